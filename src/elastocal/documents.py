@@ -1,0 +1,89 @@
+"""YAML documents that users write: read, and checked against a JSON schema that knows every key."""
+
+import difflib
+from importlib import resources
+
+import jsonschema
+import yaml
+
+from elastocal.errors import InputError
+
+
+def read_document(path):
+    """Contents of a YAML file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    InputError
+        A file that is missing or is no YAML.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            return yaml.safe_load(file)
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except yaml.YAMLError as error:
+        line = getattr(getattr(error, "problem_mark", None), "line", None)
+        where = "" if line is None else f"line {line + 1}"
+        raise InputError(path, where, getattr(error, "problem", None) or str(error), "YAML") from None
+
+
+def read_schema(name):
+    """One of the package's schemas: ``config``, ``robot`` or ``strategy``."""
+    return yaml.safe_load(resources.files("elastocal").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8"))
+
+
+def check_document(document, schema, source):
+    """Check a document against a schema.
+
+    Parameters
+    ----------
+    document : object
+    schema : str
+        Name of the schema, as in `read_schema`.
+    source : str
+        The document's file, named in errors.
+
+    Raises
+    ------
+    InputError
+        Names the first key at fault, what was found and what is allowed.
+    """
+    validator = jsonschema.Draft202012Validator(read_schema(schema))
+    errors = sorted(validator.iter_errors(document), key=lambda error: [str(part) for part in error.absolute_path])
+    if errors:
+        raise InputError(source, *_explained(errors[0]))
+
+
+def _explained(error):
+    """Key, what was found and what is allowed, of one violation."""
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path).lstrip(".")
+    rule, value = error.validator, error.validator_value
+    if rule == "additionalProperties":
+        known = sorted(error.schema.get("properties", {}))
+        unknown = next(name for name in error.instance if name not in known)
+        close = difflib.get_close_matches(str(unknown), known, n=1)
+        hint = f"{close[0]!r}?" if close else ""
+        return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{hint} ({', '.join(known)})".strip()
+    if rule == "required":
+        missing = next(name for name in value if name not in error.instance)
+        return f"{key}.{missing}".lstrip("."), "nothing", error.schema["properties"][missing].get("description", "a value")
+    meaning = error.schema.get("description", "")
+    allowed = {
+        "enum": lambda: " | ".join(map(str, value)),
+        "type": lambda: f"{value}",
+        "minimum": lambda: f"{value} or more",
+        "exclusiveMinimum": lambda: f"more than {value}",
+        "minItems": lambda: f"{value} or more entries",
+        "maxItems": lambda: f"{value} or fewer entries",
+        "uniqueItems": lambda: "each entry once",
+    }.get(rule, lambda: error.message)()
+    return key, repr(error.instance), f"{allowed} ({meaning})" if meaning else allowed

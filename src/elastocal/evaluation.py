@@ -1,0 +1,226 @@
+"""From identified compliances to the figures that judge a strategy, block of data sets by block.
+
+Two views of the same estimates: the paper's, which averages the stiffness over all data sets before it looks at the error
+(equations 12-15), and that of somebody who has one data set.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.metrics import (
+    first_length_below,
+    k_sigma,
+    mean_deviation,
+    position_errors,
+    relative_stiffness_error,
+    spread_with_censoring,
+)
+from elastocal.random_streams import draw
+
+LARGEST_TRUSTED_SPREAD = 0.25
+
+
+@dataclass(frozen=True)
+class Averages:
+    """Averages over data sets, replicate 0 with every data set once, the others with bootstrap weights.
+
+    Attributes
+    ----------
+    compliance : ndarray (1 + replicates, lengths, n)
+        Inverse of the averaged stiffness, rad/(N m).
+    deviation : ndarray (1 + replicates, lengths)
+        Equation 15, m.
+    nonpositive_share, relative_spread : ndarray (lengths,)
+    """
+
+    compliance: np.ndarray
+    deviation: np.ndarray
+    nonpositive_share: np.ndarray
+    relative_spread: np.ndarray
+
+
+def bootstrap_weights(seed, key, data_sets, replicates):
+    """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
+
+    Independent weights of mean one are the bootstrap that does not need to know how many data sets there are. They are the same
+    for every noise level and strategy.
+
+    Parameters
+    ----------
+    seed, key
+        As in `random_streams.stream`.
+    data_sets : sequence of int
+    replicates : int
+
+    Returns
+    -------
+    ndarray (1 + replicates, sets)
+    """
+    counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
+    return np.vstack([np.ones(len(counts)), counts.T])
+
+
+def average(blocks, judge, method, deviation_of):
+    """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
+
+    Parameters
+    ----------
+    blocks : iterable of (compliance, weights)
+        Compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets).
+    judge : Judge
+    method : {"stiffness", "compliance", "median"}
+        What is averaged: 1/c or c, by its mean; or the median of c (reading R7).
+    deviation_of : {"averaged_model", "each_data_set"}
+        Whether equation 15 scores the averaged model or averages the scores of the data sets (reading R8).
+
+    Returns
+    -------
+    Averages
+    """
+    if method == "median":
+        compliances, weights = zip(*blocks, strict=True)
+        blocks = [(np.concatenate(compliances), np.concatenate(weights, axis=1))]
+    total = sums = scores = moments = nonpositive = 0.0
+    sets = 0
+    for compliance, weights in blocks:
+        sets += len(compliance)
+        total = total + weights.sum(axis=1)
+        nonpositive = nonpositive + (compliance <= 0).any(axis=-1).sum(axis=0)
+        scaled = compliance / judge.reference
+        moments = moments + np.stack([scaled.sum(axis=0), (scaled**2).sum(axis=0)])
+        if method == "median":
+            averaged = _weighted_medians(compliance, weights)
+        else:
+            values = compliance if method == "compliance" else 1.0 / compliance
+            sums = sums + np.tensordot(weights, values, axes=1)
+        if deviation_of == "each_data_set":
+            scores = scores + weights @ mean_deviation(judge, compliance)
+    if method != "median":
+        averaged = sums / total[:, None, None]
+        averaged = averaged if method == "compliance" else 1.0 / averaged
+    deviation = mean_deviation(judge, averaged) if deviation_of == "averaged_model" else scores / total[:, None]
+    mean, square = moments / sets
+    spread = (np.sqrt(np.maximum(square - mean**2, 0.0)) / np.abs(mean)).max(axis=-1)
+    return Averages(averaged, deviation, nonpositive / sets, spread)
+
+
+def metrics_table(averages, true_compliance, first_stage_joints):
+    """Columns of the metrics table, one row for each length, from `average`.
+
+    Parameters
+    ----------
+    averages : Averages
+    true_compliance : ndarray (n,)
+    first_stage_joints : sequence of int
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    replicated = {}
+    relative = relative_stiffness_error(averages.compliance, true_compliance)
+    for j in range(len(true_compliance)):
+        replicated[f"compliance_{j + 1}"] = averages.compliance[..., j]
+        replicated[f"delta_k_{j + 1}"] = relative[..., j]
+    replicated |= _replicated_scores(averages, true_compliance, first_stage_joints)
+    table = {"length": np.arange(1, averages.deviation.shape[1] + 1)}
+    for name, values in replicated.items():
+        table[name], table[f"{name}_std_error"] = values[0], values[1:].std(axis=0, ddof=1)
+    table["nonpositive_share"], table["relative_spread"] = averages.nonpositive_share, averages.relative_spread
+    with np.errstate(invalid="ignore"):
+        table["trustworthy"] = (averages.nonpositive_share == 0) & (averages.relative_spread <= LARGEST_TRUSTED_SPREAD)
+    return table
+
+
+def replicates_table(averages, true_compliance, first_stage_joints):
+    """Columns of the replicates table: the scores of every bootstrap replicate at every length.
+
+    Parameters
+    ----------
+    averages, true_compliance, first_stage_joints
+        As in `metrics_table`.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    replicates, lengths = averages.deviation[1:].shape
+    table = {
+        "replicate": np.repeat(np.arange(1, replicates + 1), lengths),
+        "length": np.tile(np.arange(1, lengths + 1), replicates),
+    }
+    scores = _replicated_scores(averages, true_compliance, first_stage_joints)
+    return table | {name: values[1:].ravel() for name, values in scores.items()}
+
+
+def accuracy_table(blocks, judge, lengths):
+    """Columns of the accuracy table: what one data set gives, averaged over data sets.
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray (sets, lengths, n)
+        Compliances.
+    judge : Judge
+    lengths : sequence of int
+        Which data set lengths to evaluate.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    rows = np.asarray(lengths) - 1
+    sets, first, second = 0, 0.0, 0.0
+    for block in blocks:
+        compliance = block[:, rows]
+        n = compliance.shape[-1]
+        errors = position_errors(judge, compliance.reshape(-1, n))
+        rank = int(np.ceil(0.95 * errors.shape[1])) - 1
+        single = np.stack([errors.mean(axis=1), (errors**2).mean(axis=1), np.partition(errors, rank)[:, rank], errors.max(axis=1)], 1)
+        relative = ((compliance - judge.reference) / judge.reference) ** 2
+        values = np.concatenate([single.reshape(*compliance.shape[:2], 4), relative], axis=-1)
+        sets += len(block)
+        first, second = first + values.sum(axis=0), second + (values**2).sum(axis=0)
+    mean = first / sets
+    error = np.sqrt(np.maximum(second / sets - mean**2, 0.0) / max(sets - 1, 1))
+    squared = np.zeros(mean.shape[1], bool)
+    squared[[1, *range(4, mean.shape[1])]] = True
+    with np.errstate(invalid="ignore", divide="ignore"):
+        error = np.where(squared & (mean > 0), error / (2 * np.sqrt(mean)), error)
+    mean = np.where(squared, np.sqrt(mean), mean)
+    names = ["mean", "rms", "p95", "max", *(f"relative_error_{j + 1}" for j in range(mean.shape[1] - 4))]
+    table = {"length": np.asarray(lengths)}
+    for column, name in enumerate(names):
+        scale = 100.0 if name.startswith("relative") else 1.0
+        table[name], table[f"{name}_std_error"] = scale * mean[:, column], scale * error[:, column]
+    return table
+
+
+def lengths_to_reach(values, replicate_values, limit):
+    """First length at which a metric is at most `limit`, with its Monte Carlo standard error.
+
+    Parameters
+    ----------
+    values : ndarray (lengths,)
+    replicate_values : ndarray (replicates, lengths)
+    limit : float
+
+    Returns
+    -------
+    length, std_error : float
+        Infinite where it is not reached; see `metrics.spread_with_censoring`.
+    """
+    return float(first_length_below(values, limit)), spread_with_censoring(first_length_below(replicate_values, limit))
+
+
+def _replicated_scores(averages, true_compliance, first_stage_joints):
+    return {
+        "k_sigma": k_sigma(averages.compliance, true_compliance),
+        "k_sigma_first_stage": k_sigma(averages.compliance, true_compliance, list(first_stage_joints)),
+        "deviation": averages.deviation,
+    }
+
+
+def _weighted_medians(compliance, weights):
+    counts = weights.astype(int)
+    return np.stack([np.median(np.repeat(compliance, count, axis=0), axis=0) for count in counts])

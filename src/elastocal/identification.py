@@ -1,0 +1,284 @@
+"""Equation 11 for every prefix of many data sets in one pass, one strategy at a time.
+
+The least-squares problem of the first k configurations, for every k, is solved by orthogonal elimination that takes one
+configuration after the other and all data sets at once. It gives the solution of the normal equations of equation 11 without
+forming them, so that prefixes of one or two configurations keep their digits.
+
+Inside this module the batch lies last in memory, as (..., configuration, data set).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What one measuring point contributes.
+
+    Attributes
+    ----------
+    regressor : ndarray (rows, n, configurations, sets)
+        Matrix A of equation 10, base axes.
+    deflection : ndarray (rows, configurations, sets)
+        Measured deflection; rows are three displacements (m), then, where poses are measured, three rotations (rad).
+    """
+
+    regressor: np.ndarray
+    deflection: np.ndarray
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What a strategy makes of each prefix; the first axis for the prefixes 1, 2, 3 ...
+
+    Attributes
+    ----------
+    compliance : ndarray (configurations, n, sets)
+        rad/(N m); not a number where the prefix is too short.
+    covariance : ndarray (configurations, sets, n, n)
+        Of the compliances for readings with unit variance, through all stages.
+    condition : ndarray (configurations, sets)
+        2-norm condition number of the identification Jacobian, the largest of the stages.
+    """
+
+    compliance: np.ndarray
+    covariance: np.ndarray
+    condition: np.ndarray
+
+
+def first_solvable_length(strategy, rows):
+    """Smallest number of configurations with at least as many readings as unknowns in every stage.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    rows : int
+        Readings of one point in one configuration: 6 for poses, 3 for positions.
+
+    Returns
+    -------
+    int
+    """
+    return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
+
+
+def identify(strategy, readings, joints):
+    """Compliances by a strategy for every prefix length of every data set, with covariance and condition number.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    readings : dict of str to Readings
+        For each measuring point of the strategy.
+    joints : int
+        Number of joints, n.
+
+    Returns
+    -------
+    Estimates
+    """
+    compliance, triangles = estimate_compliance(strategy, readings, joints)
+    spread = covariance(strategy, readings, triangles)
+    condition = condition_numbers(strategy, triangles)
+    rows = next(iter(readings.values())).regressor.shape[0]
+    short = first_solvable_length(strategy, rows) - 1
+    for result in (compliance, spread, condition):
+        result[:short] = np.nan
+    return Estimates(compliance, spread, condition)
+
+
+def estimate_compliance(strategy, readings, joints):
+    """Solve the stages of a strategy one after the other (equation 11).
+
+    Parameters
+    ----------
+    strategy, readings, joints
+        As in `identify`.
+
+    Returns
+    -------
+    compliance : ndarray (configurations, n, sets)
+        rad/(N m); meaningless where a prefix is too short, see `first_solvable_length`.
+    triangles : list of ndarray (configurations, pivots, columns, sets)
+        Triangular factor of each stage; columns: joints identified, joints held, right-hand side.
+    """
+    *_, configurations, sets = next(iter(readings.values())).regressor.shape
+    compliance = np.full((configurations, joints, sets), np.nan)
+    triangles = []
+    for stage in strategy.stages:
+        pivots = len(stage.identified)
+        triangle = prefix_triangles(_stacked_system(stage, readings), pivots)
+        right = triangle[:, :, -1]
+        for column, joint in enumerate(stage.held, pivots):
+            right = right - triangle[:, :, column] * compliance[:, None, joint]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for row in range(pivots - 1, -1, -1):
+                rest = right[:, row].copy()
+                for column in range(row + 1, pivots):
+                    rest -= triangle[:, row, column] * compliance[:, stage.identified[column]]
+                compliance[:, stage.identified[row]] = rest / triangle[:, row, row]
+        triangles.append(triangle)
+    return compliance, triangles
+
+
+def covariance(strategy, readings, triangles):
+    """Covariance of the estimates for readings of unit variance, through all stages, also where stages share readings.
+
+    Parameters
+    ----------
+    strategy, readings
+        As in `identify`.
+    triangles : list of ndarray
+        From `estimate_compliance`.
+
+    Returns
+    -------
+    ndarray (configurations, sets, n, n)
+
+    Notes
+    -----
+    A stage solves N_II c_I = sum_p (A_p^T y_p)_I - N_IH c_H, with N the information of its points, I the joints identified and H
+    those held. With e_p the noise at point p, the estimates are c + sum_p B_p A_p^T e_p, so their covariance is
+    sum_p B_p N_p B_p^T. A stage that holds nothing forgets the stages before it.
+    """
+    start = max(index for index, stage in enumerate(strategy.stages) if not stage.held)
+    stages = list(zip(strategy.stages, triangles, strict=True))[start:]
+    if len(stages) == 1:
+        order = np.argsort(stages[0][0].identified)
+        return _stage_inverse(*stages[0])[..., order, :][..., order]
+    names = tuple(dict.fromkeys(name for stage, _ in stages for name in stage.points))
+    information = {name: prefix_information(readings[name].regressor) for name in names}
+    gain = {name: np.zeros_like(information[name]) for name in names}
+    for stage, triangle in stages:
+        pivots, held = list(stage.identified), list(stage.held)
+        stage_inverse = _stage_inverse(stage, triangle)
+        coupling = sum(information[name][..., pivots, :][..., held] for name in stage.points)
+        for name in names:
+            right = -coupling @ gain[name][..., held, :]
+            if name in stage.points:
+                right[..., range(len(pivots)), pivots] += 1.0
+            gain[name][..., pivots, :] = stage_inverse @ right
+    return sum(gain[name] @ information[name] @ np.swapaxes(gain[name], -1, -2) for name in names)
+
+
+def condition_numbers(strategy, triangles):
+    """2-norm condition number of the identification Jacobian, the largest of the stages.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    triangles : list of ndarray
+        From `estimate_compliance`; their singular values are those of the regressor.
+
+    Returns
+    -------
+    ndarray (configurations, sets)
+        Infinite where the smallest singular value is zero to rounding.
+    """
+    largest = 1.0
+    for stage, triangle in zip(strategy.stages, triangles, strict=True):
+        matrices = _row_major(triangle[:, :, : len(stage.identified)])
+        eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
+        with np.errstate(divide="ignore"):
+            largest = np.maximum(largest, np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0)))
+    return largest
+
+
+def prefix_triangles(system, pivots):
+    """Triangular factor of the first k configurations, for every k, by Householder reflections.
+
+    Parameters
+    ----------
+    system : ndarray (rows, columns, configurations, sets)
+        Unknowns first, right-hand side last.
+    pivots : int
+        How many leading columns are unknowns to eliminate.
+
+    Returns
+    -------
+    ndarray (configurations, pivots, columns, sets)
+        Rows of R and, in the remaining columns, Q^T times them.
+
+    Notes
+    -----
+    The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
+    row of the triangle and the new rows only.
+    """
+    _, columns, configurations, sets = system.shape
+    triangle = np.zeros((pivots, columns, sets))
+    prefixes = np.empty((configurations, pivots, columns, sets))
+    for configuration in range(configurations):
+        new = system[:, :, configuration].copy()
+        for k in range(pivots):
+            head, tail = triangle[k, k], new[:, k]
+            norm = np.sqrt(head * head + (tail * tail).sum(axis=0))
+            reflected = -np.copysign(norm, head)
+            lead = head - reflected
+            scale = norm * np.abs(lead)
+            weight = lead * triangle[k, k + 1 :] + (tail[:, None] * new[:, k + 1 :]).sum(axis=0)
+            weight /= np.where(scale > 0, scale, 1.0)
+            triangle[k, k + 1 :] -= lead * weight
+            new[:, k + 1 :] -= tail[:, None] * weight
+            triangle[k, k] = reflected
+        prefixes[configuration] = triangle
+    return prefixes
+
+
+def inverse_triangles(triangle):
+    """Inverses of upper triangular matrices.
+
+    Parameters
+    ----------
+    triangle : ndarray (configurations, m, m, sets)
+
+    Returns
+    -------
+    ndarray (configurations, m, m, sets)
+        Infinite or not a number where singular.
+    """
+    size = triangle.shape[1]
+    inverse = np.zeros_like(triangle)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for column in range(size):
+            inverse[:, column, column] = 1.0 / triangle[:, column, column]
+            for row in range(column - 1, -1, -1):
+                done = (triangle[:, row, row + 1 : column + 1] * inverse[:, row + 1 : column + 1, column]).sum(axis=1)
+                inverse[:, row, column] = -done * inverse[:, row, row]
+    return inverse
+
+
+def prefix_information(regressor):
+    """Sum of A^T A over the first k configurations, for every k.
+
+    Parameters
+    ----------
+    regressor : ndarray (rows, n, configurations, sets)
+
+    Returns
+    -------
+    ndarray (configurations, sets, n, n)
+    """
+    matrices = np.ascontiguousarray(np.moveaxis(regressor, (0, 1), (-2, -1)))
+    return np.cumsum(np.swapaxes(matrices, -1, -2) @ matrices, axis=0)
+
+
+def _stacked_system(stage, readings):
+    """Rows of all points of a stage; columns: joints identified, joints held, measured deflection."""
+    order = list(stage.identified + stage.held)
+    blocks = []
+    for name in stage.points:
+        point = readings[name]
+        blocks.append(np.concatenate([point.regressor[:, order], point.deflection[:, None]], axis=1))
+    return np.concatenate(blocks)
+
+
+def _stage_inverse(stage, triangle):
+    """Inverse information of the joints that a stage identifies, (configurations, sets, m, m), in the order of the stage."""
+    inverse = _row_major(inverse_triangles(triangle[:, :, : len(stage.identified)]))
+    return inverse @ np.swapaxes(inverse, -1, -2)
+
+
+def _row_major(matrices):
+    """(configurations, m, n, sets) to contiguous (configurations, sets, m, n), as stacked linear algebra wants it."""
+    return np.ascontiguousarray(np.moveaxis(matrices, -1, 1))

@@ -1,0 +1,185 @@
+"""Equations 12-15: how good an identified model is, in its stiffnesses and at the end-effector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.kinematics import poses_and_jacobians
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Loaded configurations that no identification has seen, ready to score any compliances.
+
+    Attributes
+    ----------
+    reference : ndarray (n,)
+        Compliances about which the prediction is linear, rad/(N m).
+    quadratic_forms : ndarray (tests, (n + 1)(n + 2) / 2)
+        Squared position error at each test configuration as a quadratic form in (c - reference, 1).
+    """
+
+    reference: np.ndarray
+    quadratic_forms: np.ndarray
+
+
+def make_judge(robot, experiments, true_deflection):
+    """Score sheet of the reduced model on test configurations.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its joint compliances are the reference.
+    experiments : Experiments
+    true_deflection : ndarray (..., 6)
+        Of the end-effector, as simulated with the robot's full model.
+
+    Returns
+    -------
+    Judge
+
+    Notes
+    -----
+    The position error of a model c is (exact prediction at the reference - truth) + A (c - reference); what this leaves out is
+    of second order in the compliance *error*, below a thousandth of the error itself.
+    """
+    point = robot.chain.end_effector
+    torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, point)
+    jacobian = poses_and_jacobians(robot.chain, experiments.joint_angles, point)[2]
+    slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
+    predicted = exact_deflections(robot.chain, experiments.joint_angles, robot.compliance * torques, point)
+    offset = (predicted - true_deflection)[..., :3].reshape(-1, 3, 1)
+    rows = np.concatenate([slope, offset], axis=-1)
+    first, second = np.triu_indices(robot.joints + 1)
+    forms = (rows[..., first] * rows[..., second]).sum(axis=1) * np.where(first == second, 1.0, 2.0)
+    return Judge(robot.compliance, forms)
+
+
+def error_moment(judge):
+    """Mean over the test configurations of A^T A: the quadratic form of the mean squared position error.
+
+    Parameters
+    ----------
+    judge : Judge
+
+    Returns
+    -------
+    ndarray (n, n)
+        m^2 per (rad/(N m))^2.
+    """
+    size = len(judge.reference) + 1
+    first, second = np.triu_indices(size)
+    moment = np.zeros((size, size))
+    moment[first, second] = judge.quadratic_forms.mean(axis=0) / 2
+    return (moment + moment.T)[:-1, :-1]
+
+
+def position_errors(judge, compliance):
+    """End-effector position error of models at every test configuration.
+
+    Parameters
+    ----------
+    judge : Judge
+    compliance : ndarray (models, n)
+        rad/(N m).
+
+    Returns
+    -------
+    ndarray (models, tests)
+        m.
+    """
+    error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
+    first, second = np.triu_indices(error.shape[1])
+    squares = (error[:, first] * error[:, second]) @ judge.quadratic_forms.T
+    return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
+
+
+def mean_deviation(judge, compliance, chunk=4096):
+    """Equation 15: position error of models, mean over the test configurations.
+
+    Parameters
+    ----------
+    judge : Judge
+    compliance : ndarray (..., n)
+    chunk : int
+        Models at a time, to bound the memory.
+
+    Returns
+    -------
+    ndarray (...)
+        m.
+    """
+    models = compliance.reshape(-1, compliance.shape[-1])
+    parts = [position_errors(judge, models[i : i + chunk]).mean(axis=1) for i in range(0, len(models), chunk)]
+    return np.concatenate(parts).reshape(compliance.shape[:-1])
+
+
+def relative_stiffness_error(compliance, true_compliance):
+    """Equation 13, (k - k0) / k0 in percent, with k = 1 / c.
+
+    Parameters
+    ----------
+    compliance : ndarray (..., n)
+        Inverse of the averaged stiffness.
+    true_compliance : ndarray (n,)
+
+    Returns
+    -------
+    ndarray (..., n)
+    """
+    return 100.0 * (true_compliance / compliance - 1.0)
+
+
+def k_sigma(compliance, true_compliance, joints=slice(None)):
+    """Equation 14: sum of the relative stiffness errors over joints, in percent.
+
+    Parameters
+    ----------
+    compliance, true_compliance
+        As in `relative_stiffness_error`.
+    joints : sequence of int, optional
+        Only these (reading R10).
+
+    Returns
+    -------
+    ndarray (...)
+    """
+    return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(axis=-1)
+
+
+def first_length_below(values, limit):
+    """First data set length at which a metric is at most `limit` in absolute value.
+
+    Parameters
+    ----------
+    values : ndarray (..., lengths)
+        For the lengths 1, 2, 3 ...; not-a-number counts as above.
+    limit : float
+
+    Returns
+    -------
+    ndarray (...)
+        Infinite where no length reaches it.
+    """
+    below = np.abs(values) <= limit
+    return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
+
+
+def spread_with_censoring(values):
+    """Standard deviation of replicates of which some may be infinite (not reached).
+
+    Parameters
+    ----------
+    values : ndarray (replicates,)
+
+    Returns
+    -------
+    float
+        Where some are infinite: from the 16th percentile to the median, one standard deviation of a normal spread that the
+        censored upper end does not touch; not a number where more than half are infinite.
+    """
+    if np.isfinite(values).all():
+        return float(np.std(values, ddof=1))
+    low, middle = np.percentile(values, [15.87, 50.0], method="lower")
+    return float(middle - low) if np.isfinite(middle) else float("nan")

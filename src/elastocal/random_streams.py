@@ -1,0 +1,48 @@
+"""Random numbers that depend on what they are for and on nothing else.
+
+Every stream is named by (seed, robot, purpose, data set): the first two make the key of a Philox counter generator, the others
+its position. How many sets are drawn, in which order, by how many cores or in which blocks cannot change a number.
+"""
+
+import hashlib
+
+import numpy as np
+
+
+def stream(seed, robot, purpose, data_set):
+    """Generator for one purpose in one data set.
+
+    Parameters
+    ----------
+    seed : int
+    robot : str
+        Name of the robot's file.
+    purpose : str
+        Such as ``configurations``.
+    data_set : int
+
+    Returns
+    -------
+    numpy.random.Generator
+    """
+    key = np.frombuffer(hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64)
+    use = int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")
+    return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
+
+
+def draw(seed, robot, purpose, data_sets, sampler):
+    """One array for each data set, stacked.
+
+    Parameters
+    ----------
+    seed, robot, purpose
+        As in `stream`.
+    data_sets : iterable of int
+    sampler : callable
+        Takes a Generator, returns an array of fixed shape.
+
+    Returns
+    -------
+    ndarray (sets, ...)
+    """
+    return np.stack([sampler(stream(seed, robot, purpose, data_set)) for data_set in data_sets])

@@ -1,0 +1,324 @@
+"""A robot: a chain of elementary transforms with named measuring points, and what is known of its elasticity.
+
+The chain notation is the paper's matrix product written in a line (equations 1-4)::
+
+    Tz(l1) Rz(q1) Tx(l2) Ry(q2) Tx(l3) [2DoF] Ry(q3) ...
+
+``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a length,
+a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign; ``[NAME]`` marks a
+measuring point.
+"""
+
+import math
+import re
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from elastocal.errors import InputError
+
+AXES = "xyz"
+_TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
+_NUMBER = re.compile(r"\d+(\.\d*)?|\.\d+")
+_NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POINT], separated by blanks"
+
+
+@dataclass(frozen=True)
+class Transform:
+    """One elementary transform: ``constant + sign * coordinate`` along or about an axis of the moving frame.
+
+    Attributes
+    ----------
+    kind : {"T", "R"}
+        Translation (m) or rotation (rad).
+    axis : int
+        0, 1, 2 for x, y, z.
+    constant : float
+        The part that does not move (m or rad).
+    coordinate : int or None
+        Index of the coordinate that moves it: a joint, or a spring of the extended model.
+    sign : float
+        Sense of the coordinate, +1 or -1.
+    """
+
+    kind: str
+    axis: int
+    constant: float = 0.0
+    coordinate: int | None = None
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class MeasuringPoint:
+    """A place on the chain where a target sits.
+
+    Attributes
+    ----------
+    name : str
+    after : int
+        How many transforms of the chain come before it.
+    offset_m : tuple of float
+        The target in the frame of the point (the paper's T_tool, without rotation).
+    """
+
+    name: str
+    after: int
+    offset_m: tuple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Elementary transforms from the base to the last measuring point.
+
+    Attributes
+    ----------
+    transforms : tuple of Transform
+    points : tuple of MeasuringPoint
+        In the order of the chain; the last one is the end-effector.
+    coordinates : int
+        Number of coordinates that the transforms refer to.
+    """
+
+    transforms: tuple
+    points: tuple
+    coordinates: int
+
+    @property
+    def end_effector(self):
+        """The last measuring point, where the external wrench is stated."""
+        return self.points[-1]
+
+    def point(self, name):
+        """The measuring point called `name`; KeyError names those there are."""
+        for point in self.points:
+            if point.name == name:
+                return point
+        raise KeyError(f"measuring point {name!r}; the chain has {', '.join(p.name for p in self.points)}")
+
+    def moved_by(self, point):
+        """Indices of the coordinates before `point`: those that can move it."""
+        transforms = self.transforms[: point.after]
+        return tuple(t.coordinate for t in transforms if t.coordinate is not None)
+
+
+@dataclass(frozen=True)
+class Tube:
+    """A thick-walled tube of one material.
+
+    Attributes
+    ----------
+    outer_diameter_m, wall_m : float
+        Outer diameter and wall thickness.
+    youngs_modulus_Pa, shear_modulus_Pa : float
+        Material.
+    """
+
+    outer_diameter_m: float
+    wall_m: float
+    youngs_modulus_Pa: float
+    shear_modulus_Pa: float
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid stretch of the chain between two joints, and the tube that it is taken for.
+
+    Attributes
+    ----------
+    after : int
+        How many transforms of the chain come before its far end.
+    vector_m : tuple of float
+        From its near to its far end, in the frame of the chain there.
+    tube : Tube
+    """
+
+    after: int
+    vector_m: tuple
+    tube: Tube
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A robot as its file describes it, in SI units.
+
+    Attributes
+    ----------
+    name : str
+    chain : Chain
+    compliance : ndarray (n,)
+        Joint compliances, rad/(N m).
+    joint_limits : ndarray (n, 2)
+        rad.
+    links : tuple of Link
+        Elastic links of the extended model; empty for the reduced model.
+    reported_matrix, reported_offset : ndarray (n, n), (n,)
+        Joint angles from what the controller reports: q = matrix @ reported + offset (rad).
+    """
+
+    name: str
+    chain: Chain
+    compliance: np.ndarray
+    joint_limits: np.ndarray
+    links: tuple = ()
+    reported_matrix: np.ndarray = field(default=None)
+    reported_offset: np.ndarray = field(default=None)
+
+    @property
+    def joints(self):
+        """Number of joints."""
+        return self.chain.coordinates
+
+
+def parse_chain(text, lengths_m, source):
+    """Read the chain notation.
+
+    Parameters
+    ----------
+    text : str
+        The chain, as in the module's docstring.
+    lengths_m : mapping of str to float
+        Named lengths.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Chain
+
+    Raises
+    ------
+    InputError
+        A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, no measuring point,
+        a measuring point named twice.
+    """
+    transforms, points, joints, used = [], [], 0, set()
+    for word in text.split():
+        token = _TOKEN.fullmatch(word)
+        if not token:
+            raise InputError(source, "chain", repr(word), _NOTATION)
+        if token["point"]:
+            if token["point"] in {p.name for p in points}:
+                raise InputError(source, "chain", f"[{token['point']}] twice", "each measuring point once")
+            points.append(MeasuringPoint(token["point"], len(transforms)))
+            continue
+        kind, axis, argument = token["kind"], AXES.index(token["axis"]), token["argument"]
+        sign = -1.0 if token["sign"] else 1.0
+        number = argument.removesuffix("deg") if kind == "R" else argument
+        if kind == "T" and argument in lengths_m:
+            used.add(argument)
+            transforms.append(Transform(kind, axis, sign * lengths_m[argument]))
+        elif _NUMBER.fullmatch(number) and (kind == "T" or argument.endswith("deg")):
+            value = float(number)
+            transforms.append(Transform(kind, axis, sign * (value if kind == "T" else math.radians(value))))
+        elif kind == "R" and argument == f"q{joints + 1}":
+            transforms.append(Transform(kind, axis, 0.0, joints, sign))
+            joints += 1
+        else:
+            allowed = f"q{joints + 1} or degrees such as 90deg" if kind == "R" else f"{', '.join(lengths_m)} or metres"
+            raise InputError(source, "chain", repr(word), f"in {kind}{token['axis']}(): {allowed}")
+    if not joints:
+        raise InputError(source, "chain", "no joint", "at least one R.(q1)")
+    if not points or points[-1].after != len(transforms):
+        raise InputError(source, "chain", f"{text.split()[-1]!r} at its end", "a measuring point such as [6DoF] at the end")
+    if unused := sorted(set(lengths_m) - used):
+        raise InputError(source, "lengths_m", ", ".join(unused), "lengths that the chain uses")
+    return Chain(tuple(transforms), tuple(points), joints)
+
+
+def with_target_offset(holder, offset_m):
+    """A chain, or the robot around it, with the same target offset on every measuring point (the paper's T_tool, reading R5).
+
+    Parameters
+    ----------
+    holder : Chain or Robot
+    offset_m : sequence of float
+
+    Returns
+    -------
+    Chain or Robot
+    """
+    if isinstance(holder, Robot):
+        return replace(holder, chain=with_target_offset(holder.chain, offset_m))
+    return replace(holder, points=tuple(replace(p, offset_m=tuple(offset_m)) for p in holder.points))
+
+
+def stretches(chain):
+    """Rigid stretches between the joints, as (transforms before the far end, vector in the frame of the chain there).
+
+    Rotations by a fixed angle inside a stretch are not supported here, as in any chain that turns at its joints only.
+    """
+    found, vector = [], np.zeros(3)
+    for index, transform in enumerate(chain.transforms):
+        if transform.kind == "T":
+            vector[transform.axis] += transform.constant
+        if transform.kind == "R" or index == len(chain.transforms) - 1:
+            end = index if transform.kind == "R" else index + 1
+            if np.linalg.norm(vector) > 0:
+                found.append((end, tuple(vector.tolist())))
+            vector = np.zeros(3)
+    return tuple(found)
+
+
+def robot_from_document(document, source="robot"):
+    """Make a robot from the contents of its file, already validated against the robot schema.
+
+    Parameters
+    ----------
+    document : mapping
+        Keys as in ``schemas/robot.yaml``.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        Where the chain does not parse or a list has another length than the robot has joints.
+    """
+    chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
+    n = chain.coordinates
+    for key in ("joint_limits_deg", "compliance_urad_per_Nm"):
+        if len(document[key]) != n:
+            raise InputError(source, key, f"{len(document[key])} entries", f"one for each of the {n} joints")
+    limits = np.radians(np.array(document["joint_limits_deg"], float))
+    if (limits[:, 0] >= limits[:, 1]).any():
+        joint = int(np.argmax(limits[:, 0] >= limits[:, 1]))
+        raise InputError(source, f"joint_limits_deg[{joint}]", document["joint_limits_deg"][joint], "[lower, upper]")
+    reported = document.get("reported_joints", {})
+    matrix = np.array(reported.get("matrix", np.eye(n)), float)
+    offset = np.radians(np.array(reported.get("offset_deg", np.zeros(n)), float))
+    if matrix.shape != (n, n) or offset.shape != (n,):
+        raise InputError(source, "reported_joints", f"{matrix.shape} and {offset.shape}", f"{n} x {n} and {n} numbers")
+    return Robot(
+        name=document["name"],
+        chain=chain,
+        compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
+        joint_limits=limits,
+        links=_links(chain, document.get("links"), source),
+        reported_matrix=matrix,
+        reported_offset=offset,
+    )
+
+
+def _links(chain, described, source):
+    if described is None:
+        return ()
+    if any(t.kind == "R" and t.coordinate is None for t in chain.transforms):
+        raise InputError(source, "links", "a chain with fixed rotations", "links on chains that turn at their joints only")
+    rigid = stretches(chain)
+    tubes = described["tubes"]
+    if len(tubes) not in (1, len(rigid)):
+        raise InputError(source, "links.tubes", f"{len(tubes)} tubes", f"one for all links or one for each of the {len(rigid)}")
+    links = []
+    for number, (after, vector) in enumerate(rigid):
+        size = tubes[number if len(tubes) > 1 else 0]
+        if 2 * size["wall_m"] > size["outer_diameter_m"]:
+            raise InputError(source, "links.tubes", f"wall_m {size['wall_m']}", "at most half the outer_diameter_m")
+        tube = Tube(
+            size["outer_diameter_m"], size["wall_m"], 1e9 * described["youngs_modulus_GPa"], 1e9 * described["shear_modulus_GPa"]
+        )
+        links.append(Link(after, vector, tube))
+    return tuple(links)

@@ -1,0 +1,228 @@
+"""Tables on disk: Parquet files that carry their units, their provenance and a digest of their contents.
+
+A file is one tidy table. Each column's unit and meaning stand in its field metadata; the file's own metadata hold the name of
+the schema, the provenance and, for each row group and column, a SHA-256 of the values. Row groups are blocks of data sets, so
+that any number of them is worked off in the same memory.
+"""
+
+import hashlib
+import json
+import os
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from elastocal.errors import InputError
+
+_AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name : str
+    type : {"float64", "float32", "int32", "bool", "string"}
+        A string column has one value for each row group.
+    unit : str
+        Empty for counts, names and shares.
+    meaning : str
+    missing : bool
+        Whether a floating-point column may hold not-a-number or infinity.
+    minimum : float or None
+    """
+
+    name: str
+    type: str
+    unit: str
+    meaning: str
+    missing: bool = False
+    minimum: float | None = None
+
+
+@dataclass(frozen=True)
+class TableSchema:
+    """Name and columns of a table."""
+
+    name: str
+    columns: tuple
+
+    def column(self, name):
+        """The column called `name`."""
+        return next(column for column in self.columns if column.name == name)
+
+
+def write_table(path, schema, blocks, provenance):
+    """Write a table block by block, each a row group; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+    schema : TableSchema
+    blocks : iterable of dict of str to array
+        One value or array for each column; all arrays of a block have the same length.
+    provenance : dict
+        JSON-serialisable; says from what the table was made.
+
+    Raises
+    ------
+    InputError
+        A column that is missing, too many, not finite or out of range.
+    """
+    fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
+    floats = [c.name for c in schema.columns if c.type.startswith("float")]
+    partial, digests = f"{path}.partial", []
+    with pq.ParquetWriter(
+        partial,
+        pa.schema(fields),
+        compression="zstd",
+        compression_level=1,
+        use_dictionary=[c.name for c in schema.columns if c.name not in floats],
+        use_byte_stream_split=floats,
+    ) as writer:
+        for block in blocks:
+            values = _checked(path, schema, block)
+            digests.append({name: _digest(array) for name, array in values.items()})
+            arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
+        metadata = {"elastocal.table": schema.name, "elastocal.provenance": provenance, "elastocal.sha256": digests}
+        writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
+    os.replace(partial, path)
+
+
+def read_blocks(path, schema, columns=None, **where):
+    """Read a table block by block, checked against its schema and its digests.
+
+    Parameters
+    ----------
+    path : str
+    schema : TableSchema
+    columns : sequence of str, optional
+        Only these; all without.
+    **where
+        Column = value: only row groups with this value throughout.
+
+    Yields
+    ------
+    dict of str to ndarray
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, is another table, or whose contents are not those written.
+    """
+    wanted = [c for c in schema.columns if columns is None or c.name in columns]
+    with _opened(path) as file:
+        metadata = file.schema_arrow.metadata or {}
+        metadata = {**metadata, **(file.metadata.metadata or {})}
+        if metadata.get(b"elastocal.table") != json.dumps(schema.name).encode():
+            raise InputError(path, "metadata elastocal.table", metadata.get(b"elastocal.table", b"nothing").decode(), schema.name)
+        for column in schema.columns:
+            index = file.schema_arrow.get_field_index(column.name)
+            if index < 0 or file.schema_arrow.field(index).type != _arrow_type(column):
+                found = "nothing" if index < 0 else f"type {file.schema_arrow.field(index).type}"
+                raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
+        digests = json.loads(metadata[b"elastocal.sha256"])
+        if len(digests) != file.num_row_groups:
+            raise InputError(path, "row groups", str(file.num_row_groups), f"{len(digests)}: {_AS_WRITTEN}")
+        positions = {file.metadata.schema.column(i).path: i for i in range(file.metadata.num_columns)}
+        for group in range(file.num_row_groups):
+            if any(_constant(file, group, positions[name]) != value for name, value in where.items()):
+                continue
+            try:
+                table = file.read_row_group(group, [c.name for c in wanted], use_threads=False)
+            except (OSError, pa.ArrowException) as error:
+                raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
+            block = {c.name: _to_numpy(c, table.column(c.name)) for c in wanted}
+            for name, array in block.items():
+                if _digest(array) != digests[group][name]:
+                    raise InputError(path, f"column {name}, row group {group}", "values that were edited", _AS_WRITTEN)
+            yield block
+
+
+def read_table(path, schema, columns=None, **where):
+    """Read a whole table; as `read_blocks`, with the blocks joined.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    blocks = list(read_blocks(path, schema, columns, **where))
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def read_provenance(path):
+    """What `write_table` was told of where the table comes from.
+
+    Parameters
+    ----------
+    path : str
+
+    Returns
+    -------
+    dict
+    """
+    with _opened(path) as file:
+        return json.loads((file.metadata.metadata or {})[b"elastocal.provenance"])
+
+
+def _opened(path):
+    try:
+        return pq.ParquetFile(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None
+
+
+def _constant(file, group, column):
+    statistics = file.metadata.row_group(group).column(column).statistics
+    return statistics.min if statistics and statistics.min == statistics.max else None
+
+
+def _arrow_type(column):
+    return pa.dictionary(pa.int32(), pa.string()) if column.type == "string" else pa.type_for_alias(column.type)
+
+
+def _checked(path, schema, block):
+    names = [c.name for c in schema.columns]
+    if set(block) != set(names):
+        raise InputError(path, "columns", ", ".join(sorted(set(block) ^ set(names))), f"those of {schema.name}")
+    values = {}
+    for column in schema.columns:
+        value = block[column.name]
+        if column.type != "string":
+            value = np.ascontiguousarray(value, dtype=column.type)
+            if column.type.startswith("float") and not column.missing and not np.isfinite(value).all():
+                row = int(np.argmin(np.isfinite(value)))
+                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), "finite numbers")
+            if column.minimum is not None and (value < column.minimum).any():
+                row = int(np.argmax(value < column.minimum))
+                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), f">= {column.minimum}")
+        values[column.name] = value
+    lengths = {len(v) for c, v in values.items() if not isinstance(v, str)}
+    if len(lengths) != 1:
+        raise InputError(path, "rows", f"columns of {sorted(lengths)} rows", "columns of one length")
+    rows = lengths.pop()
+    return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
+
+
+def _digest(array):
+    data = "\n".join(dict.fromkeys(array)).encode() if array.dtype == object else np.ascontiguousarray(array)
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+def _to_arrow(column, array, rows):
+    if column.type != "string":
+        return pa.array(array)
+    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), pa.array([array[0]]))
+
+
+def _to_numpy(column, chunked):
+    array = chunked.combine_chunks() if chunked.num_chunks != 1 else chunked.chunk(0)
+    if column.type == "string":
+        names = np.array(array.dictionary.to_pylist(), dtype=object)
+        return names[array.indices.to_numpy(zero_copy_only=False)]
+    return array.to_numpy(zero_copy_only=False)

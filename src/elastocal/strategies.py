@@ -1,0 +1,114 @@
+"""Identification strategies as data: stages of (points measured, joints identified, joints held from an earlier stage)."""
+
+from dataclasses import dataclass
+
+from elastocal.errors import InputError
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One least-squares problem of a strategy.
+
+    Attributes
+    ----------
+    points : tuple of str
+        Measuring points whose readings it uses, with equal weight.
+    identified : tuple of int
+        Joint indices, from 0, that it estimates; estimates of an earlier stage are where an iterative solver starts.
+    held : tuple of int
+        Joint indices whose estimates it takes over from earlier stages.
+    """
+
+    points: tuple
+    identified: tuple
+    held: tuple = ()
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """A named sequence of stages that together estimate every joint.
+
+    Attributes
+    ----------
+    name : str
+        As printed in the paper.
+    stages : tuple of Stage
+    """
+
+    name: str
+    stages: tuple
+
+    @property
+    def points(self):
+        """Names of all points that the strategy measures, each once, in order of use."""
+        return tuple(dict.fromkeys(name for stage in self.stages for name in stage.points))
+
+    @property
+    def first_stage_joints(self):
+        """Joints that the last stage takes over (the paper's k_sigma seems to count these alone, reading R10); else all."""
+        last = self.stages[-1]
+        return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
+
+
+def strategy_from_document(document):
+    """Make a strategy from the contents of its file, already validated against the strategy schema.
+
+    Parameters
+    ----------
+    document : mapping
+        Keys as in ``schemas/strategy.yaml``; joints count from 1.
+
+    Returns
+    -------
+    Strategy
+    """
+    stages = [
+        Stage(
+            tuple(stage["points"]),
+            tuple(joint - 1 for joint in stage["joints"]),
+            tuple(joint - 1 for joint in stage.get("held", ())),
+        )
+        for stage in document["stages"]
+    ]
+    return Strategy(document["name"], tuple(stages))
+
+
+def check_strategy(strategy, chain, source):
+    """Refuse a strategy that the chain cannot carry out.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    chain : Chain
+    source : str
+        Named in errors.
+
+    Raises
+    ------
+    InputError
+        An unknown point or joint; a joint that moves a measured point but is neither identified nor held; a held joint that
+        no earlier stage identified; a joint that no stage identifies.
+    """
+    known, names = set(), [p.name for p in chain.points]
+    for number, stage in enumerate(strategy.stages, 1):
+        where = f"stages[{number}]"
+        for name in stage.points:
+            if name not in names:
+                raise InputError(source, f"{where}.points", repr(name), ", ".join(names))
+        moving = {joint for name in stage.points for joint in chain.moved_by(chain.point(name))}
+        for joint in stage.identified:
+            if joint not in moving:
+                allowed = f"joints that move {', '.join(stage.points)}: {_numbers(moving)}"
+                raise InputError(source, f"{where}.joints", f"joint {joint + 1}", allowed)
+        for joint in stage.held:
+            if joint not in known or joint in stage.identified:
+                raise InputError(source, f"{where}.held", f"joint {joint + 1}", f"joints of earlier stages: {_numbers(known)}")
+        if left := moving - set(stage.identified) - set(stage.held):
+            raise InputError(source, where, f"joint {_numbers(left)} in neither list", f"{_numbers(moving)} in joints or held")
+        known |= set(stage.identified)
+    if left := set(range(chain.coordinates)) - known:
+        raise InputError(source, "stages", f"no stage for joint {_numbers(left)}", "every joint identified in some stage")
+
+
+def _numbers(joints):
+    return ", ".join(str(joint + 1) for joint in sorted(joints)) or "none"

@@ -1,0 +1,48 @@
+"""Step 4b: what the readings of each strategy could give at best."""
+
+import numpy as np
+
+from elastocal.bounds import squared_error_bounds
+from elastocal.elastostatics import joint_torques, regressor
+from elastocal.identification import prefix_information
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.metrics import error_moment
+from elastocal.study.columns import to_experiments
+
+
+def bound_blocks(experiment_blocks, chain, point_sets, rows, wrench_at, judge):
+    """Cramér-Rao bound of the RMS end-effector error for each set of measuring points and each length.
+
+    Parameters
+    ----------
+    experiment_blocks : iterable of dict
+        Blocks of the experiments table.
+    chain : Chain
+    point_sets : iterable of tuple of str
+    rows : int
+        6 where poses are measured, 3 where positions are.
+    wrench_at : {"end_effector", "measuring_point"}
+    judge : Judge
+
+    Yields
+    ------
+    dict
+        Columns of one block of the bounds table.
+    """
+    point_sets = list(dict.fromkeys(tuple(sorted(points)) for points in point_sets))
+    names = {name for points in point_sets for name in points}
+    moment, sums, sets = error_moment(judge), dict.fromkeys(point_sets, 0.0), 0
+    for block in experiment_blocks:
+        experiments = to_experiments(block)
+        sets += len(experiments.joint_angles)
+        information = {}
+        for name in names:
+            at = chain.end_effector if wrench_at == "end_effector" else chain.point(name)
+            torques = joint_torques(chain, experiments.joint_angles, experiments.wrench, at)
+            jacobian = poses_and_jacobians(chain, experiments.joint_angles, chain.point(name))[2]
+            matrix = np.moveaxis(regressor(jacobian, torques), (-2, -1, 1), (0, 1, 2))
+            information[name] = prefix_information(matrix[:rows])
+        for points in point_sets:
+            sums[points] = sums[points] + squared_error_bounds(sum(information[p] for p in points), moment).sum(axis=1)
+    for points, total in sums.items():
+        yield {"points": "+".join(points), "length": np.arange(1, len(total) + 1), "rms_per_noise": np.sqrt(total / sets)}

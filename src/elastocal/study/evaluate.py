@@ -1,0 +1,51 @@
+"""Step 4: the metrics of one strategy from its identified compliances."""
+
+import numpy as np
+
+from elastocal.evaluation import accuracy_table, average, bootstrap_weights, metrics_table, replicates_table
+from elastocal.metrics import make_judge
+from elastocal.study.columns import to_deflections, to_experiments
+
+
+def judge_from(robot, test_experiments, test_deflections):
+    """Score sheet from the tables of the test configurations."""
+    return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections))
+
+
+def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, deviation_of, replicates, lengths):
+    """Tables of metrics, bootstrap replicates and accuracy of one strategy.
+
+    Parameters
+    ----------
+    identified_blocks : callable
+        Each call starts the blocks of the identified table anew: one pass for each view of them, in bounded memory.
+    judge : Judge
+    key : str
+        Name of the robot's file.
+    seed : int
+    first_stage_joints : sequence of int
+    method, deviation_of
+        Readings R7 and R8, see `evaluation.average`.
+    replicates : int
+    lengths : sequence of int
+        For the accuracy of one data set.
+
+    Returns
+    -------
+    metrics, replicates, accuracy : dict of str to ndarray
+    """
+    joints = len(judge.reference)
+
+    def compliances():
+        for block in identified_blocks():
+            sets = np.unique(block["data_set"])
+            shape = (len(sets), -1)
+            yield sets, np.stack([block[f"c{j + 1}"].reshape(shape) for j in range(joints)], axis=-1)
+
+    weighted = ((c, bootstrap_weights(seed, key, sets, replicates)) for sets, c in compliances())
+    averages = average(weighted, judge, method, deviation_of)
+    return (
+        metrics_table(averages, judge.reference, first_stage_joints),
+        replicates_table(averages, judge.reference, first_stage_joints),
+        accuracy_table((c for _, c in compliances()), judge, lengths),
+    )

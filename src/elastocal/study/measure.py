@@ -1,0 +1,32 @@
+"""Step 2: noise on the ideal deflections."""
+
+import numpy as np
+
+from elastocal.simulation import measurement_noise
+from elastocal.study.columns import COMPONENT_NAMES, block_shape
+
+
+def measured_blocks(ideal_blocks, key, seed, noise):
+    """Deflections as measured: ideal plus independent normal noise on every component.
+
+    Parameters
+    ----------
+    ideal_blocks : iterable of dict
+        Blocks of the deflections table.
+    key : str
+        Name of the robot's file.
+    seed : int
+    noise : float
+        Standard deviation, the same number in m and rad.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the deflections table.
+    """
+    for block in ideal_blocks:
+        _, configurations = block_shape(block)
+        point = block["point"][0]
+        normal = measurement_noise(seed, key, point, np.unique(block["data_set"]), configurations)
+        measured = {name: block[name] + noise * normal[..., k].ravel() for k, name in enumerate(COMPONENT_NAMES)}
+        yield block | measured | {"point": point}

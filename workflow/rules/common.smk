@@ -1,0 +1,41 @@
+"""What all rules share: the checked configuration, the names that paths are made of, and the sources behind each script."""
+
+import sys
+from pathlib import Path
+
+from elastocal.configuration import check_study, rows_read
+from elastocal.errors import InputError
+
+ROOT = Path(workflow.basedir)
+sys.path.insert(0, str(ROOT / "workflow" / "rules"))
+
+from import_closure import closure
+
+try:
+    STUDY = check_study(config, "config")
+except InputError as error:
+    sys.exit(str(error))
+
+NOISE = [f"{level:g}" for level in config["noise_um"]]
+READINGS = config["readings"]
+
+
+wildcard_constraints:
+    robot="[^/]+",
+    strategy="[^/]+",
+    noise=r"[\d.e-]+",
+    test="(/test)?",
+
+
+def sources(script):
+    """Package modules that a script runs: an edit of one of them reruns the jobs that depend on it, and no others."""
+    files = closure(ROOT / "workflow" / "scripts" / script, [ROOT / "src", ROOT / "workflow" / "scripts"])
+    return [file.relative_to(ROOT).as_posix() for file in files]
+
+
+def robot_document(wildcards):
+    return STUDY.robots[wildcards.robot]
+
+
+def strategy_document(wildcards):
+    return STUDY.strategies[wildcards.strategy]

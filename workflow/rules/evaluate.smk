@@ -1,0 +1,54 @@
+"""Metrics: what each strategy is worth, averaged over data sets as in the paper and for one data set, and what is possible.
+
+Needs results/identified/ and data/simulated/. Writes results/metrics/, results/replicates/ and results/accuracy/, each
+{robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
+"""
+
+
+rule evaluate:
+    input:
+        identified=rules.identify.output.identified,
+        test_experiments="data/simulated/{robot}/test/experiments.parquet",
+        test_ideal="data/simulated/{robot}/test/ideal.parquet",
+        sources=sources("evaluate.py"),
+    output:
+        metrics="results/metrics/{robot}/{noise}um/{strategy}.parquet",
+        replicates="results/replicates/{robot}/{noise}um/{strategy}.parquet",
+        accuracy="results/accuracy/{robot}/{noise}um/{strategy}.parquet",
+    log:
+        "results/logs/evaluate/{robot}/{noise}um/{strategy}.log",
+    benchmark:
+        "results/timings/evaluate/{robot}/{noise}um/{strategy}.tsv"
+    params:
+        robot=robot_document,
+        strategy=strategy_document,
+        seed=config["seed"],
+        tool_offset_m=READINGS["tool_offset_m"],
+        average=READINGS["average"],
+        deviation_of=READINGS["deviation_of"],
+        replicates=config["evaluation"]["bootstrap_replicates"],
+        lengths=config["evaluation"]["lengths"],
+    script:
+        "../scripts/evaluate.py"
+
+
+rule bound:
+    input:
+        experiments="data/simulated/{robot}/experiments.parquet",
+        test_experiments="data/simulated/{robot}/test/experiments.parquet",
+        test_ideal="data/simulated/{robot}/test/ideal.parquet",
+        sources=sources("bound.py"),
+    output:
+        bounds="results/bounds/{robot}.parquet",
+    log:
+        "results/logs/bound/{robot}.log",
+    benchmark:
+        "results/timings/bound/{robot}.tsv"
+    params:
+        robot=robot_document,
+        point_sets=list(STUDY.points.values()),
+        rows=rows_read(READINGS["measured"]),
+        tool_offset_m=READINGS["tool_offset_m"],
+        wrench_at=READINGS["wrench_at"],
+    script:
+        "../scripts/bound.py"

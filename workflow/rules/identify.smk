@@ -1,0 +1,31 @@
+"""Estimates: each strategy on each robot at each noise level, its own job.
+
+Needs data/simulated/. Writes results/identified/{robot}/{noise}um/{strategy}.parquet.
+"""
+
+
+rule identify:
+    input:
+        experiments="data/simulated/{robot}/experiments.parquet",
+        measured=rules.measure.output.measured,
+        sources=sources("identify.py"),
+    output:
+        identified="results/identified/{robot}/{noise}um/{strategy}.parquet",
+    log:
+        "results/logs/identify/{robot}/{noise}um/{strategy}.log",
+    benchmark:
+        "results/timings/identify/{robot}/{noise}um/{strategy}.tsv"
+    params:
+        chain=lambda wildcards: robot_document(wildcards)["chain"],
+        lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
+        strategy=strategy_document,
+        rows=rows_read(READINGS["measured"]),
+        tool_offset_m=READINGS["tool_offset_m"],
+        wrench_at=READINGS["wrench_at"],
+        start=(
+            1e-6 * config["identification"]["start_urad_per_Nm"]
+            if config["identification"]["solver"] == "gauss_newton"
+            else None
+        ),
+    script:
+        "../scripts/identify.py"

@@ -1,0 +1,59 @@
+"""Data: random experiments of each robot, their deflections, and these with noise.
+
+Needs nothing but the configuration. Writes data/simulated/{robot}/: experiments.parquet and ideal.parquet, the same in test/ for
+the configurations that judge, and {noise}um/measured.parquet.
+"""
+
+
+rule draw_experiments:
+    input:
+        sources=sources("draw_experiments.py"),
+    output:
+        experiments="data/simulated/{robot}{test}/experiments.parquet",
+    log:
+        "results/logs/draw_experiments/{robot}{test}.log",
+    benchmark:
+        "results/timings/draw_experiments/{robot}{test}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        loading=config["loading"] | {key: READINGS[key] for key in ("offset_frame", "joint_range")},
+        purpose=lambda wildcards: "test" if wildcards.test else "identification",
+        data_sets=lambda wildcards: 1 if wildcards.test else config["data_sets"],
+        configurations=lambda wildcards: config["test_configurations" if wildcards.test else "configurations"],
+    script:
+        "../scripts/draw_experiments.py"
+
+
+rule simulate:
+    input:
+        experiments=rules.draw_experiments.output.experiments,
+        sources=sources("simulate.py"),
+    output:
+        ideal="data/simulated/{robot}{test}/ideal.parquet",
+    log:
+        "results/logs/simulate/{robot}{test}.log",
+    benchmark:
+        "results/timings/simulate/{robot}{test}.tsv"
+    params:
+        robot=robot_document,
+        tool_offset_m=READINGS["tool_offset_m"],
+        wrench_at=READINGS["wrench_at"],
+    script:
+        "../scripts/simulate.py"
+
+
+rule measure:
+    input:
+        ideal="data/simulated/{robot}/ideal.parquet",
+        sources=sources("measure.py"),
+    output:
+        measured="data/simulated/{robot}/{noise}um/measured.parquet",
+    log:
+        "results/logs/measure/{robot}/{noise}um.log",
+    benchmark:
+        "results/timings/measure/{robot}/{noise}um.tsv"
+    params:
+        seed=config["seed"],
+    script:
+        "../scripts/measure.py"

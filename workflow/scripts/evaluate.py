@@ -1,0 +1,38 @@
+"""Metrics of one strategy for one robot at one noise level."""
+
+from elastocal.provenance import provenance
+from elastocal.robot import robot_from_document, with_target_offset
+from elastocal.storage import read_blocks, read_table, write_table
+from elastocal.strategies import strategy_from_document
+from elastocal.study.evaluate import evaluated, judge_from
+from elastocal.table_schemas import DEFLECTIONS, REPLICATES, accuracy, experiments, identified, metrics
+from job import run
+
+
+def evaluate(job):
+    settings = job.params
+    robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
+    n, end_effector = robot.joints, robot.chain.end_effector.name
+    judge = judge_from(
+        robot,
+        read_table(job.input.test_experiments, experiments(n)),
+        read_table(job.input.test_ideal, DEFLECTIONS, point=end_effector),
+    )
+    needed = ["data_set", *(f"c{j + 1}" for j in range(n))]
+    tables = evaluated(
+        lambda: read_blocks(job.input.identified, identified(n), needed),
+        judge,
+        job.wildcards.robot,
+        settings.seed,
+        strategy_from_document(settings.strategy).first_stage_joints,
+        settings.average,
+        settings.deviation_of,
+        settings.replicates,
+        settings.lengths,
+    )
+    origin = provenance(settings, **dict(job.wildcards))
+    for path, schema, table in zip(job.output, (metrics(n), REPLICATES, accuracy(n)), tables, strict=True):
+        write_table(path, schema, [table], origin)
+
+
+run(evaluate, snakemake)

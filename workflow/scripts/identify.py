@@ -1,0 +1,24 @@
+"""One strategy on the data sets of one robot at one noise level, every prefix length."""
+
+from elastocal.provenance import provenance
+from elastocal.robot import parse_chain, with_target_offset
+from elastocal.storage import read_blocks, write_table
+from elastocal.strategies import strategy_from_document
+from elastocal.study.identify import identified_blocks, paired_blocks
+from elastocal.table_schemas import DEFLECTIONS, experiments, identified
+from job import run
+
+
+def identify(job):
+    settings = job.params
+    chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
+    strategy = strategy_from_document(settings.strategy)
+    blocks = paired_blocks(
+        read_blocks(job.input.experiments, experiments(chain.coordinates)),
+        {name: read_blocks(job.input.measured, DEFLECTIONS, point=name) for name in strategy.points},
+    )
+    solved = identified_blocks(blocks, chain, strategy, settings.rows, settings.wrench_at, settings.start)
+    write_table(job.output.identified, identified(chain.coordinates), solved, provenance(settings, **dict(job.wildcards)))
+
+
+run(identify, snakemake)

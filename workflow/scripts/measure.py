@@ -1,0 +1,17 @@
+"""Deflections of one robot as measured at one noise level."""
+
+from elastocal.provenance import provenance
+from elastocal.storage import read_blocks, write_table
+from elastocal.study.measure import measured_blocks
+from elastocal.table_schemas import DEFLECTIONS
+from job import run
+
+
+def measure(job):
+    noise = 1e-6 * float(job.wildcards.noise)
+    ideal = read_blocks(job.input.ideal, DEFLECTIONS)
+    blocks = measured_blocks(ideal, job.wildcards.robot, job.params.seed, noise)
+    write_table(job.output.measured, DEFLECTIONS, blocks, provenance(job.params, noise_um=job.wildcards.noise))
+
+
+run(measure, snakemake)

@@ -1,0 +1,18 @@
+"""Deflections of one robot without noise."""
+
+from elastocal.provenance import provenance
+from elastocal.robot import robot_from_document, with_target_offset
+from elastocal.storage import read_blocks, write_table
+from elastocal.study.simulate import ideal_blocks
+from elastocal.table_schemas import DEFLECTIONS, experiments
+from job import run
+
+
+def simulate(job):
+    settings = job.params
+    robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
+    blocks = read_blocks(job.input.experiments, experiments(robot.joints))
+    write_table(job.output.ideal, DEFLECTIONS, ideal_blocks(blocks, robot, settings.wrench_at), provenance(settings))
+
+
+run(simulate, snakemake)
