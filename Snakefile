@@ -7,9 +7,13 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/identify.smk"
 include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/tables.smk"
+include: "workflow/rules/figures.smk"
 
 
 rule all:
     default_target: True
     input:
-        expand(rules.evaluate.output.metrics, robot=config["robots"], noise=NOISE, strategy=config["strategies"]),
+        expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
+        expand("reports/tables/{table}.csv", table=["comparison", "extended", "per_dataset", "solvers"]),
+        expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),

@@ -21,11 +21,14 @@ class Study:
         Documents by the names of their files.
     points : dict of str to tuple of str
         Measuring points that each strategy reads.
+    end_effectors : dict of str to str
+        Last measuring point of each robot.
     """
 
     robots: dict
     strategies: dict
     points: dict
+    end_effectors: dict
 
 
 def check_study(config, folder, source="config.yaml"):
@@ -61,8 +64,10 @@ def check_study(config, folder, source="config.yaml"):
         needed = first_solvable_length(strategy, rows_read(config["readings"]["measured"]))
         if config["configurations"] < needed:
             raise InputError(source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short")
+    if all("links" in document for document in robots.values()):
+        raise InputError(source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4")
     _check_cells(config, source)
-    return Study(robots, strategies, points)
+    return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
 
 def rows_read(measured):
@@ -72,6 +77,8 @@ def rows_read(measured):
 
 def _check_cells(config, source):
     tables, longest = config["tables"], config["configurations"]
+    if tables["classical_strategy"] not in config["strategies"]:
+        raise InputError(source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}")
     if tables["noise_um"] not in config["noise_um"]:
         raise InputError(source, "tables.noise_um", str(tables["noise_um"]), f"one of noise_um {config['noise_um']}")
     for index, length in enumerate(config["evaluation"]["lengths"]):

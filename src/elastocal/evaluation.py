@@ -31,11 +31,14 @@ class Averages:
         Inverse of the averaged stiffness, rad/(N m).
     deviation : ndarray (1 + replicates, lengths)
         Equation 15, m.
+    initial_deviation : ndarray (1 + replicates, lengths)
+        The same without any model; it does not depend on the length.
     nonpositive_share, relative_spread : ndarray (lengths,)
     """
 
     compliance: np.ndarray
     deviation: np.ndarray
+    initial_deviation: np.ndarray
     nonpositive_share: np.ndarray
     relative_spread: np.ndarray
 
@@ -43,8 +46,8 @@ class Averages:
 def bootstrap_weights(seed, key, data_sets, replicates):
     """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
 
-    Independent weights of mean one are the bootstrap that does not need to know how many data sets there are. They are the same
-    for every noise level and strategy.
+    Independent weights of mean one are the bootstrap that does not need to know how many there are. They are the same for every
+    noise level and strategy, so that replicates of two of them may be compared one by one.
 
     Parameters
     ----------
@@ -61,7 +64,24 @@ def bootstrap_weights(seed, key, data_sets, replicates):
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
-def average(blocks, judge, method, deviation_of):
+def bootstrap_test_weights(seed, key, tests, replicates):
+    """How often each test configuration counts in each replicate, as `bootstrap_weights` for data sets.
+
+    Parameters
+    ----------
+    seed, key, replicates
+        As in `bootstrap_weights`.
+    tests : int
+
+    Returns
+    -------
+    ndarray (1 + replicates, tests)
+    """
+    counts = draw(seed, key, "bootstrap of tests", [0], lambda stream: stream.poisson(1.0, (replicates, tests)))[0]
+    return np.vstack([np.ones(tests), counts])
+
+
+def average(blocks, judge, method, deviation_of, test_weights):
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
     Parameters
@@ -73,6 +93,8 @@ def average(blocks, judge, method, deviation_of):
         What is averaged: 1/c or c, by its mean; or the median of c (reading R7).
     deviation_of : {"averaged_model", "each_data_set"}
         Whether equation 15 scores the averaged model or averages the scores of the data sets (reading R8).
+    test_weights : ndarray (1 + replicates, tests)
+        From `bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
 
     Returns
     -------
@@ -95,14 +117,18 @@ def average(blocks, judge, method, deviation_of):
             values = compliance if method == "compliance" else 1.0 / compliance
             sums = sums + np.tensordot(weights, values, axes=1)
         if deviation_of == "each_data_set":
-            scores = scores + weights @ mean_deviation(judge, compliance)
+            scores = scores + weights @ mean_deviation(judge, compliance)  # of these very test configurations
     if method != "median":
         averaged = sums / total[:, None, None]
         averaged = averaged if method == "compliance" else 1.0 / averaged
-    deviation = mean_deviation(judge, averaged) if deviation_of == "averaged_model" else scores / total[:, None]
+    if deviation_of == "averaged_model":
+        deviation = mean_deviation(judge, averaged, test_weights)
+    else:
+        deviation = scores / total[:, None]
+    initial = np.broadcast_to((test_weights @ judge.initial_errors / test_weights.sum(axis=1))[:, None], deviation.shape)
     mean, square = moments / sets
     spread = (np.sqrt(np.maximum(square - mean**2, 0.0)) / np.abs(mean)).max(axis=-1)
-    return Averages(averaged, deviation, nonpositive / sets, spread)
+    return Averages(averaged, deviation, initial, nonpositive / sets, spread)
 
 
 def metrics_table(averages, true_compliance, first_stage_joints):
@@ -218,6 +244,7 @@ def _replicated_scores(averages, true_compliance, first_stage_joints):
         "k_sigma": k_sigma(averages.compliance, true_compliance),
         "k_sigma_first_stage": k_sigma(averages.compliance, true_compliance, list(first_stage_joints)),
         "deviation": averages.deviation,
+        "initial_deviation": averages.initial_deviation,
     }
 
 

@@ -9,7 +9,9 @@ from elastocal.elastostatics import exact_deflections, regressor
 from elastocal.kinematics import poses_and_jacobians
 
 STEPS = 30
-CLOSE_ENOUGH = 1e-13
+# Relative size of the last step. Rounding of positions of metres against deflections of millimetres allows steps of 1e-12; each
+# step is about a thousand times smaller than the one before, so what follows the last one is lost in it.
+LAST_STEP = 1e-10
 
 
 def identify_exactly(strategy, chain, joint_angles, torques, deflections, start, lengths):
@@ -65,7 +67,7 @@ def _solve_stage(chain, data, identified, compliance):
             right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
         step = np.linalg.solve(normal, right[..., None])[..., 0]
         compliance[:, identified] += step
-        if np.abs(step).max() <= CLOSE_ENOUGH * np.abs(compliance).max():
+        if np.abs(step).max() <= LAST_STEP * np.abs(compliance).max():
             return compliance
     raise ArithmeticError(f"Gauss-Newton did not settle within {STEPS} steps")
 

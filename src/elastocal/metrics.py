@@ -18,10 +18,13 @@ class Judge:
         Compliances about which the prediction is linear, rad/(N m).
     quadratic_forms : ndarray (tests, (n + 1)(n + 2) / 2)
         Squared position error at each test configuration as a quadratic form in (c - reference, 1).
+    initial_errors : ndarray (tests,)
+        Position error without any elastostatic model: the deflection itself, m.
     """
 
     reference: np.ndarray
     quadratic_forms: np.ndarray
+    initial_errors: np.ndarray
 
 
 def make_judge(robot, experiments, true_deflection):
@@ -53,7 +56,7 @@ def make_judge(robot, experiments, true_deflection):
     rows = np.concatenate([slope, offset], axis=-1)
     first, second = np.triu_indices(robot.joints + 1)
     forms = (rows[..., first] * rows[..., second]).sum(axis=1) * np.where(first == second, 1.0, 2.0)
-    return Judge(robot.compliance, forms)
+    return Judge(robot.compliance, forms, np.linalg.norm(true_deflection[..., :3], axis=-1).ravel())
 
 
 def error_moment(judge):
@@ -95,24 +98,25 @@ def position_errors(judge, compliance):
     return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
 
 
-def mean_deviation(judge, compliance, chunk=4096):
+def mean_deviation(judge, compliance, test_weights=None):
     """Equation 15: position error of models, mean over the test configurations.
 
     Parameters
     ----------
     judge : Judge
-    compliance : ndarray (..., n)
-    chunk : int
-        Models at a time, to bound the memory.
+    compliance : ndarray (groups, models, n)
+    test_weights : ndarray (groups, tests), optional
+        How often each test configuration counts for a group of models; once without.
 
     Returns
     -------
-    ndarray (...)
+    ndarray (groups, models)
         m.
     """
-    models = compliance.reshape(-1, compliance.shape[-1])
-    parts = [position_errors(judge, models[i : i + chunk]).mean(axis=1) for i in range(0, len(models), chunk)]
-    return np.concatenate(parts).reshape(compliance.shape[:-1])
+    if test_weights is None:
+        test_weights = np.ones((len(compliance), len(judge.initial_errors)))
+    means = [position_errors(judge, group) @ weights for group, weights in zip(compliance, test_weights, strict=True)]
+    return np.stack(means) / test_weights.sum(axis=1, keepdims=True)
 
 
 def relative_stiffness_error(compliance, true_compliance):

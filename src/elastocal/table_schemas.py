@@ -69,6 +69,7 @@ def metrics(joints):
     columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
     columns += _with_error("k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (reading R10)")
     columns += _with_error("deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)")
+    columns += _with_error("initial_deviation", "m", "mean deflection of the end-effector on the test configurations")
     columns += [
         Column("nonpositive_share", "float64", "", "share of data sets with a compliance that is not positive"),
         Column("relative_spread", "float64", "", "largest standard deviation over mean of an identified compliance", missing=True),
@@ -86,7 +87,7 @@ def accuracy(joints):
         ("p95", "95th percentile over test configurations"),
         ("max", "largest over test configurations"),
     ):
-        columns += _with_error(name, "m", meaning)
+        columns += _with_error(name, "m", meaning, over="data sets, for these test configurations")
     for j in range(1, joints + 1):
         columns += _with_error(f"relative_error_{j}", "percent", f"root mean square relative error of the compliance of joint {j}")
     return TableSchema("accuracy", tuple(columns))
@@ -100,8 +101,31 @@ REPLICATES = TableSchema(
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
         Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
         Column("deviation", "float64", "m", "as in the metrics", missing=True),
+        Column("initial_deviation", "float64", "m", "as in the metrics"),
     ),
 )
+
+INITIAL = TableSchema(
+    "initial",
+    (
+        _SET,
+        Column("configurations", "int32", "", "configurations in the data set", minimum=1),
+        Column("mean", "float64", "m", "mean over the data set of the end-effector's displacement under load", minimum=0),
+        Column("mean_square", "float64", "m^2", "mean square of the same", minimum=0),
+        Column("maximum", "float64", "m", "largest of the same", minimum=0),
+    ),
+)
+
+
+def solvers(joints):
+    """Estimates of both solvers at one length; one row for each strategy and data set, a row group holds one strategy."""
+    pairs = [
+        Column(f"{solver}_c{j}", "float64", "rad/(N m)", f"compliance of joint {j} by {solver.replace('_', ' ')}")
+        for j in range(1, joints + 1)
+        for solver in ("equation_11", "gauss_newton")
+    ]
+    return TableSchema("solvers", (Column("strategy", "string", "", "name of the strategy"), _SET, *pairs))
+
 
 BOUNDS = TableSchema(
     "bounds",
@@ -113,8 +137,8 @@ BOUNDS = TableSchema(
 )
 
 
-def _with_error(name, unit, meaning):
+def _with_error(name, unit, meaning, over="data sets and test configurations"):
     return [
         Column(name, "float64", unit, meaning, missing=True),
-        Column(f"{name}_std_error", "float64", unit, f"Monte Carlo standard error of {name}", missing=True),
+        Column(f"{name}_std_error", "float64", unit, f"Monte Carlo standard error of {name} over {over}", missing=True),
     ]

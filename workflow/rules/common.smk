@@ -17,7 +17,12 @@ except InputError as error:
     sys.exit(str(error))
 
 NOISE = [f"{level:g}" for level in config["noise_um"]]
+TABLE_NOISE = f"{config['tables']['noise_um']:g}"
+CLASSICAL = config["tables"]["classical_strategy"]
 READINGS = config["readings"]
+NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
+EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
+REDUCED = [name for name in config["robots"] if name not in EXTENDED]
 
 
 wildcard_constraints:

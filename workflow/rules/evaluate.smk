@@ -47,6 +47,7 @@ rule bound:
     params:
         robot=robot_document,
         point_sets=list(STUDY.points.values()),
+        seed=config["seed"],
         rows=rows_read(READINGS["measured"]),
         tool_offset_m=READINGS["tool_offset_m"],
         wrench_at=READINGS["wrench_at"],

@@ -19,6 +19,7 @@ rule identify:
         chain=lambda wildcards: robot_document(wildcards)["chain"],
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategy=strategy_document,
+        seed=config["seed"],
         rows=rows_read(READINGS["measured"]),
         tool_offset_m=READINGS["tool_offset_m"],
         wrench_at=READINGS["wrench_at"],

@@ -37,6 +37,7 @@ rule simulate:
         "results/timings/simulate/{robot}{test}.tsv"
     params:
         robot=robot_document,
+        seed=config["seed"],
         tool_offset_m=READINGS["tool_offset_m"],
         wrench_at=READINGS["wrench_at"],
     script:

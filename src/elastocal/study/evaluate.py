@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from elastocal.evaluation import accuracy_table, average, bootstrap_weights, metrics_table, replicates_table
+from elastocal.evaluation import (
+    accuracy_table,
+    average,
+    bootstrap_test_weights,
+    bootstrap_weights,
+    metrics_table,
+    replicates_table,
+)
 from elastocal.metrics import make_judge
 from elastocal.study.columns import to_deflections, to_experiments
 
@@ -43,7 +50,8 @@ def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, d
             yield sets, np.stack([block[f"c{j + 1}"].reshape(shape) for j in range(joints)], axis=-1)
 
     weighted = ((c, bootstrap_weights(seed, key, sets, replicates)) for sets, c in compliances())
-    averages = average(weighted, judge, method, deviation_of)
+    tests = bootstrap_test_weights(seed, key, len(judge.initial_errors), replicates)
+    averages = average(weighted, judge, method, deviation_of, tests)
     return (
         metrics_table(averages, judge.reference, first_stage_joints),
         replicates_table(averages, judge.reference, first_stage_joints),

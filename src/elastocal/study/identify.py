@@ -1,10 +1,12 @@
 """Step 3: one strategy on measured data sets, every prefix length."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from elastocal.elastostatics import joint_torques, regressor
 from elastocal.gauss_newton import identify_exactly
-from elastocal.identification import Estimates, Readings, first_solvable_length, identify
+from elastocal.identification import Readings, first_solvable_length, identify
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.study.columns import to_deflections, to_experiments
 from elastocal.table_schemas import covariance_columns
@@ -51,19 +53,35 @@ def identified_blocks(blocks, chain, strategy, rows, wrench_at, start=None):
     """
     for experiments, deflections in blocks:
         sets = np.unique(experiments["data_set"])
-        situation = _Situation(experiments, deflections, chain, strategy, rows, wrench_at)
+        situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
         estimates = identify(strategy, situation.readings, chain.coordinates)
         if start is not None:
-            estimates = Estimates(situation.solved_exactly(start), estimates.covariance, estimates.condition)
+            lengths = range(first_solvable_length(strategy, rows), len(estimates.compliance) + 1)
+            exact = np.full_like(estimates.compliance, np.nan)
+            exact[lengths[0] - 1 :] = situation.solved_exactly(start, lengths)
+            estimates = replace(estimates, compliance=exact)
         yield _columns(sets, estimates)
 
 
-class _Situation:
-    """Readings of one block, configuration before data set."""
+class Situation:
+    """Readings of one block, configuration before data set, ready for either solver.
+
+    Parameters
+    ----------
+    experiments : dict
+    deflections : dict of str to dict
+    chain, strategy, rows, wrench_at
+        As in `identified_blocks`.
+
+    Attributes
+    ----------
+    readings : dict of str to Readings
+        For equation 11.
+    """
 
     def __init__(self, experiments, deflections, chain, strategy, rows, wrench_at):
         loaded = to_experiments(experiments)
-        self.chain, self.strategy, self.rows = chain, strategy, rows
+        self.chain, self.strategy = chain, strategy
         self.joint_angles = _configuration_first(loaded.joint_angles)
         wrench = _configuration_first(loaded.wrench)
         self.torques, self.measured, self.readings = {}, {}, {}
@@ -76,14 +94,12 @@ class _Situation:
             self.measured[name] = _configuration_first(to_deflections(deflections[name]))[..., :rows]
             self.readings[name] = Readings(matrix, np.moveaxis(self.measured[name], -1, 0))
 
-    def solved_exactly(self, start):
-        configurations, sets, joints = self.joint_angles.shape
-        lengths = range(first_solvable_length(self.strategy, self.rows), configurations + 1)
-        compliance = np.full((configurations, joints, sets), np.nan)
-        compliance[lengths[0] - 1 :] = identify_exactly(
-            self.strategy, self.chain, self.joint_angles, self.torques, self.measured, np.full(joints, start), lengths
+    def solved_exactly(self, start, lengths):
+        """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
+        start = np.full(self.chain.coordinates, start)
+        return identify_exactly(
+            self.strategy, self.chain, self.joint_angles, self.torques, self.measured, start, lengths
         )
-        return compliance
 
 
 def _configuration_first(array):

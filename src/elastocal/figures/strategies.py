@@ -1,0 +1,183 @@
+"""Figures that compare strategies and noise levels over the data set length."""
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter
+
+from elastocal.figures.style import PALETTE, line_style, panels
+
+MICRO = 1e6
+_LENGTH = "configurations in the data set"
+
+
+def noise_impact(metrics, strategy, titles):
+    """Figure 4: deviation of one strategy against the data set length, for each noise level.
+
+    Parameters
+    ----------
+    metrics : DataFrame
+        Long.
+    strategy : str
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, len(titles), 78, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        cells = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
+        for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
+            trusted = cell[cell.trustworthy]
+            axis.plot(cell.length, MICRO * cell.deviation, color=PALETTE[index], linewidth=0.5, alpha=0.5)
+            axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g} µm, µrad")
+            _band(axis, trusted.length, MICRO * trusted.deviation, MICRO * trusted.deviation_std_error, PALETTE[index])
+        axis.set(title=title, xlabel=_LENGTH, yscale="log", xlim=(1, cells.length.max()), ylim=(0.02, 3000))
+        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes[0, 0].set_ylabel("dev, equation 15 (µm)")
+    axes[0, -1].legend(title="noise", loc="upper right", title_fontsize=7.5, ncols=2)
+    return figure
+
+
+def stiffness_errors(metrics, title, robot, order, limit_percent):
+    """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
+
+    Parameters
+    ----------
+    metrics : DataFrame
+        Long, of one noise level.
+    title : str
+    robot : str
+    order : sequence of str
+        Strategies.
+    limit_percent : float
+        Marked by a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, 2, 88, sharey=True)
+    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage (as Table 4 seems to)"}
+    for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
+        _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
+        _limit(axis, limit_percent, "%")
+        axis.set(title=f"{title}: {count}", xlabel=_LENGTH)
+    axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", ylim=(0, 20))
+    axes[0, 1].legend(loc="upper right")
+    return figure
+
+
+def deviations(metrics, title, robot, order, limit_um):
+    """Figures 5c and 5d: deviation of all strategies against the data set length.
+
+    Parameters
+    ----------
+    metrics : DataFrame
+        Long, of one noise level.
+    title : str
+    robot : str
+    order : sequence of str
+        Strategies.
+    limit_um : float
+        Marked by a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, 1, 88)
+    axis = axes[0, 0]
+    _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
+    _limit(axis, limit_um, "µm")
+    axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", ylim=(0, 40))
+    axis.legend(loc="upper right", ncols=2)
+    return figure
+
+
+def bias_and_accuracy(metrics, per_dataset, titles, order):
+    """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
+
+    Parameters
+    ----------
+    metrics : DataFrame
+        Long, of one noise level.
+    per_dataset : DataFrame
+        The table of the same name, of the same noise level.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+    order : sequence of str
+        Strategies to draw.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, len(titles), 92, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, strategy in enumerate(order):
+            averaged = metrics[(metrics.robot == robot) & (metrics.strategy == strategy) & (metrics.length > 1)]
+            single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
+            color = PALETTE[index]
+            axis.fill_between(single.ds, single.mean_um, single.p95_um, color=color, alpha=0.15, linewidth=0)
+            axis.plot(single.ds, single.mean_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, mean to p95")
+            axis.plot(single.ds, single.crlb_rms_um, color=color, linestyle=":", label=f"{strategy}: Cramér-Rao bound, RMS")
+            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=f"{strategy}: dev of the paper")
+        axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
+        for plain in (axis.xaxis, axis.yaxis):
+            plain.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes[0, 0].set_ylabel("end-effector error (µm)")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(order))
+    return figure
+
+
+def accuracy_of_one_data_set(per_dataset, titles, order, length):
+    """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own readings.
+
+    Parameters
+    ----------
+    per_dataset : DataFrame
+        The table of the same name, of one noise level.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+    order : sequence of str
+        Strategies.
+    length : int
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, len(titles), 72, sharey=True)
+    rows = np.arange(len(order))[::-1]
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        cell = per_dataset[(per_dataset.robot == robot) & (per_dataset.ds == length)].set_index("strategy").loc[list(order)]
+        errors = cell.rms_um_std_error
+        axis.barh(rows, cell.rms_um, xerr=errors, height=0.6, color=PALETTE[5], ecolor="black", label="RMS error")
+        axis.plot(cell.crlb_rms_um, rows, "|", color=PALETTE[1], markersize=14, markeredgewidth=2, label="Cramér-Rao bound")
+        for row, efficiency in zip(rows, cell.efficiency, strict=True):
+            axis.text(1, row, f"{100 * efficiency:.0f} %", va="center", fontsize=7.5)
+        axis.set(title=title, xlabel=f"RMS end-effector error after {length} configurations (µm)", yticks=rows)
+        axis.set_yticklabels(order)
+        axis.grid(visible=False, axis="y")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+def _strategy_lines(axis, metrics, robot, quantity, scale, order):
+    for index, strategy in enumerate(order):
+        cell = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
+        style = line_style(index)
+        axis.plot(cell.length, scale * cell[quantity], label=strategy, **style)
+        _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
+    axis.set_xlim(2, metrics.length.max())
+
+
+def _limit(axis, value, unit):
+    axis.axhline(value, color="black", linewidth=0.7)
+    axis.annotate(f"{value:g} {unit}", (1, value), (2, 0), ("axes fraction", "data"), "offset points", va="center", fontsize=7.5)
+
+
+def _band(axis, length, value, error, color):
+    axis.fill_between(length, value - error, value + error, color=color, alpha=0.12, linewidth=0)

@@ -1,0 +1,65 @@
+"""One look for all figures: sizes, colours that colour-blind readers can tell apart, and a line style for each strategy."""
+
+import os
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+WIDTH_MM = 165
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
+DASHES = ("-", (0, (1, 2)), "--", (0, (4, 4)), "-", (0, (2, 3)), "-.", (0, (6, 1.5, 1, 1.5)))
+SETTINGS = {
+    "font.size": 8,
+    "axes.titlesize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4,
+    "legend.frameon": False,
+    "legend.fontsize": 7.5,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "elastocal",
+}
+
+
+def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
+    """A figure with a grid of axes in the common look.
+
+    Parameters
+    ----------
+    rows, columns : int
+    height_mm, width_mm : float
+    **options
+        Passed on to ``Figure.subplots``.
+
+    Returns
+    -------
+    figure : matplotlib.figure.Figure
+    axes : ndarray of Axes (rows, columns)
+    """
+    with rc_context(SETTINGS):
+        figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+        return figure, figure.subplots(rows, columns, squeeze=False, **options)
+
+
+def line_style(index):
+    """Colour and dashes of the strategy with this place in the list; lines that coincide remain visible through the gaps."""
+    return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
+
+
+def save(figure, pdf, png):
+    """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    pdf, png : str
+        Paths; each file appears whole or not at all.
+    """
+    with rc_context(SETTINGS):
+        for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 200, "metadata": {"Software": None}})):
+            partial = f"{path}.partial"
+            figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+            os.replace(partial, path)

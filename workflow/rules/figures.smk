@@ -1,0 +1,177 @@
+"""Figures: the paper's, and those that show what its metric hides.
+
+Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
+"""
+
+TITLES = {name: STUDY.robots[name]["name"] for name in config["robots"]}
+REDUCED_TITLES = {name: TITLES[name] for name in REDUCED}
+# Figures 2 and 3 show one robot, the extended one where there is one.
+SCHEME_ROBOT = (EXTENDED or REDUCED)[-1]
+# Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
+STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
+DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
+SCHEMES = {"fig2": "kinematic_scheme", "fig3": "spring_scheme"}
+BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
+FIGURES = [
+    *SCHEMES,
+    "fig4",
+    *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS)),
+    "bias_and_accuracy",
+    "accuracy_of_one_data_set",
+    "scores_against_paper",
+    "table2_samples",
+]
+
+
+rule draw_scheme:
+    input:
+        sources=sources("draw_scheme.py"),
+    output:
+        pdf="reports/figures/{scheme}.pdf",
+        png="reports/figures/{scheme}.png",
+    log:
+        "results/logs/draw_scheme/{scheme}.log",
+    benchmark:
+        "results/timings/draw_scheme/{scheme}.tsv"
+    wildcard_constraints:
+        scheme="|".join(SCHEMES),
+    params:
+        robot=STUDY.robots[SCHEME_ROBOT],
+        scheme=lambda wildcards: SCHEMES[wildcards.scheme],
+    script:
+        "../scripts/draw_scheme.py"
+
+
+rule draw_noise_impact:
+    input:
+        metrics=cells("metrics", REDUCED, NOISE, CLASSICAL),
+        sources=sources("draw_noise_impact.py"),
+    output:
+        pdf="reports/figures/fig4.pdf",
+        png="reports/figures/fig4.png",
+    log:
+        "results/logs/draw_noise_impact.log",
+    benchmark:
+        "results/timings/draw_noise_impact.tsv"
+    params:
+        strategy=NAMES[CLASSICAL],
+        titles=REDUCED_TITLES,
+    script:
+        "../scripts/draw_noise_impact.py"
+
+
+rule draw_stiffness_errors:
+    input:
+        metrics=lambda wildcards: cells("metrics", STIFFNESS_PANELS[wildcards.panel], TABLE_NOISE),
+        sources=sources("draw_stiffness_errors.py"),
+    output:
+        pdf="reports/figures/fig5{panel}.pdf",
+        png="reports/figures/fig5{panel}.png",
+    log:
+        "results/logs/draw_stiffness_errors/fig5{panel}.log",
+    benchmark:
+        "results/timings/draw_stiffness_errors/fig5{panel}.tsv"
+    wildcard_constraints:
+        panel="|".join(STIFFNESS_PANELS) or "none",
+    params:
+        robot=lambda wildcards: STIFFNESS_PANELS[wildcards.panel],
+        title=lambda wildcards: TITLES[STIFFNESS_PANELS[wildcards.panel]],
+        order=list(NAMES.values()),
+        limit=config["tables"]["k_sigma_limit_percent"],
+    script:
+        "../scripts/draw_stiffness_errors.py"
+
+
+rule draw_deviations:
+    input:
+        metrics=lambda wildcards: cells("metrics", DEVIATION_PANELS[wildcards.panel], TABLE_NOISE),
+        sources=sources("draw_deviations.py"),
+    output:
+        pdf="reports/figures/fig5{panel}.pdf",
+        png="reports/figures/fig5{panel}.png",
+    log:
+        "results/logs/draw_deviations/fig5{panel}.log",
+    benchmark:
+        "results/timings/draw_deviations/fig5{panel}.tsv"
+    wildcard_constraints:
+        panel="|".join(DEVIATION_PANELS) or "none",
+    params:
+        robot=lambda wildcards: DEVIATION_PANELS[wildcards.panel],
+        title=lambda wildcards: TITLES[DEVIATION_PANELS[wildcards.panel]],
+        order=list(NAMES.values()),
+        limit=config["tables"]["deviation_limit_um"],
+    script:
+        "../scripts/draw_deviations.py"
+
+
+rule draw_bias_and_accuracy:
+    input:
+        metrics=cells("metrics", REDUCED, TABLE_NOISE, BEST_TWO),
+        per_dataset=rules.tabulate_accuracy.output.table,
+        sources=sources("draw_bias_and_accuracy.py"),
+    output:
+        pdf="reports/figures/bias_and_accuracy.pdf",
+        png="reports/figures/bias_and_accuracy.png",
+    log:
+        "results/logs/draw_bias_and_accuracy.log",
+    benchmark:
+        "results/timings/draw_bias_and_accuracy.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        order=[NAMES[name] for name in BEST_TWO],
+        noise_um=config["tables"]["noise_um"],
+    script:
+        "../scripts/draw_bias_and_accuracy.py"
+
+
+rule draw_accuracy:
+    input:
+        per_dataset=rules.tabulate_accuracy.output.table,
+        sources=sources("draw_accuracy.py"),
+    output:
+        pdf="reports/figures/accuracy_of_one_data_set.pdf",
+        png="reports/figures/accuracy_of_one_data_set.png",
+    log:
+        "results/logs/draw_accuracy.log",
+    benchmark:
+        "results/timings/draw_accuracy.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        order=list(NAMES.values()),
+        noise_um=config["tables"]["noise_um"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/draw_accuracy.py"
+
+
+rule draw_scores:
+    input:
+        comparison=rules.compare_with_paper.output.table,
+        sources=sources("draw_scores.py"),
+    output:
+        pdf="reports/figures/scores_against_paper.pdf",
+        png="reports/figures/scores_against_paper.png",
+    log:
+        "results/logs/draw_scores.log",
+    benchmark:
+        "results/timings/draw_scores.tsv"
+    script:
+        "../scripts/draw_scores.py"
+
+
+rule draw_table2_samples:
+    input:
+        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
+        reference="config/paper/reference.csv",
+        sources=sources("draw_table2_samples.py"),
+    output:
+        pdf="reports/figures/table2_samples.pdf",
+        png="reports/figures/table2_samples.png",
+    log:
+        "results/logs/draw_table2_samples.log",
+    benchmark:
+        "results/timings/draw_table2_samples.tsv"
+    params:
+        titles=TITLES,
+    script:
+        "../scripts/draw_table2_samples.py"

@@ -1,0 +1,24 @@
+"""Each figure that the paper prints beside ours."""
+
+import pandas as pd
+
+from elastocal.comparison import OurResults, comparison_table
+from elastocal.frames import read_long, write_csv
+from elastocal.table_schemas import REPLICATES, metrics
+from job import run
+
+
+def compare_with_paper(job):
+    settings = job.params
+    ours = OurResults(
+        tables={name: pd.read_csv(job.input[name]) for name in ("table1", "table2", "table3", "table4", "extended")},
+        metrics=read_long(job.input.metrics, metrics),
+        replicates=read_long(job.input.replicates, lambda joints: REPLICATES),
+        noise_um=settings.noise_um,
+        length=settings.length,
+    )
+    reference = pd.read_csv(job.input.reference, dtype={"table": str}, keep_default_na=False)
+    write_csv(job.output.table, comparison_table(reference, ours))
+
+
+run(compare_with_paper, snakemake)

@@ -1,0 +1,17 @@
+"""Accuracy of one data set, strategy by strategy."""
+
+import pandas as pd
+
+from elastocal.figures.strategies import accuracy_of_one_data_set
+from elastocal.figures.style import save
+from job import run
+
+
+def draw_accuracy(job):
+    settings = job.params
+    per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
+    figure = accuracy_of_one_data_set(per_dataset, settings.titles, settings.order, settings.length)
+    save(figure, job.output.pdf, job.output.png)
+
+
+run(draw_accuracy, snakemake)

@@ -1,0 +1,19 @@
+"""Bias of the averaged model against the accuracy of one data set."""
+
+import pandas as pd
+
+from elastocal.figures.strategies import bias_and_accuracy
+from elastocal.figures.style import save
+from elastocal.frames import read_long
+from elastocal.table_schemas import metrics
+from job import run
+
+
+def draw_bias_and_accuracy(job):
+    settings = job.params
+    per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
+    figure = bias_and_accuracy(read_long(job.input.metrics, metrics), per_dataset, settings.titles, settings.order)
+    save(figure, job.output.pdf, job.output.png)
+
+
+run(draw_bias_and_accuracy, snakemake)

@@ -1,0 +1,15 @@
+"""Figure 4: noise impact on the classical strategy."""
+
+from elastocal.figures.strategies import noise_impact
+from elastocal.figures.style import save
+from elastocal.frames import read_long
+from elastocal.table_schemas import metrics
+from job import run
+
+
+def draw_noise_impact(job):
+    figure = noise_impact(read_long(job.input.metrics, metrics), job.params.strategy, job.params.titles)
+    save(figure, job.output.pdf, job.output.png)
+
+
+run(draw_noise_impact, snakemake)

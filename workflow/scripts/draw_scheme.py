@@ -1,0 +1,14 @@
+"""Figures 2 and 3: the robot's kinematic scheme, and its springs."""
+
+from elastocal.figures import schemes
+from elastocal.figures.style import save
+from elastocal.robot import robot_from_document
+from job import run
+
+
+def draw_scheme(job):
+    robot = robot_from_document(job.params.robot)
+    save(getattr(schemes, job.params.scheme)(robot), job.output.pdf, job.output.png)
+
+
+run(draw_scheme, snakemake)

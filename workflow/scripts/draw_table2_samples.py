@@ -1,0 +1,19 @@
+"""Table 2 against the statistics of single data sets."""
+
+import pandas as pd
+
+from elastocal.figures.against_paper import table2_samples
+from elastocal.figures.style import save
+from elastocal.frames import read_frame
+from elastocal.table_schemas import INITIAL
+from job import run
+
+
+def draw_table2_samples(job):
+    titles = job.params.titles
+    initial = {robot: read_frame(path, INITIAL) for robot, path in zip(titles, job.input.initial, strict=True)}
+    reference = pd.read_csv(job.input.reference, dtype={"table": str}, keep_default_na=False)
+    save(table2_samples(initial, reference, titles), job.output.pdf, job.output.png)
+
+
+run(draw_table2_samples, snakemake)

@@ -1,0 +1,15 @@
+"""Deflection of one robot before calibration, data set by data set."""
+
+from elastocal.provenance import provenance
+from elastocal.storage import read_blocks, write_table
+from elastocal.study.initial import initial_blocks
+from elastocal.table_schemas import DEFLECTIONS, INITIAL
+from job import run
+
+
+def summarize_initial(job):
+    ideal = read_blocks(job.input.ideal, DEFLECTIONS, point=job.params.end_effector)
+    write_table(job.output.initial, INITIAL, initial_blocks(ideal), provenance(job.params))
+
+
+run(summarize_initial, snakemake)

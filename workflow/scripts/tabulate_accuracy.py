@@ -1,0 +1,15 @@
+"""What one data set gives, for every strategy, robot and noise level."""
+
+from elastocal.frames import read_frame, read_long, write_csv
+from elastocal.table_schemas import BOUNDS, accuracy
+from elastocal.tables import per_dataset_table
+from job import run
+
+
+def tabulate_accuracy(job):
+    settings = job.params
+    bounds = {robot: read_frame(path, BOUNDS) for robot, path in zip(settings.robots, job.input.bounds, strict=True)}
+    write_csv(job.output.table, per_dataset_table(read_long(job.input.accuracy, accuracy), bounds, settings.points))
+
+
+run(tabulate_accuracy, snakemake)

@@ -1,0 +1,13 @@
+"""Table 1: the compliances that the study takes as true."""
+
+from elastocal.frames import write_csv
+from elastocal.robot import robot_from_document
+from elastocal.tables import table1
+from job import run
+
+
+def tabulate_compliances(job):
+    write_csv(job.output.table, table1({name: robot_from_document(d, name) for name, d in job.params.robots.items()}))
+
+
+run(tabulate_compliances, snakemake)

@@ -1,0 +1,22 @@
+"""What calibration with the reduced model leaves of robots with elastic links."""
+
+from elastocal.frames import read_long, write_csv
+from elastocal.table_schemas import REPLICATES, metrics
+from elastocal.tables import extended_table
+from job import run
+
+
+def tabulate_extended(job):
+    settings = job.params
+    table = extended_table(
+        read_long(job.input.metrics, metrics),
+        read_long(job.input.replicates, lambda joints: REPLICATES),
+        settings.robots,
+        settings.strategies,
+        settings.noise_um,
+        settings.length,
+    )
+    write_csv(job.output.table, table)
+
+
+run(tabulate_extended, snakemake)

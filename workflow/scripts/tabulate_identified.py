@@ -1,0 +1,15 @@
+"""Table 3: compliances by the classical strategy."""
+
+from elastocal.frames import read_long, write_csv
+from elastocal.table_schemas import metrics
+from elastocal.tables import table3
+from job import run
+
+
+def tabulate_identified(job):
+    settings = job.params
+    frame = read_long(job.input.metrics, metrics)
+    write_csv(job.output.table, table3(frame, settings.robots, settings.strategy, settings.noise_um, settings.length))
+
+
+run(tabulate_identified, snakemake)

@@ -1,0 +1,19 @@
+"""Table 2: deviation before calibration."""
+
+from elastocal.evaluation import bootstrap_weights
+from elastocal.frames import read_frame, write_csv
+from elastocal.table_schemas import INITIAL
+from elastocal.tables import table2
+from job import run
+
+
+def tabulate_initial(job):
+    settings = job.params
+    initial = {robot: read_frame(path, INITIAL) for robot, path in zip(settings.robots, job.input.initial, strict=True)}
+    weights = {
+        robot: bootstrap_weights(settings.seed, robot, frame.data_set, settings.replicates) for robot, frame in initial.items()
+    }
+    write_csv(job.output.table, table2(initial, weights))
+
+
+run(tabulate_initial, snakemake)

@@ -1,0 +1,14 @@
+"""How far the estimates of strategies and solvers that should agree are apart."""
+
+from elastocal.frames import read_frame, write_csv
+from elastocal.table_schemas import solvers
+from elastocal.tables import solver_summary
+from job import run
+
+
+def tabulate_solvers(job):
+    settings = zip(job.params.robots, job.params.joints, job.input.solvers, strict=True)
+    write_csv(job.output.table, solver_summary({robot: read_frame(path, solvers(n)) for robot, n, path in settings}))
+
+
+run(tabulate_solvers, snakemake)

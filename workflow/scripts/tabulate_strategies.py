@@ -1,0 +1,21 @@
+"""Table 4: the strategies compared."""
+
+from elastocal.frames import read_long, write_csv
+from elastocal.table_schemas import REPLICATES, metrics
+from elastocal.tables import table4
+from job import run
+
+
+def tabulate_strategies(job):
+    settings = job.params
+    table = table4(
+        read_long(job.input.metrics, metrics),
+        read_long(job.input.replicates, lambda joints: REPLICATES),
+        settings.robots,
+        settings.strategies,
+        **settings.cells,
+    )
+    write_csv(job.output.table, table)
+
+
+run(tabulate_strategies, snakemake)

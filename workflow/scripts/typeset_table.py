@@ -1,0 +1,16 @@
+"""A table as Markdown and LaTeX, each value with its standard error."""
+
+import pandas as pd
+
+from elastocal.frames import write_latex, write_markdown
+from elastocal.tables import with_errors_merged
+from job import run
+
+
+def typeset_table(job):
+    shown = with_errors_merged(pd.read_csv(job.input.table, keep_default_na=False, na_values=[""]))
+    write_markdown(job.output.markdown, shown)
+    write_latex(job.output.latex, shown)
+
+
+run(typeset_table, snakemake)
