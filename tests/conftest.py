@@ -1,0 +1,60 @@
+"""Fixtures: the robots and strategies of the repository's own config."""
+
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+from elastocal.documents import check_document, read_document
+from elastocal.robot import robot_from_document
+from elastocal.strategies import strategy_from_document
+
+CONFIG = Path(__file__).resolve().parents[1] / "config"
+
+# The same examples in every run: a test that fails must fail again.
+hypothesis.settings.register_profile("repeatable", deadline=None, max_examples=40, derandomize=True)
+hypothesis.settings.load_profile("repeatable")
+
+
+def load_robot(key):
+    path = CONFIG / "robots" / f"{key}.yaml"
+    document = read_document(path)
+    check_document(document, "robot", path)
+    return robot_from_document(document, path)
+
+
+@pytest.fixture(scope="session")
+def config_folder():
+    return CONFIG
+
+
+@pytest.fixture(scope="session")
+def kuka():
+    return load_robot("kuka")
+
+
+@pytest.fixture(scope="session")
+def fanuc():
+    return load_robot("fanuc")
+
+
+@pytest.fixture(scope="session")
+def kuka_extended():
+    return load_robot("kuka_extended")
+
+
+@pytest.fixture(scope="session", params=["kuka", "fanuc"])
+def robot(request):
+    """Each of the paper's two robots in turn."""
+    return load_robot(request.param)
+
+
+@pytest.fixture(scope="session")
+def strategies():
+    """The paper's eight strategies by the names of their files."""
+    found = {}
+    for path in sorted((CONFIG / "strategies").glob("*.yaml")):
+        document = read_document(path)
+        check_document(document, "strategy", path)
+        found[path.stem] = strategy_from_document(document)
+    return found

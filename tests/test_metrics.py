@@ -1,0 +1,181 @@
+"""Equations 12-15: closed forms, and the score sheet against exact kinematics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from support import random_loads, without_tool
+
+from elastocal.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.metrics import (
+    error_moment,
+    first_length_below,
+    k_sigma,
+    make_judge,
+    mean_deviation,
+    position_errors,
+    relative_stiffness_error,
+    spread_with_censoring,
+)
+from elastocal.robot import with_target_offset
+from elastocal.simulation import true_deflections
+
+RELATIVE_ERRORS = np.array([[0.01, -0.02, 0.03, -0.04, 0.05, -0.06], [-0.2, 0.1, 0.3, 0.1, -0.3, 0.2], [0.0] * 6])
+
+
+def judge_of(robot, loads=None):
+    loads = random_loads(robot, 1, 40) if loads is None else loads
+    return make_judge(robot, loads, true_deflections(robot, loads, robot.chain.end_effector, "end_effector"))
+
+
+def exact_errors(robot, loads, compliance):
+    """Position error of one model: pose by pose, without any linearisation."""
+    end = robot.chain.end_effector
+    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, without_tool(end))
+    predicted = exact_deflections(robot.chain, loads.joint_angles, compliance * torques, end)
+    truth = true_deflections(robot, loads, end, "end_effector")
+    return np.linalg.norm((predicted - truth)[..., :3], axis=-1).ravel()
+
+
+def test_position_errors_are_those_of_the_exact_kinematics(robot):
+    loads, models = random_loads(robot, 1, 40), robot.compliance * (1 + RELATIVE_ERRORS)
+    found = position_errors(judge_of(robot, loads), models)
+    assert found.shape == (3, 40)
+    for model, errors in zip(models[:2], found, strict=False):
+        expected = exact_errors(robot, loads, model)
+        assert errors.mean() == pytest.approx(expected.mean(), rel=1e-3)
+        # Second order: an error of up to a third of the compliance turns by up to a milliradian more.
+        np.testing.assert_allclose(errors, expected, rtol=0, atol=3e-3 * expected.max())
+    # Root of rounding: squares of 1e-3 m lose sixteen digits.
+    np.testing.assert_allclose(found[2], 0, atol=1e-10)
+
+
+def test_true_joint_compliances_leave_what_the_links_bend(kuka_extended):
+    loads = random_loads(kuka_extended, 1, 40)
+    found = position_errors(judge_of(kuka_extended, loads), kuka_extended.compliance[None])[0]
+    np.testing.assert_allclose(found, exact_errors(kuka_extended, loads, kuka_extended.compliance), rtol=1e-6)
+    assert found.mean() > 1e-4
+
+
+def test_true_compliances_have_no_error_at_a_target_off_the_flange(kuka):
+    # The target is shifted, the load stays at the end-effector (readings R5 and R6).
+    found = position_errors(judge_of(with_target_offset(kuka, (0.1, 0.2, 0.3))), kuka.compliance[None])
+    np.testing.assert_allclose(found, 0, atol=1e-10)
+
+
+def test_mean_deviation_is_the_mean_position_error(kuka):
+    judge = judge_of(kuka)
+    models = (kuka.compliance * (1 + RELATIVE_ERRORS[[0, 1, 0, 1, 1, 0]])).reshape(2, 3, 6)
+    expected = position_errors(judge, models.reshape(-1, 6)).mean(axis=1).reshape(2, 3)
+    np.testing.assert_allclose(mean_deviation(judge, models), expected, rtol=1e-12)
+
+
+def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuka):
+    judge = judge_of(kuka)
+    models = kuka.compliance * (1 + RELATIVE_ERRORS[[[0, 1], [1, 0]]])
+    counts = np.random.default_rng(1).poisson(1.0, (2, 40))
+    found = mean_deviation(judge, models, counts)
+    for group in range(2):
+        expected = np.repeat(position_errors(judge, models[group]), counts[group], axis=1).mean(axis=1)
+        np.testing.assert_allclose(found[group], expected, rtol=1e-12)
+
+
+def test_initial_errors_are_the_deflections_themselves(kuka):
+    loads = random_loads(kuka, 2, 10)
+    expected = np.linalg.norm(true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector")[..., :3], axis=-1)
+    np.testing.assert_allclose(judge_of(kuka, loads).initial_errors, expected.ravel(), rtol=1e-12)
+
+
+def test_error_moment_is_the_mean_of_the_squared_regressor(robot):
+    loads = random_loads(robot, 1, 40)
+    jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.end_effector)[2]
+    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
+    rows = regressor(jacobian, torques)[..., :3, :].reshape(-1, 6)
+    expected = rows.T @ rows / 40
+    np.testing.assert_allclose(error_moment(judge_of(robot, loads)), expected, rtol=0, atol=1e-12 * expected.max())
+
+
+def test_error_moment_gives_the_mean_squared_error(kuka):
+    judge = judge_of(kuka)
+    for error in RELATIVE_ERRORS[:2] * kuka.compliance:
+        squares = position_errors(judge, (kuka.compliance + error)[None]) ** 2
+        assert error @ error_moment(judge) @ error == pytest.approx(squares.mean(), rel=1e-9)
+
+
+def test_relative_stiffness_error_is_equation_13():
+    stiffness, true_stiffness = np.array([1.1e6, 0.5e6]), np.array([1.0e6, 1.0e6])
+    np.testing.assert_allclose(relative_stiffness_error(1 / stiffness, 1 / true_stiffness), [10.0, -50.0], rtol=1e-12)
+
+
+def test_averaged_stiffness_is_biased_as_jensen_says():
+    # c lognormal about 1: E[1/c] = exp(s^2 - m) with E[c] = exp(m + s^2 / 2) = 1, so that k is over by exp(s^2) - 1.
+    spread = 0.2
+    nodes, weights = np.polynomial.hermite_e.hermegauss(40)
+    compliance = np.exp(spread * nodes - spread**2 / 2)
+    mean_stiffness = weights @ (1 / compliance) / weights.sum()
+    found = relative_stiffness_error(np.array([1 / mean_stiffness]), np.ones(1))
+    np.testing.assert_allclose(found, 100 * (np.exp(spread**2) - 1), rtol=1e-10)
+
+
+def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
+    true_compliance = np.array([1.0, 2.0, 4.0])
+    compliance = true_compliance / [1.01, 0.97, 1.05]
+    assert k_sigma(compliance, true_compliance) == pytest.approx(3.0, rel=1e-10)
+    assert k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(-2.0, rel=1e-10)
+    np.testing.assert_allclose(k_sigma(np.stack([compliance, true_compliance]), true_compliance), [3.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([5.0, 3.0, 1.0, 0.5], 3),
+        ([0.5, 3.0, 1.0], 1),
+        ([5.0, -0.5, 1.0], 2),
+        ([5.0, -3.0, 2.0], np.inf),
+        ([np.nan, np.nan, 0.1], 3),
+        ([np.nan, np.nan], np.inf),
+        ([np.inf, 1.0], 2),
+    ],
+)
+def test_first_length_below_counts_from_one_and_is_infinite_where_not_reached(values, expected):
+    assert first_length_below(np.array(values), 1.0) == expected
+
+
+def test_first_length_below_keeps_leading_axes():
+    values = np.array([[[5.0, 0.0], [5.0, 5.0]], [[0.0, 0.0], [np.nan, 0.0]]])
+    np.testing.assert_array_equal(first_length_below(values, 1.0), [[2, np.inf], [1, 2]])
+
+
+@given(arrays(float, st.integers(2, 40), elements=st.floats(1, 100)))
+def test_spread_without_censoring_is_the_standard_deviation(values):
+    assert spread_with_censoring(values) == pytest.approx(np.std(values, ddof=1), rel=1e-12)
+
+
+def test_spread_with_censoring_estimates_the_standard_deviation_of_a_normal_spread():
+    values = np.random.default_rng(1).normal(50, 4, 20_000)
+    censored = np.where(values > 53, np.inf, values)
+    # Two percentiles of 20 000 numbers: 0.05 each.
+    assert spread_with_censoring(censored) == pytest.approx(4.0, abs=0.25)
+
+
+def test_spread_is_not_a_number_where_more_than_half_are_censored():
+    assert np.isnan(spread_with_censoring(np.array([1.0, 2.0, np.inf, np.inf, np.inf])))
+    assert np.isnan(spread_with_censoring(np.full(10, np.inf)))
+
+
+def test_spread_stays_finite_where_fewer_than_half_are_censored():
+    assert np.isfinite(spread_with_censoring(np.array([1.0, 2.0, 3.0, np.inf, np.inf])))
+
+
+def test_judge_scores_about_the_compliances_of_the_robot(kuka):
+    loads = random_loads(kuka, 1, 10)
+    truth = true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector")
+    other = replace(kuka, compliance=1.1 * kuka.compliance)
+    # Judged about another reference, the truth is still the truth: only the second order differs.
+    about_truth = position_errors(make_judge(kuka, loads, truth), 1.05 * kuka.compliance[None])
+    about_other = position_errors(make_judge(other, loads, truth), 1.05 * kuka.compliance[None])
+    np.testing.assert_allclose(about_other, about_truth, rtol=0, atol=3e-3 * about_truth.max())

@@ -1,0 +1,212 @@
+"""The chain notation and the robot file: what they mean, and that every fault is refused in one line."""
+
+import math
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import chain_of, refused
+
+from elastocal.documents import read_document
+from elastocal.robot import Transform, parse_chain, robot_from_document, stretches, with_target_offset
+
+TWO_JOINTS = {
+    "name": "two joints",
+    "chain": "Tz(l1) Rz(q1) Tx(l2) [A] Ry(q2) Tx(l3) [B]",
+    "lengths_m": {"l1": 0.5, "l2": 0.25, "l3": 1.5},
+    "joint_limits_deg": [[-180, 180], [-90, 45]],
+    "compliance_urad_per_Nm": [1.5, 2.5],
+}
+TUBES = {"youngs_modulus_GPa": 70, "shear_modulus_GPa": 26, "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}]}
+
+
+def document(**changes):
+    changed = deepcopy(TWO_JOINTS) | changes
+    return {key: value for key, value in changed.items() if value is not None}
+
+
+def test_each_token_becomes_one_transform():
+    text = "Tz(l1) Rz(q1) Tx(-l2) Ry(-q2) Rx(90deg) Rx(-30.5deg) Ty(-.25) Tz(2) [EE]"
+    chain = parse_chain(text, {"l1": 0.6, "l2": 0.3}, "test")
+    assert chain.transforms == (
+        Transform("T", 2, 0.6),
+        Transform("R", 2, 0.0, 0, 1.0),
+        Transform("T", 0, -0.3),
+        Transform("R", 1, 0.0, 1, -1.0),
+        Transform("R", 0, math.pi / 2),
+        Transform("R", 0, -math.radians(30.5)),
+        Transform("T", 1, -0.25),
+        Transform("T", 2, 2.0),
+    )
+    assert chain.coordinates == 2
+    assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
+
+
+def test_minus_sign_of_a_negative_length_is_plus():
+    assert parse_chain("Rz(q1) Tx(-l) [A]", {"l": -0.041}, "test").transforms[1].constant == 0.041
+
+
+def test_points_stand_where_they_are_written_and_the_last_is_the_end_effector():
+    chain = chain_of("[base] Rz(q1) Tx(1) [A] Ry(q2) [B] [C]")
+    assert [(p.name, p.after) for p in chain.points] == [("base", 0), ("A", 2), ("B", 3), ("C", 3)]
+    assert chain.end_effector == chain.point("C")
+    assert [chain.moved_by(p) for p in chain.points] == [(), (0,), (0, 1), (0, 1)]
+
+
+def test_unknown_point_names_those_of_the_chain():
+    with pytest.raises(KeyError, match=r"'C'.*A, B"):
+        chain_of("Rz(q1) [A] Ry(q2) [B]").point("C")
+
+
+def test_both_robots_have_the_points_and_joints_of_the_paper(robot):
+    assert [p.name for p in robot.chain.points] == ["2DoF", "3DoF", "4DoF", "6DoF"]
+    assert [robot.chain.moved_by(p) for p in robot.chain.points] == [(0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 1, 2, 3, 4, 5)]
+    assert robot.joints == 6
+
+
+@st.composite
+def written_chains(draw):
+    """(text, transforms) of a chain of random tokens."""
+    words, transforms, joints = [], [], 0
+    for kind in [*draw(st.lists(st.sampled_from("TRq"), min_size=1, max_size=12)), "q"]:
+        axis, sign = draw(st.integers(0, 2)), draw(st.sampled_from(["", "-"]))
+        factor = -1.0 if sign else 1.0
+        if kind == "q":
+            joints += 1
+            words.append(f"R{'xyz'[axis]}({sign}q{joints})")
+            transforms.append(Transform("R", axis, 0.0, joints - 1, factor))
+        else:
+            number = f"{draw(st.integers(0, 359))}.{draw(st.integers(0, 999)):03d}"
+            words.append(f"{kind}{'xyz'[axis]}({sign}{number}{'deg' if kind == 'R' else ''})")
+            amount = math.radians(float(number)) if kind == "R" else float(number)
+            transforms.append(Transform(kind, axis, factor * amount))
+    return " ".join([*words, "[EE]"]), tuple(transforms)
+
+
+@given(written_chains())
+def test_any_written_chain_is_read_as_written(written):
+    text, transforms = written
+    assert chain_of(text).transforms == transforms
+
+
+def test_blanks_and_line_breaks_separate_tokens_alike():
+    assert chain_of("Tz(1)\n  Rz(q1)   Tx(2)\t[EE]") == chain_of("Tz(1) Rz(q1) Tx(2) [EE]")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("Tz(l1) Rz(q1) Tw(l2) [A]", ["'Tw(l2)'", "Tx(length)", "[POINT]"]),
+        ("Tz(l1) rz(q1) Tx(l2) [A]", ["'rz(q1)'"]),
+        ("Tz(l1)Rz(q1) Tx(l2) [A]", ["'Tz(l1)Rz(q1)'", "separated by blanks"]),
+        ("Tz(l1) Rz(q1) Tx(l2 [A]", ["'Tx(l2'"]),
+        ("Tz(l1) Rz(q1) Tx(--l2) [A]", ["'Tx(--l2)'"]),
+        ("Tz(l1) Rz(q1) Tx() [A]", ["'Tx()'"]),
+        ("Tz(l1) Rz(q1) Tx(l2) []", ["'[]'"]),
+        ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(q1) [A]", ["'Ry(q1)'", "q2 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(90) [A]", ["'Ry(90)'", "90deg"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(l2) [A]", ["'Ry(l2)'"]),
+        ("Tz(l1) Rz(q1) Tx(l9) [A]", ["'Tx(l9)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(q2) [A]", ["'Tx(q2)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(5deg) [A]", ["'Tx(5deg)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(1,5) [A]", ["'Tx(1,5)'"]),
+        ("Tz(l1) Rz(q1) [A] Tx(l2) [A]", ["[A] twice", "once"]),
+        ("Tz(l1) Rz(q1) [A] Tx(l2)", ["'Tx(l2)' at its end", "measuring point"]),
+        ("Tz(l1) Rz(q1) Tx(l2)", ["'Tx(l2)' at its end", "[6DoF] at the end"]),
+        ("Tz(l1) Tx(l2) [A]", ["no joint", "q1"]),
+        ("", ["no joint", "q1"]),
+    ],
+)
+def test_faulty_chain_is_refused_in_one_line(text, words):
+    with refused("robots/x.yaml", "chain", *words):
+        parse_chain(text, {"l1": 1.0, "l2": 2.0}, "robots/x.yaml")
+
+
+def test_length_that_the_chain_does_not_use_is_refused():
+    with refused("robots/x.yaml", "lengths_m", "l2, l3", "that the chain uses"):
+        parse_chain("Tz(l1) Rz(q1) [A]", {"l1": 1.0, "l3": 2.0, "l2": 2.0}, "robots/x.yaml")
+
+
+def test_robot_file_comes_in_si_units():
+    robot = robot_from_document(document())
+    assert robot.joints == 2 and robot.links == ()
+    np.testing.assert_allclose(robot.compliance, [1.5e-6, 2.5e-6], rtol=1e-15)
+    np.testing.assert_allclose(robot.joint_limits, [[-np.pi, np.pi], [-np.pi / 2, np.pi / 4]], rtol=1e-15)
+    np.testing.assert_array_equal(robot.reported_matrix, np.eye(2))
+    np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
+
+
+def test_reported_joints_come_in_radians():
+    robot = robot_from_document(document(reported_joints={"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}))
+    np.testing.assert_array_equal(robot.reported_matrix, [[1, 0], [1, -1]])
+    np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"joint_limits_deg": [[-180, 180]]}, "joint_limits_deg", ["1 entries", "each of the 2 joints"]),
+        ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
+        ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
+        ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
+        ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 x 2"]),
+        ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["2 x 2 and 2"]),
+        ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 x 2"]),
+        ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
+        ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
+        ({"links": TUBES | {"tubes": TUBES["tubes"] * 2}}, "links.tubes", ["2 tubes", "each of the 3"]),
+        ({"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}}, "links.tubes", ["0.101", "half"]),
+    ],
+)
+def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
+    with refused("robots/two.yaml", key, *words):
+        robot_from_document(document(**changes), "robots/two.yaml")
+
+
+def test_links_on_a_chain_with_fixed_rotations_are_refused():
+    with refused("robots/two.yaml", "links", "turn at their joints only"):
+        turned = document(chain="Tz(l1) Rz(q1) Tx(l2) Rx(90deg) [A] Ry(q2) Tx(l3) [B]", links=TUBES)
+        robot_from_document(turned, "robots/two.yaml")
+
+
+def test_one_tube_serves_every_link_and_a_list_of_tubes_goes_from_the_base_on():
+    same = robot_from_document(document(links=TUBES))
+    assert len(same.links) == 3 and len({link.tube for link in same.links}) == 1
+    sizes = [{"outer_diameter_m": d, "wall_m": 0.01} for d in (0.3, 0.2, 0.1)]
+    each = robot_from_document(document(links=TUBES | {"tubes": sizes}))
+    assert [link.tube.outer_diameter_m for link in each.links] == [0.3, 0.2, 0.1]
+    assert {(link.tube.youngs_modulus_Pa, link.tube.shear_modulus_Pa) for link in each.links} == {(70e9, 26e9)}
+
+
+def test_a_solid_tube_is_allowed():
+    solid = TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.1}]}
+    assert len(robot_from_document(document(links=solid)).links) == 3
+
+
+def test_stretches_are_the_rigid_parts_between_the_joints(kuka):
+    assert stretches(kuka.chain) == (
+        (1, (0.0, 0.0, 0.675)),
+        (3, (0.35, 0.0, 0.0)),
+        (5, (1.15, 0.0, 0.0)),
+        (8, (1.2, 0.0, -0.041)),
+        (12, (0.24, 0.0, 0.0)),
+    )
+
+
+def test_target_offset_reaches_every_point_and_leaves_the_chain_alone(kuka):
+    moved = with_target_offset(kuka, [0.1, 0.2, 0.3])
+    assert {p.offset_m for p in moved.chain.points} == {(0.1, 0.2, 0.3)}
+    assert moved.chain.transforms == kuka.chain.transforms
+    assert {p.offset_m for p in kuka.chain.points} == {(0.0, 0.0, 0.0)}
+    assert with_target_offset(kuka.chain, [0.1, 0.2, 0.3]) == moved.chain
+
+
+def test_every_robot_of_the_repository_has_the_compliances_of_table_1(config_folder):
+    table = {"kuka": [0.54, 0.29, 0.42, 2.79, 3.48, 2.07], "fanuc": [1.23, 0.37, 0.46, 2.68, 2.70, 2.72]}
+    for name, compliance in (table | {"kuka_extended": table["kuka"]}).items():
+        robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
+        np.testing.assert_allclose(robot.compliance, 1e-6 * np.array(compliance), rtol=1e-12)

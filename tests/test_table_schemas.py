@@ -1,0 +1,42 @@
+"""Tables: every column has a name of its own, a meaning, and a unit where it has one."""
+
+import pytest
+
+from elastocal import table_schemas
+from elastocal.storage import TableSchema
+
+SCHEMAS = [schema for schema in vars(table_schemas).values() if isinstance(schema, TableSchema)]
+SCHEMAS += [make(n) for make in (table_schemas.experiments, table_schemas.identified) for n in (3, 6, 7)]
+SCHEMAS += [make(n) for make in (table_schemas.metrics, table_schemas.accuracy) for n in (3, 6, 7)]
+
+
+@pytest.mark.parametrize("schema", SCHEMAS, ids=lambda schema: f"{schema.name} of {len(schema.columns)} columns")
+def test_columns_have_a_name_of_their_own_and_a_meaning(schema):
+    names = [column.name for column in schema.columns]
+    assert len(set(names)) == len(names)
+    assert all(column.meaning for column in schema.columns)
+    assert all(
+        column.unit
+        for column in schema.columns
+        if column.name.startswith(("q", "f", "m", "d", "r", "c", "cov")) and bare(column)
+    )
+
+
+def bare(column):
+    """Columns named after a joint, a force, a displacement, a compliance or a covariance."""
+    return column.type.startswith("float") and (column.name[-1].isdigit() or column.name[1:] in ("x", "y", "z"))
+
+
+def test_there_is_one_column_for_each_joint_and_one_covariance_for_each_pair():
+    for joints in (3, 7):
+        names = {column.name for column in table_schemas.identified(joints).columns}
+        assert {f"c{j + 1}" for j in range(joints)} <= names
+        pairs = table_schemas.covariance_columns(joints)
+        assert len(pairs) == joints * (joints + 1) // 2 and {name for name, _, _ in pairs} <= names
+        assert {(i, j) for _, i, j in pairs} == {(i, j) for i in range(joints) for j in range(i + 1)}
+
+
+def test_schema_finds_its_columns_by_name():
+    assert table_schemas.experiments(6).column("q3").unit == "rad"
+    assert table_schemas.DEFLECTIONS.column("rx").unit == "rad"
+    assert table_schemas.experiments(6).column("mx").unit == "N m"
