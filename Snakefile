@@ -9,11 +9,13 @@ include: "workflow/rules/identify.smk"
 include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
+include: "workflow/rules/report.smk"
 
 
 rule all:
     default_target: True
     input:
+        rules.compile_report.output.report,
         expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
         expand("reports/tables/{table}.csv", table=["comparison", "extended", "per_dataset", "solvers"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),

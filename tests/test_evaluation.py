@@ -12,8 +12,8 @@ from elastocal.evaluation import (
     average,
     bootstrap_test_weights,
     bootstrap_weights,
-    lengths_to_reach,
     metrics_table,
+    reached_length,
     replicates_table,
 )
 from elastocal.metrics import make_judge, mean_deviation, position_errors
@@ -248,8 +248,14 @@ def test_exact_estimates_have_no_error_and_no_standard_error(judge):
             np.testing.assert_allclose(values, 0, atol=1e-9, err_msg=name)
 
 
-def test_lengths_to_reach_a_limit_come_with_the_spread_of_the_replicates():
+def test_length_that_reaches_a_limit_comes_with_the_spread_of_the_replicates():
     values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 0.5], [0.9, 0.9, 0.5]])
-    length, error = lengths_to_reach(values, replicates, 1.0)
+    length, error = reached_length(values, replicates, 1.0)
     assert length == 2.0 and error == pytest.approx(np.std([2, 3, 1], ddof=1))
-    assert lengths_to_reach(values, replicates, 0.1)[0] == np.inf
+
+
+def test_replicates_that_do_not_reach_the_limit_are_continued_and_not_left_out():
+    values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 1.5], [9.0, 4.0, -2.0]])
+    length, error = reached_length(values, replicates, 1.0)
+    assert length == 2.0 and error == pytest.approx(np.std([2, 4.5, 6], ddof=1))
+    assert reached_length(values, replicates, 0.1)[0] == np.inf

@@ -45,6 +45,19 @@ def test_target_offset_agrees_with_pinocchio(kuka):
         assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(3), chain, 10))
 
 
+@pytest.mark.parametrize("kind", ["R", "T"])
+def test_coordinates_with_a_constant_part_agree_with_pinocchio_and_keep_the_angles(kind):
+    chain = chain_of(OTHER_CHAINS["fixed rotations"])
+    moving = [t if t.coordinate is None else replace(t, kind=kind, constant=0.1 * (t.coordinate + 1)) for t in chain.transforms]
+    chain = replace(chain, transforms=tuple(moving))
+    # Component first in memory, so that the package may work on the angles themselves and not on a copy.
+    angles = np.asfortranarray(random_angles(np.random.default_rng(14), chain, 5))
+    before = angles.copy()
+    for point in chain.points:
+        assert_agrees_with_pinocchio(chain, point, angles)
+    np.testing.assert_array_equal(angles, before)
+
+
 @st.composite
 def chain_texts(draw):
     """Chains of one to eight joints with translations, fixed rotations and points anywhere."""

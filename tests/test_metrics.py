@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 from support import random_loads, without_tool
 
 from elastocal.elastostatics import exact_deflections, joint_torques, regressor
@@ -15,11 +14,11 @@ from elastocal.metrics import (
     error_moment,
     first_length_below,
     k_sigma,
+    length_to_reach,
     make_judge,
     mean_deviation,
     position_errors,
     relative_stiffness_error,
-    spread_with_censoring,
 )
 from elastocal.robot import with_target_offset
 from elastocal.simulation import true_deflections
@@ -150,25 +149,19 @@ def test_first_length_below_keeps_leading_axes():
     np.testing.assert_array_equal(first_length_below(values, 1.0), [[2, np.inf], [1, 2]])
 
 
-@given(arrays(float, st.integers(2, 40), elements=st.floats(1, 100)))
-def test_spread_without_censoring_is_the_standard_deviation(values):
-    assert spread_with_censoring(values) == pytest.approx(np.std(values, ddof=1), rel=1e-12)
+@given(st.floats(1e-3, 1e3), st.sampled_from([-1.0, 1.0]), st.integers(1, 30))
+def test_length_to_reach_continues_a_bias_that_falls_as_one_over_the_length(bias, sign, lengths):
+    values = sign * bias / np.arange(1, lengths + 1)
+    found, reached = length_to_reach(values, 1.0), first_length_below(values, 1.0)
+    if np.isfinite(reached):
+        assert found == reached
+    else:
+        assert found == pytest.approx(bias, rel=1e-12) and found >= lengths
 
 
-def test_spread_with_censoring_estimates_the_standard_deviation_of_a_normal_spread():
-    values = np.random.default_rng(1).normal(50, 4, 20_000)
-    censored = np.where(values > 53, np.inf, values)
-    # Two percentiles of 20 000 numbers: 0.05 each.
-    assert spread_with_censoring(censored) == pytest.approx(4.0, abs=0.25)
-
-
-def test_spread_is_not_a_number_where_more_than_half_are_censored():
-    assert np.isnan(spread_with_censoring(np.array([1.0, 2.0, np.inf, np.inf, np.inf])))
-    assert np.isnan(spread_with_censoring(np.full(10, np.inf)))
-
-
-def test_spread_stays_finite_where_fewer_than_half_are_censored():
-    assert np.isfinite(spread_with_censoring(np.array([1.0, 2.0, 3.0, np.inf, np.inf])))
+def test_length_to_reach_is_the_first_length_below_where_there_is_one():
+    values = np.array([[5.0, 0.5, 3.0], [5.0, 4.0, -2.0]])
+    np.testing.assert_array_equal(length_to_reach(values, 1.0), [2.0, 6.0])
 
 
 def test_judge_scores_about_the_compliances_of_the_robot(kuka):

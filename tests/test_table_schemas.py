@@ -15,16 +15,13 @@ def test_columns_have_a_name_of_their_own_and_a_meaning(schema):
     names = [column.name for column in schema.columns]
     assert len(set(names)) == len(names)
     assert all(column.meaning for column in schema.columns)
-    assert all(
-        column.unit
-        for column in schema.columns
-        if column.name.startswith(("q", "f", "m", "d", "r", "c", "cov")) and bare(column)
-    )
 
 
-def bare(column):
-    """Columns named after a joint, a force, a displacement, a compliance or a covariance."""
-    return column.type.startswith("float") and (column.name[-1].isdigit() or column.name[1:] in ("x", "y", "z"))
+@pytest.mark.parametrize("make", ["experiments", "identified", "metrics", "accuracy"])
+def test_only_shares_and_ratios_go_without_a_unit(make):
+    columns = [*getattr(table_schemas, make)(6).columns, *table_schemas.DEFLECTIONS.columns, *table_schemas.BOUNDS.columns]
+    without = {column.name for column in columns if column.type.startswith("float") and not column.unit}
+    assert without <= {"condition", "nonpositive_share", "relative_spread"}
 
 
 def test_there_is_one_column_for_each_joint_and_one_covariance_for_each_pair():

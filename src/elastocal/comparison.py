@@ -47,7 +47,7 @@ def comparison_table(reference, ours):
     -------
     pandas.DataFrame
         table, robot, strategy, quantity, unit, paper, ours, mc_std, z, reading. `mc_std` is the standard deviation between
-        studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where either
+        studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where one
         is missing. The paper is a study of the same size with the same spread, so a faithful z has standard deviation 1.4 and
         about one in thirteen lies beyond 2.5. What the study does not cover is empty.
     """
@@ -109,7 +109,9 @@ def _smallest_ratio(ours):
     ratios = []
     for _, cells in ours.tables["table4"].groupby("robot", sort=True):
         best = cells.loc[cells[f"dev_{ours.length}_um"].idxmin()]
-        ratios.append(deviation_ratio(ours.metrics, ours.replicates, best.robot, "6DoF", best.strategy, ours.noise_um, ours.length))
+        ratios.append(
+            deviation_ratio(ours.metrics, ours.replicates, best.robot, "6DoF", best.strategy, ours.noise_um, ours.length)
+        )
     return *min(ratios), "R8: the best strategy of each robot, the smaller robot ratio"
 
 

@@ -63,9 +63,13 @@ def check_study(config, folder, source="config.yaml"):
             check_strategy(strategy, chain, _path(folder, "strategies", name))
         needed = first_solvable_length(strategy, rows_read(config["readings"]["measured"]))
         if config["configurations"] < needed:
-            raise InputError(source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short")
+            raise InputError(
+                source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short"
+            )
     if all("links" in document for document in robots.values()):
-        raise InputError(source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4")
+        raise InputError(
+            source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4"
+        )
     _check_cells(config, source)
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
@@ -78,14 +82,18 @@ def rows_read(measured):
 def _check_cells(config, source):
     tables, longest = config["tables"], config["configurations"]
     if tables["classical_strategy"] not in config["strategies"]:
-        raise InputError(source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}")
+        raise InputError(
+            source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}"
+        )
     if tables["noise_um"] not in config["noise_um"]:
         raise InputError(source, "tables.noise_um", str(tables["noise_um"]), f"one of noise_um {config['noise_um']}")
     for index, length in enumerate(config["evaluation"]["lengths"]):
         if length > longest:
             raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
     if tables["length"] not in config["evaluation"]["lengths"]:
-        raise InputError(source, "tables.length", str(tables["length"]), f"one of evaluation.lengths {config['evaluation']['lengths']}")
+        raise InputError(
+            source, "tables.length", str(tables["length"]), f"one of evaluation.lengths {config['evaluation']['lengths']}"
+        )
 
 
 def _path(folder, kind, name):

@@ -1,12 +1,24 @@
 """YAML documents that users write: read, and checked against a JSON schema that knows every key."""
 
 import difflib
+import math
 from importlib import resources
 
 import jsonschema
 import yaml
 
 from elastocal.errors import InputError
+
+# Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
+_Validator = jsonschema.validators.extend(
+    jsonschema.Draft202012Validator,
+    type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
+        {
+            "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
+            "number": lambda _, value: isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value),
+        }
+    ),
+)
 
 
 def read_document(path):
@@ -30,6 +42,8 @@ def read_document(path):
             return yaml.safe_load(file)
     except OSError as error:
         raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
     except yaml.YAMLError as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         where = "" if line is None else f"line {line + 1}"
@@ -57,7 +71,7 @@ def check_document(document, schema, source):
     InputError
         Names the first key at fault, what was found and what is allowed.
     """
-    validator = jsonschema.Draft202012Validator(read_schema(schema))
+    validator = _Validator(read_schema(schema))
     errors = sorted(validator.iter_errors(document), key=lambda error: [str(part) for part in error.absolute_path])
     if errors:
         raise InputError(source, *_explained(errors[0]))

@@ -4,6 +4,8 @@ Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflec
 and rad, base axes. Compliances of rotary springs are in rad/(N m).
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
@@ -63,8 +65,25 @@ def generalized_forces(jacobian, wrench):
     return (jacobian * wrench[..., :, None]).sum(axis=-2)
 
 
-def joint_torques(chain, joint_angles, wrench, loaded_point):
-    """Torques that a wrench at `loaded_point` puts on the joints.
+def loaded_point(chain, point, wrench_at):
+    """Where the wrench acts that deflects a measuring point (reading R6).
+
+    Parameters
+    ----------
+    chain : Chain
+    point : MeasuringPoint
+    wrench_at : {"end_effector", "measuring_point"}
+
+    Returns
+    -------
+    MeasuringPoint
+        The end-effector itself, whatever target sits on it; or the measuring point.
+    """
+    return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else point
+
+
+def joint_torques(chain, joint_angles, wrench, at):
+    """Torques that a wrench puts on the joints.
 
     Parameters
     ----------
@@ -72,15 +91,15 @@ def joint_torques(chain, joint_angles, wrench, loaded_point):
     joint_angles : ndarray (..., n)
         rad.
     wrench : ndarray (..., 6)
-    loaded_point : MeasuringPoint
-        Where the wrench is stated: the end-effector, or, under the untransported reading (R6), the measuring point itself.
+    at : MeasuringPoint
+        Where the wrench is stated, see `loaded_point`.
 
     Returns
     -------
     ndarray (..., n)
         N m.
     """
-    return generalized_forces(poses_and_jacobians(chain, joint_angles, loaded_point)[2], wrench)
+    return generalized_forces(poses_and_jacobians(chain, joint_angles, at)[2], wrench)
 
 
 def regressor(jacobian, torques):

@@ -11,10 +11,10 @@ import numpy as np
 from elastocal.metrics import (
     first_length_below,
     k_sigma,
+    length_to_reach,
     mean_deviation,
     position_errors,
     relative_stiffness_error,
-    spread_with_censoring,
 )
 from elastocal.random_streams import draw
 
@@ -121,10 +121,7 @@ def average(blocks, judge, method, deviation_of, test_weights):
     if method != "median":
         averaged = sums / total[:, None, None]
         averaged = averaged if method == "compliance" else 1.0 / averaged
-    if deviation_of == "averaged_model":
-        deviation = mean_deviation(judge, averaged, test_weights)
-    else:
-        deviation = scores / total[:, None]
+    deviation = mean_deviation(judge, averaged, test_weights) if deviation_of == "averaged_model" else scores / total[:, None]
     initial = np.broadcast_to((test_weights @ judge.initial_errors / test_weights.sum(axis=1))[:, None], deviation.shape)
     mean, square = moments / sets
     spread = (np.sqrt(np.maximum(square - mean**2, 0.0)) / np.abs(mean)).max(axis=-1)
@@ -202,7 +199,9 @@ def accuracy_table(blocks, judge, lengths):
         n = compliance.shape[-1]
         errors = position_errors(judge, compliance.reshape(-1, n))
         rank = int(np.ceil(0.95 * errors.shape[1])) - 1
-        single = np.stack([errors.mean(axis=1), (errors**2).mean(axis=1), np.partition(errors, rank)[:, rank], errors.max(axis=1)], 1)
+        single = np.stack(
+            [errors.mean(axis=1), (errors**2).mean(axis=1), np.partition(errors, rank)[:, rank], errors.max(axis=1)], 1
+        )
         relative = ((compliance - judge.reference) / judge.reference) ** 2
         values = np.concatenate([single.reshape(*compliance.shape[:2], 4), relative], axis=-1)
         sets += len(block)
@@ -222,7 +221,7 @@ def accuracy_table(blocks, judge, lengths):
     return table
 
 
-def lengths_to_reach(values, replicate_values, limit):
+def reached_length(values, replicate_values, limit):
     """First length at which a metric is at most `limit`, with its Monte Carlo standard error.
 
     Parameters
@@ -234,9 +233,10 @@ def lengths_to_reach(values, replicate_values, limit):
     Returns
     -------
     length, std_error : float
-        Infinite where it is not reached; see `metrics.spread_with_censoring`.
+        The length is infinite where it is not reached; replicates that do not reach it are continued, see
+        `metrics.length_to_reach`, since leaving them out would make the error too small.
     """
-    return float(first_length_below(values, limit)), spread_with_censoring(first_length_below(replicate_values, limit))
+    return float(first_length_below(values, limit)), float(np.std(length_to_reach(replicate_values, limit), ddof=1))
 
 
 def _replicated_scores(averages, true_compliance, first_stage_joints):

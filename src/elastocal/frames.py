@@ -1,10 +1,9 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
-import os
-
 import pandas as pd
 
 from elastocal.storage import read_provenance, read_table
+from elastocal.whole_files import appearing_whole
 
 
 def read_frame(path, schema, columns=None):
@@ -58,18 +57,18 @@ def write_csv(path, frame):
     path : str
     frame : pandas.DataFrame
     """
-    _write_text(path, frame.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+    write_text(path, frame.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
 
 
 def write_markdown(path, frame):
     """Write a frame of strings as a Markdown table."""
-    _write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n")
+    write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n")
 
 
 def write_latex(path, frame):
     """Write a frame of strings as a LaTeX tabular."""
     shown = frame.rename(columns=_latex).map(_latex)
-    _write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]))
+    write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]))
 
 
 def _latex(text):
@@ -78,7 +77,7 @@ def _latex(text):
     return text
 
 
-def _write_text(path, text):
-    with open(f"{path}.partial", "w", encoding="utf-8") as file:
+def write_text(path, text):
+    """Write a text; the file appears whole or not at all."""
+    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
         file.write(text)
-    os.replace(f"{path}.partial", path)

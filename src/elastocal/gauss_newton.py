@@ -9,9 +9,9 @@ from elastocal.elastostatics import exact_deflections, regressor
 from elastocal.kinematics import poses_and_jacobians
 
 STEPS = 30
-# Relative size of the last step. Rounding of positions of metres against deflections of millimetres allows steps of 1e-12; each
-# step is about a thousand times smaller than the one before, so what follows the last one is lost in it.
-LAST_STEP = 1e-10
+# Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding of
+# positions of metres against deflections of millimetres, which the condition number magnifies.
+LAST_STEP = 1e-7
 
 
 def identify_exactly(strategy, chain, joint_angles, torques, deflections, start, lengths):
@@ -35,12 +35,7 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
     Returns
     -------
     ndarray (lengths, n, sets)
-        rad/(N m).
-
-    Raises
-    ------
-    ArithmeticError
-        Where the steps do not settle.
+        rad/(N m); not a number where the steps of a data set do not settle, as in very short prefixes near a singularity.
     """
     sets, joints = joint_angles.shape[1:]
     solved = np.empty((len(lengths), joints, sets))
@@ -58,18 +53,31 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
 
 def _solve_stage(chain, data, identified, compliance):
     compliance = compliance.copy()
-    for _ in range(STEPS):
-        normal = right = 0.0
-        for point, joint_angles, torques, measured in data:
-            sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, compliance)
-            sensitivity = sensitivity[..., identified]
-            normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
-            right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
-        step = np.linalg.solve(normal, right[..., None])[..., 0]
-        compliance[:, identified] += step
-        if np.abs(step).max() <= LAST_STEP * np.abs(compliance).max():
-            return compliance
-    raise ArithmeticError(f"Gauss-Newton did not settle within {STEPS} steps")
+    settled = np.zeros(len(compliance), bool)
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            normal = right = 0.0
+            for point, joint_angles, torques, measured in data:
+                sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, compliance)
+                sensitivity = sensitivity[..., identified]
+                normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
+                right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
+            step = _solved(normal, right)
+            compliance[:, identified] += step
+            if settled.all():
+                break
+            settled = np.abs(step).max(axis=1) <= LAST_STEP * np.abs(compliance).max(axis=1)
+    compliance[~settled] = np.nan
+    return compliance
+
+
+def _solved(normal, right):
+    """Solutions of the normal equations; not a number where they are singular."""
+    usable = np.isfinite(normal).all(axis=(1, 2))
+    usable[usable] = np.linalg.cond(normal[usable]) < 1.0 / np.finfo(float).eps
+    solution = np.full_like(right, np.nan)
+    solution[usable] = np.linalg.solve(normal[usable], right[usable, :, None])[..., 0]
+    return solution
 
 
 def _linearised(chain, point, joint_angles, torques, measured, compliance):

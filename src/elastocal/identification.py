@@ -11,6 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+# Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
+# the readings do not determine the compliances.
+LARGEST_CONDITION = 1e7
+
 
 @dataclass(frozen=True)
 class Readings:
@@ -35,7 +39,7 @@ class Estimates:
     Attributes
     ----------
     compliance : ndarray (configurations, n, sets)
-        rad/(N m); not a number where the prefix is too short.
+        rad/(N m); not a number where the readings of the prefix do not determine them.
     covariance : ndarray (configurations, sets, n, n)
         Of the compliances for readings with unit variance, through all stages.
     condition : ndarray (configurations, sets)
@@ -82,9 +86,11 @@ def identify(strategy, readings, joints):
     spread = covariance(strategy, readings, triangles)
     condition = condition_numbers(strategy, triangles)
     rows = next(iter(readings.values())).regressor.shape[0]
-    short = first_solvable_length(strategy, rows) - 1
-    for result in (compliance, spread, condition):
-        result[:short] = np.nan
+    unsolvable = ~(condition < LARGEST_CONDITION)
+    unsolvable[: first_solvable_length(strategy, rows) - 1] = True
+    np.moveaxis(compliance, 1, -1)[unsolvable] = np.nan
+    spread[unsolvable] = np.nan
+    condition[unsolvable] = np.nan
     return Estimates(compliance, spread, condition)
 
 
@@ -138,13 +144,14 @@ def covariance(strategy, readings, triangles):
 
     Notes
     -----
-    A stage solves N_II c_I = sum_p (A_p^T y_p)_I - N_IH c_H, with N the information of its points, I the joints identified and H
-    those held. With e_p the noise at point p, the estimates are c + sum_p B_p A_p^T e_p, so their covariance is
-    sum_p B_p N_p B_p^T. A stage that holds nothing forgets the stages before it.
+    A stage solves N_II c_I = sum_p (A_p^T y_p)_I - N_IH c_H, with N the information of its points, I the joints identified and
+    H those held. With e_p the noise at point p, the estimates are c + sum_p B_p A_p^T e_p, so their covariance is
+    sum_p B_p N_p B_p^T. A stage that identifies every joint forgets the stages before it.
     """
-    start = max(index for index, stage in enumerate(strategy.stages) if not stage.held)
+    joints = next(iter(readings.values())).regressor.shape[1]
+    start = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
     stages = list(zip(strategy.stages, triangles, strict=True))[start:]
-    if len(stages) == 1:
+    if len(stages) == 1 and len(stages[0][0].identified) == joints:
         order = np.argsort(stages[0][0].identified)
         return _stage_inverse(*stages[0])[..., order, :][..., order]
     names = tuple(dict.fromkeys(name for stage, _ in stages for name in stage.points))

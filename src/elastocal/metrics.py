@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
 from elastocal.kinematics import poses_and_jacobians
 
 
@@ -27,7 +27,7 @@ class Judge:
     initial_errors: np.ndarray
 
 
-def make_judge(robot, experiments, true_deflection):
+def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
     """Score sheet of the reduced model on test configurations.
 
     Parameters
@@ -37,6 +37,8 @@ def make_judge(robot, experiments, true_deflection):
     experiments : Experiments
     true_deflection : ndarray (..., 6)
         Of the end-effector, as simulated with the robot's full model.
+    wrench_at : {"end_effector", "measuring_point"}
+        Reading R6; it matters where a target is offset from the end-effector.
 
     Returns
     -------
@@ -48,7 +50,8 @@ def make_judge(robot, experiments, true_deflection):
     of second order in the compliance *error*, below a thousandth of the error itself.
     """
     point = robot.chain.end_effector
-    torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, point)
+    at = loaded_point(robot.chain, point, wrench_at)
+    torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, at)
     jacobian = poses_and_jacobians(robot.chain, experiments.joint_angles, point)[2]
     slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
     predicted = exact_deflections(robot.chain, experiments.joint_angles, robot.compliance * torques, point)
@@ -170,20 +173,20 @@ def first_length_below(values, limit):
     return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
 
 
-def spread_with_censoring(values):
-    """Standard deviation of replicates of which some may be infinite (not reached).
+def length_to_reach(values, limit):
+    """Data set length at which a metric comes down to `limit`, past the longest one if need be.
 
     Parameters
     ----------
-    values : ndarray (replicates,)
+    values : ndarray (..., lengths)
+        For the lengths 1, 2, 3 ...
+    limit : float
 
     Returns
     -------
-    float
-        Where some are infinite: from the 16th percentile to the median, one standard deviation of a normal spread that the
-        censored upper end does not touch; not a number where more than half are infinite.
+    ndarray (...)
+        As `first_length_below`; where that is infinite, the metric is continued as a bias of second order, which falls as
+        1 / length.
     """
-    if np.isfinite(values).all():
-        return float(np.std(values, ddof=1))
-    low, middle = np.percentile(values, [15.87, 50.0], method="lower")
-    return float(middle - low) if np.isfinite(middle) else float("nan")
+    first, longest = first_length_below(values, limit), values.shape[-1]
+    return np.where(np.isfinite(first), first, longest * np.maximum(np.abs(values[..., -1]) / limit, 1.0))

@@ -4,9 +4,9 @@ The chain notation is the paper's matrix product written in a line (equations 1-
 
     Tz(l1) Rz(q1) Tx(l2) Ry(q2) Tx(l3) [2DoF] Ry(q3) ...
 
-``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a length,
-a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign; ``[NAME]`` marks a
-measuring point.
+``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a
+length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign;
+``[NAME]`` marks a measuring point.
 """
 
 import math
@@ -288,18 +288,19 @@ def robot_from_document(document, source="robot"):
         joint = int(np.argmax(limits[:, 0] >= limits[:, 1]))
         raise InputError(source, f"joint_limits_deg[{joint}]", document["joint_limits_deg"][joint], "[lower, upper]")
     reported = document.get("reported_joints", {})
-    matrix = np.array(reported.get("matrix", np.eye(n)), float)
-    offset = np.radians(np.array(reported.get("offset_deg", np.zeros(n)), float))
-    if matrix.shape != (n, n) or offset.shape != (n,):
-        raise InputError(source, "reported_joints", f"{matrix.shape} and {offset.shape}", f"{n} x {n} and {n} numbers")
+    matrix = reported.get("matrix", np.eye(n).tolist())
+    offset = reported.get("offset_deg", [0.0] * n)
+    if [len(row) for row in matrix] != [n] * n or len(offset) != n:
+        found = f"rows of {[len(row) for row in matrix]} and {len(offset)} offsets"
+        raise InputError(source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets")
     return Robot(
         name=document["name"],
         chain=chain,
         compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
         joint_limits=limits,
         links=_links(chain, document.get("links"), source),
-        reported_matrix=matrix,
-        reported_offset=offset,
+        reported_matrix=np.array(matrix, float),
+        reported_offset=np.radians(np.array(offset, float)),
     )
 
 
@@ -318,7 +319,10 @@ def _links(chain, described, source):
         if 2 * size["wall_m"] > size["outer_diameter_m"]:
             raise InputError(source, "links.tubes", f"wall_m {size['wall_m']}", "at most half the outer_diameter_m")
         tube = Tube(
-            size["outer_diameter_m"], size["wall_m"], 1e9 * described["youngs_modulus_GPa"], 1e9 * described["shear_modulus_GPa"]
+            size["outer_diameter_m"],
+            size["wall_m"],
+            1e9 * described["youngs_modulus_GPa"],
+            1e9 * described["shear_modulus_GPa"],
         )
         links.append(Link(after, vector, tube))
     return tuple(links)

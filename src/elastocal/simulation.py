@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.elastostatics import exact_deflections, generalized_forces, wrench_of_offset_force
+from elastocal.elastostatics import exact_deflections, generalized_forces, loaded_point, wrench_of_offset_force
 from elastocal.experiments import Experiments
 from elastocal.kinematics import poses, poses_and_jacobians
 from elastocal.links import extended_chain, spring_compliance
@@ -88,14 +88,13 @@ def true_deflections(robot, experiments, point, wrench_at):
     unloaded = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
     unloaded[..., : robot.joints] = experiments.joint_angles
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
-    loaded = replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else measured
-    jacobian = poses_and_jacobians(chain, unloaded, loaded)[2]
+    jacobian = poses_and_jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))[2]
     springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(robot)
     return exact_deflections(chain, unloaded, springs, measured)
 
 
 def measurement_noise(seed, key, point_name, data_sets, configurations):
-    """Standard normal noise of the six components at one measuring point; scaled by the noise level it is the measurement error.
+    """Standard normal noise of the six components at one measuring point; times the noise level it is the measurement error.
 
     The same numbers serve every noise level, so that levels differ by scale alone.
 

@@ -7,7 +7,6 @@ that any number of them is worked off in the same memory.
 
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +14,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
+from elastocal.whole_files import appearing_whole
 
+_TABLE, _PROVENANCE, _DIGESTS = "elastocal.table", "elastocal.provenance", "elastocal.sha256"
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
 
 
@@ -75,23 +76,25 @@ def write_table(path, schema, blocks, provenance):
     """
     fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
     floats = [c.name for c in schema.columns if c.type.startswith("float")]
-    partial, digests = f"{path}.partial", []
-    with pq.ParquetWriter(
-        partial,
-        pa.schema(fields),
-        compression="zstd",
-        compression_level=1,
-        use_dictionary=[c.name for c in schema.columns if c.name not in floats],
-        use_byte_stream_split=floats,
-    ) as writer:
+    digests = []
+    with (
+        appearing_whole(path) as partial,
+        pq.ParquetWriter(
+            partial,
+            pa.schema(fields),
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=[c.name for c in schema.columns if c.name not in floats],
+            use_byte_stream_split=floats,
+        ) as writer,
+    ):
         for block in blocks:
             values = _checked(path, schema, block)
             digests.append({name: _digest(array) for name, array in values.items()})
             arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
             writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
-        metadata = {"elastocal.table": schema.name, "elastocal.provenance": provenance, "elastocal.sha256": digests}
+        metadata = {_TABLE: schema.name, _PROVENANCE: provenance, _DIGESTS: digests}
         writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
-    os.replace(partial, path)
 
 
 def read_blocks(path, schema, columns=None, **where):
@@ -115,18 +118,17 @@ def read_blocks(path, schema, columns=None, **where):
     InputError
         A file that cannot be read, is another table, or whose contents are not those written.
     """
-    wanted = [c for c in schema.columns if columns is None or c.name in columns]
+    wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
     with _opened(path) as file:
-        metadata = file.schema_arrow.metadata or {}
-        metadata = {**metadata, **(file.metadata.metadata or {})}
-        if metadata.get(b"elastocal.table") != json.dumps(schema.name).encode():
-            raise InputError(path, "metadata elastocal.table", metadata.get(b"elastocal.table", b"nothing").decode(), schema.name)
+        name = _metadata(path, file, _TABLE)
+        if name != schema.name:
+            raise InputError(path, f"metadata {_TABLE}", name, schema.name)
         for column in schema.columns:
             index = file.schema_arrow.get_field_index(column.name)
             if index < 0 or file.schema_arrow.field(index).type != _arrow_type(column):
                 found = "nothing" if index < 0 else f"type {file.schema_arrow.field(index).type}"
                 raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
-        digests = json.loads(metadata[b"elastocal.sha256"])
+        digests = _metadata(path, file, _DIGESTS)
         if len(digests) != file.num_row_groups:
             raise InputError(path, "row groups", str(file.num_row_groups), f"{len(digests)}: {_AS_WRITTEN}")
         positions = {file.metadata.schema.column(i).path: i for i in range(file.metadata.num_columns)}
@@ -152,6 +154,10 @@ def read_table(path, schema, columns=None, **where):
     dict of str to ndarray
     """
     blocks = list(read_blocks(path, schema, columns, **where))
+    if not blocks:
+        raise InputError(
+            path, ", ".join(where) or "row groups", ", ".join(map(str, where.values())) or "none", "one that it has"
+        )
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
@@ -167,7 +173,7 @@ def read_provenance(path):
     dict
     """
     with _opened(path) as file:
-        return json.loads((file.metadata.metadata or {})[b"elastocal.provenance"])
+        return _metadata(path, file, _PROVENANCE)
 
 
 def _opened(path):
@@ -175,6 +181,13 @@ def _opened(path):
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None
+
+
+def _metadata(path, file, key):
+    text = (file.metadata.metadata or {}).get(key.encode())
+    if text is None:
+        raise InputError(path, f"metadata {key}", "nothing", _AS_WRITTEN)
+    return json.loads(text)
 
 
 def _constant(file, group, column):

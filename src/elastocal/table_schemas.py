@@ -49,7 +49,8 @@ def covariance_columns(joints):
 def identified(joints):
     """What a strategy identified; one row for each data set and length."""
     compliances = [
-        Column(f"c{j}", "float64", "rad/(N m)", f"identified compliance of joint {j}", missing=True) for j in range(1, joints + 1)
+        Column(f"c{j}", "float64", "rad/(N m)", f"identified compliance of joint {j}", missing=True)
+        for j in range(1, joints + 1)
     ]
     covariances = [
         Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit reading variance", missing=True)
@@ -65,14 +66,20 @@ def metrics(joints):
     for j in range(1, joints + 1):
         columns += _with_error(f"compliance_{j}", "rad/(N m)", f"inverse of the averaged stiffness of joint {j} (equation 12)")
     for j in range(1, joints + 1):
-        columns += _with_error(f"delta_k_{j}", "percent", f"relative error of the averaged stiffness of joint {j} (equation 13)")
+        columns += _with_error(
+            f"delta_k_{j}", "percent", f"relative error of the averaged stiffness of joint {j} (equation 13)"
+        )
     columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
     columns += _with_error("k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (reading R10)")
-    columns += _with_error("deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)")
+    columns += _with_error(
+        "deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)"
+    )
     columns += _with_error("initial_deviation", "m", "mean deflection of the end-effector on the test configurations")
     columns += [
         Column("nonpositive_share", "float64", "", "share of data sets with a compliance that is not positive"),
-        Column("relative_spread", "float64", "", "largest standard deviation over mean of an identified compliance", missing=True),
+        Column(
+            "relative_spread", "float64", "", "largest standard deviation over mean of an identified compliance", missing=True
+        ),
         Column("trustworthy", "bool", "", "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25"),
     ]
     return TableSchema("metrics", tuple(columns))
@@ -89,7 +96,9 @@ def accuracy(joints):
     ):
         columns += _with_error(name, "m", meaning, over="data sets, for these test configurations")
     for j in range(1, joints + 1):
-        columns += _with_error(f"relative_error_{j}", "percent", f"root mean square relative error of the compliance of joint {j}")
+        columns += _with_error(
+            f"relative_error_{j}", "percent", f"root mean square relative error of the compliance of joint {j}"
+        )
     return TableSchema("accuracy", tuple(columns))
 
 
@@ -132,7 +141,9 @@ BOUNDS = TableSchema(
     (
         Column("points", "string", "", "measuring points read, joined by +; a row group holds one set"),
         _LENGTH,
-        Column("rms_per_noise", "float64", "m/m", "Cramér-Rao bound of the RMS end-effector error per unit noise", missing=True),
+        Column(
+            "rms_per_noise", "float64", "m/m", "Cramér-Rao bound of the RMS end-effector error per unit noise", missing=True
+        ),
     ),
 )
 

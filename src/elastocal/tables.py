@@ -7,7 +7,7 @@ measured by simulation has a column of its Monte Carlo standard error, ``<quanti
 import numpy as np
 import pandas as pd
 
-from elastocal.evaluation import lengths_to_reach
+from elastocal.evaluation import reached_length
 
 MICRO, MILLI = 1e6, 1e3
 
@@ -80,7 +80,11 @@ def table3(metrics, robots, strategy, noise_um, length):
     rows = []
     for robot in robots:
         cell = _cell(metrics, robot, noise_um, strategy).set_index("length").loc[length]
-        names = [f"compliance_{j}" for j in range(1, len(cell) + 1) if f"compliance_{j}" in cell and np.isfinite(cell[f"compliance_{j}"])]
+        names = [
+            f"compliance_{j}"
+            for j in range(1, len(cell) + 1)
+            if f"compliance_{j}" in cell and np.isfinite(cell[f"compliance_{j}"])
+        ]
         row = {"robot": robot}
         for j, name in enumerate(names, 1):
             row |= {f"c{j}": MICRO * cell[name], f"c{j}_std_error": MICRO * cell[f"{name}_std_error"]}
@@ -119,12 +123,10 @@ def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_li
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
                 row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
-                reached, error = lengths_to_reach(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
+                reached, error = reached_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
                 row |= {f"n_k_sigma_{limit}{suffix}": reached, f"n_k_sigma_{limit}{suffix}_std_error": error}
             row |= {f"dev_{length}_um": MICRO * at.deviation, f"dev_{length}_um_std_error": MICRO * at.deviation_std_error}
-            reached, error = lengths_to_reach(
-                cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO
-            )
+            reached, error = reached_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
             row |= {f"n_dev_{deviation_limit_um:g}_um": reached, f"n_dev_{deviation_limit_um:g}_um_std_error": error}
             rows.append(row)
     return pd.DataFrame(rows)
@@ -192,7 +194,7 @@ def share_compensated(metrics, replicates, robot, strategy, noise_um, length):
 
 
 def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length):
-    """How many times smaller the deviation of `over` is than that of `strategy`, with its standard error; NaN where not studied.
+    """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied.
 
     Parameters
     ----------
@@ -231,7 +233,7 @@ def per_dataset_table(accuracy, bounds, points):
     Returns
     -------
     pandas.DataFrame
-        strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, standard errors and the relative
+        strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, their errors and the relative
         error of each compliance. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without
         noise.
     """
@@ -263,8 +265,8 @@ def solver_summary(frames):
     Returns
     -------
     pandas.DataFrame
-        robot, strategy, closest_strategy (under Gauss-Newton), the largest relative difference to it under each solver, and that
-        between the solvers, which is the second-order error of equation 11.
+        robot, strategy, closest_strategy (under Gauss-Newton), the largest relative difference to it under each solver, and
+        that between the solvers, which is the second-order error of equation 11.
     """
     rows = []
     for robot, frame in frames.items():
@@ -310,11 +312,40 @@ def with_errors_merged(frame, digits=3):
         if column.endswith("_std_error"):
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
-        shown[column] = [_shown(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
+        shown[column] = [worded(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
     return pd.DataFrame(shown)
 
 
-def _shown(value, error, digits):
+def headed_rows(frame):
+    """The table for people as rows of words, its header first, with names of columns that break at blanks.
+
+    Parameters
+    ----------
+    frame : DataFrame
+
+    Returns
+    -------
+    list of list of str
+    """
+    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
+    return [[name.replace("_", " ") for name in shown.columns], *shown.to_numpy().tolist()]
+
+
+def worded(value, error, digits=3):
+    """A value for people, with two digits of its standard error.
+
+    Parameters
+    ----------
+    value : float or str
+    error : float
+        Not a number or zero where there is none.
+    digits : int
+        Significant digits of a value without error.
+
+    Returns
+    -------
+    str
+    """
     if isinstance(value, str):
         return value
     if np.isinf(value):

@@ -1,15 +1,19 @@
 """The steps of the study one after the other: from random experiments to compliances, bounds and metrics."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from elastocal.elastostatics import joint_torques
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.metrics import error_moment
 from elastocal.robot import with_target_offset
 from elastocal.simulation import Loading, measurement_noise
 from elastocal.study import simulate
 from elastocal.study.bound import bound_blocks
-from elastocal.study.columns import to_deflections
+from elastocal.study.columns import to_deflections, to_experiments
 from elastocal.study.evaluate import evaluated, judge_from
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.study.measure import measured_blocks
@@ -121,7 +125,7 @@ def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, s
     # Readings R5 and R6 together: under "end_effector" the wrench stays where it is stated, whatever target is measured.
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
     deflections = deflections_of(moved, experiments, at=at)
-    table = identified(moved, strategies["3+6DoF-comb"], experiments, deflections, rows, at, start=1e-6)
+    table = identified(moved, strategies["6DoF"], experiments, deflections, rows, at, start=1e-6)
     np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=1e-7)
 
 
@@ -149,7 +153,7 @@ def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strate
 
 def judge(robot, at="end_effector"):
     experiments = experiments_of(robot, 1, 30, purpose="test")
-    return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0])
+    return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
 
 
 def test_bounds_are_below_what_the_strategies_reach(kuka, strategies):
@@ -175,12 +179,22 @@ def test_bounds_are_below_what_the_strategies_reach(kuka, strategies):
             assert ratio == pytest.approx(1.0, abs=0.15)
 
 
+def test_bounds_of_a_target_off_the_flange_are_those_of_a_load_at_the_flange(kuka):
+    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
+    scores, loads = judge(kuka), to_experiments(experiments[0])
+    (found,) = bound_blocks(experiments, moved.chain, [("6DoF",)], 6, "end_effector", scores)
+    torques = joint_torques(kuka.chain, loads.joint_angles, loads.wrench, kuka.chain.end_effector)
+    rows = poses_and_jacobians(moved.chain, loads.joint_angles, moved.chain.end_effector)[2] * torques[..., None, :]
+    bounds = [np.trace(error_moment(scores) @ np.linalg.inv(np.einsum("kri,krj->ij", one, one))) for one in rows]
+    assert found["rms_per_noise"][-1] == pytest.approx(np.sqrt(np.mean(bounds)), rel=1e-6)
+
+
 def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
     experiments = experiments_of(kuka, sets=12)
     table = identified(kuka, strategies["3+6DoF-comb"], experiments, deflections_of(kuka, experiments, 5e-5))
 
     def cut(*edges):
-        return [{n: v[4 * a : 4 * b] for n, v in table.items()} for a, b in zip(edges, edges[1:], strict=False)]
+        return [{n: v[4 * a : 4 * b] for n, v in table.items()} for a, b in pairwise(edges)]
 
     scores = judge(kuka)
     whole, parts = (
@@ -195,8 +209,8 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
 
 def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
     moved = with_target_offset(kuka, OFFSET)
-    table = {"data_set": np.arange(3), "length": np.ones(3)}
-    table |= {f"c{j + 1}": np.full(3, c) for j, c in enumerate(kuka.compliance)}
+    table = {"data_set": np.arange(12), "length": np.ones(12)}
+    table |= {f"c{j + 1}": np.full(12, c) for j, c in enumerate(kuka.compliance)}
     found = evaluated(lambda: [table], judge(moved), "kuka", 1, (0,), "compliance", "averaged_model", 10, [1])
     # Roots of rounding.
     np.testing.assert_allclose(found[0]["deviation"], 0, atol=1e-9)

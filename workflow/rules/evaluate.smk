@@ -24,6 +24,7 @@ rule evaluate:
         strategy=strategy_document,
         seed=config["seed"],
         tool_offset_m=READINGS["tool_offset_m"],
+        wrench_at=READINGS["wrench_at"],
         average=READINGS["average"],
         deviation_of=READINGS["deviation_of"],
         replicates=config["evaluation"]["bootstrap_replicates"],

@@ -6,6 +6,7 @@ from elastocal.storage import read_blocks, read_table, write_table
 from elastocal.study.bound import bound_blocks
 from elastocal.study.evaluate import judge_from
 from elastocal.table_schemas import BOUNDS, DEFLECTIONS, experiments
+
 from job import run
 
 
@@ -17,6 +18,7 @@ def bound(job):
         robot,
         read_table(job.input.test_experiments, schema),
         read_table(job.input.test_ideal, DEFLECTIONS, point=end_effector),
+        settings.wrench_at,
     )
     blocks = bound_blocks(
         read_blocks(job.input.experiments, schema), robot.chain, settings.point_sets, settings.rows, settings.wrench_at, judge

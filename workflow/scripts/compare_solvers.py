@@ -7,6 +7,7 @@ from elastocal.strategies import strategy_from_document
 from elastocal.study.identify import paired_blocks
 from elastocal.study.solvers import solver_table
 from elastocal.table_schemas import DEFLECTIONS, experiments, solvers
+
 from job import run
 
 

@@ -5,6 +5,7 @@ import pandas as pd
 from elastocal.comparison import OurResults, comparison_table
 from elastocal.frames import read_long, write_csv
 from elastocal.table_schemas import REPLICATES, metrics
+
 from job import run
 
 

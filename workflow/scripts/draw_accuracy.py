@@ -4,6 +4,7 @@ import pandas as pd
 
 from elastocal.figures.strategies import accuracy_of_one_data_set
 from elastocal.figures.style import save
+
 from job import run
 
 

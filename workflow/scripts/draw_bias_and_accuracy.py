@@ -6,6 +6,7 @@ from elastocal.figures.strategies import bias_and_accuracy
 from elastocal.figures.style import save
 from elastocal.frames import read_long
 from elastocal.table_schemas import metrics
+
 from job import run
 
 

@@ -6,6 +6,7 @@ from elastocal.simulation import Loading
 from elastocal.storage import write_table
 from elastocal.study.simulate import experiment_blocks
 from elastocal.table_schemas import experiments
+
 from job import run
 
 

@@ -3,6 +3,7 @@
 from elastocal.figures import schemes
 from elastocal.figures.style import save
 from elastocal.robot import robot_from_document
+
 from job import run
 
 

@@ -4,6 +4,7 @@ import pandas as pd
 
 from elastocal.figures.against_paper import scores
 from elastocal.figures.style import save
+
 from job import run
 
 

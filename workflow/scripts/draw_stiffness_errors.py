@@ -4,13 +4,16 @@ from elastocal.figures.strategies import stiffness_errors
 from elastocal.figures.style import save
 from elastocal.frames import read_long
 from elastocal.table_schemas import metrics
+
 from job import run
 
 
 def draw_stiffness_errors(job):
     settings = job.params
     frame = read_long(job.input.metrics, metrics)
-    save(stiffness_errors(frame, settings.title, settings.robot, settings.order, settings.limit), job.output.pdf, job.output.png)
+    save(
+        stiffness_errors(frame, settings.title, settings.robot, settings.order, settings.limit), job.output.pdf, job.output.png
+    )
 
 
 run(draw_stiffness_errors, snakemake)

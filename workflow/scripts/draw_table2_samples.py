@@ -6,6 +6,7 @@ from elastocal.figures.against_paper import table2_samples
 from elastocal.figures.style import save
 from elastocal.frames import read_frame
 from elastocal.table_schemas import INITIAL
+
 from job import run
 
 

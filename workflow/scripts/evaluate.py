@@ -6,6 +6,7 @@ from elastocal.storage import read_blocks, read_table, write_table
 from elastocal.strategies import strategy_from_document
 from elastocal.study.evaluate import evaluated, judge_from
 from elastocal.table_schemas import DEFLECTIONS, REPLICATES, accuracy, experiments, identified, metrics
+
 from job import run
 
 
@@ -17,6 +18,7 @@ def evaluate(job):
         robot,
         read_table(job.input.test_experiments, experiments(n)),
         read_table(job.input.test_ideal, DEFLECTIONS, point=end_effector),
+        settings.wrench_at,
     )
     needed = ["data_set", *(f"c{j + 1}" for j in range(n))]
     tables = evaluated(

@@ -6,6 +6,7 @@ from elastocal.storage import read_blocks, write_table
 from elastocal.strategies import strategy_from_document
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.table_schemas import DEFLECTIONS, experiments, identified
+
 from job import run
 
 

@@ -5,6 +5,7 @@ from elastocal.robot import robot_from_document, with_target_offset
 from elastocal.storage import read_blocks, write_table
 from elastocal.study.simulate import ideal_blocks
 from elastocal.table_schemas import DEFLECTIONS, experiments
+
 from job import run
 
 

@@ -4,6 +4,7 @@ from elastocal.provenance import provenance
 from elastocal.storage import read_blocks, write_table
 from elastocal.study.initial import initial_blocks
 from elastocal.table_schemas import DEFLECTIONS, INITIAL
+
 from job import run
 
 

@@ -3,6 +3,7 @@
 from elastocal.frames import read_frame, read_long, write_csv
 from elastocal.table_schemas import BOUNDS, accuracy
 from elastocal.tables import per_dataset_table
+
 from job import run
 
 

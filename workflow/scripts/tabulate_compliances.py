@@ -3,6 +3,7 @@
 from elastocal.frames import write_csv
 from elastocal.robot import robot_from_document
 from elastocal.tables import table1
+
 from job import run
 
 

@@ -3,6 +3,7 @@
 from elastocal.frames import read_long, write_csv
 from elastocal.table_schemas import REPLICATES, metrics
 from elastocal.tables import extended_table
+
 from job import run
 
 

@@ -3,6 +3,7 @@
 from elastocal.frames import read_long, write_csv
 from elastocal.table_schemas import metrics
 from elastocal.tables import table3
+
 from job import run
 
 

@@ -4,6 +4,7 @@ from elastocal.evaluation import bootstrap_weights
 from elastocal.frames import read_frame, write_csv
 from elastocal.table_schemas import INITIAL
 from elastocal.tables import table2
+
 from job import run
 
 

@@ -3,6 +3,7 @@
 from elastocal.frames import read_frame, write_csv
 from elastocal.table_schemas import solvers
 from elastocal.tables import solver_summary
+
 from job import run
 
 

@@ -4,6 +4,7 @@ import pandas as pd
 
 from elastocal.frames import write_latex, write_markdown
 from elastocal.tables import with_errors_merged
+
 from job import run
 
 

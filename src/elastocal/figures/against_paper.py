@@ -3,13 +3,14 @@
 import numpy as np
 
 from elastocal.comparison import ACCEPTED_Z
-from elastocal.figures.style import PALETTE, panels
+from elastocal.figures.style import PALETTE, panels, styled
 
 MILLI = 1e3
 # Beyond this, a z score is drawn at the margin with an arrow.
 _MARGIN = 8.0
 
 
+@styled
 def scores(comparison):
     """Distance of each printed figure from ours, in Monte Carlo standard deviations.
 
@@ -31,7 +32,7 @@ def scores(comparison):
     axis.axvline(0, color="black", linewidth=0.7)
     for index, robot in enumerate(dict.fromkeys(shown.robot)):
         chosen = (shown.robot == robot).to_numpy()
-        z, row = shown.z.to_numpy()[chosen], groups[chosen]
+        z, row = shown.z.to_numpy()[chosen], groups[chosen] + 0.22 * (index - 1)
         outside = np.abs(z) > _MARGIN
         axis.plot(z[~outside], row[~outside], "o", color=PALETTE[index], markersize=4, alpha=0.8, label=robot)
         for side, marker in ((-1, "<"), (1, ">")):
@@ -44,6 +45,7 @@ def scores(comparison):
     return figure
 
 
+@styled
 def table2_samples(initial, reference, titles):
     """Statistics of single data sets, in which the paper's Table 2 lies, although it is far from all data sets together.
 
@@ -74,8 +76,13 @@ def table2_samples(initial, reference, titles):
             axis.plot([q1, q3], [index, index], color=PALETTE[index], linewidth=5, solid_capstyle="butt")
             axis.plot(middle, index, "o", color="white", markersize=3)
             if (robot, f"deviation_{quantity}") in printed.index:
-                axis.plot(printed[robot, f"deviation_{quantity}"], index, "D", color="black", markersize=4)
+                axis.plot(
+                    printed[robot, f"deviation_{quantity}"], index, "D", color="black", markersize=4, label="paper, Table 2"
+                )
         axis.set(title=quantity, xlabel="mm", yticks=range(len(initial)), ylim=(len(initial) - 0.5, -0.5), xlim=(0, None))
         axis.set_yticklabels([titles[robot] for robot in initial] if axis is axes[0, 0] else [])
         axis.grid(visible=False, axis="y")
+    handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
+    note = "single data sets: 1 to 99 %, quartiles and median"
+    figure.legend(handles.values(), handles.keys(), title=note, loc="outside lower center", title_fontsize=7.5)
     return figure

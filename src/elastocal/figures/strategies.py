@@ -3,12 +3,13 @@
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
-from elastocal.figures.style import PALETTE, line_style, panels
+from elastocal.figures.style import PALETTE, line_style, panels, styled
 
 MICRO = 1e6
 _LENGTH = "configurations in the data set"
 
 
+@styled
 def noise_impact(metrics, strategy, titles):
     """Figure 4: deviation of one strategy against the data set length, for each noise level.
 
@@ -30,15 +31,17 @@ def noise_impact(metrics, strategy, titles):
         for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
             trusted = cell[cell.trustworthy]
             axis.plot(cell.length, MICRO * cell.deviation, color=PALETTE[index], linewidth=0.5, alpha=0.5)
-            axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g} µm, µrad")
+            axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g}")
             _band(axis, trusted.length, MICRO * trusted.deviation, MICRO * trusted.deviation_std_error, PALETTE[index])
-        axis.set(title=title, xlabel=_LENGTH, yscale="log", xlim=(1, cells.length.max()), ylim=(0.02, 3000))
+        axis.set(title=title, xlabel=_LENGTH, yscale="log", xlim=(1, cells.length.max()), ylim=(1e-4, 3000))
         axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
-    axes[0, -1].legend(title="noise", loc="upper right", title_fontsize=7.5, ncols=2)
+    title = "noise (µm and µrad); thin where the mean of 1/c is not to be trusted"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
     return figure
 
 
+@styled
 def stiffness_errors(metrics, title, robot, order, limit_percent):
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
@@ -58,16 +61,21 @@ def stiffness_errors(metrics, title, robot, order, limit_percent):
     matplotlib.figure.Figure
     """
     figure, axes = panels(1, 2, 88, sharey=True)
-    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage (as Table 4 seems to)"}
+    counts = {
+        "k_sigma": "all joints, as equation 14 says",
+        "k_sigma_first_stage": "joints of the first stage, as Table 4 seems to",
+    }
     for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
         _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
         _limit(axis, limit_percent, "%")
-        axis.set(title=f"{title}: {count}", xlabel=_LENGTH)
+        axis.set(title=count, xlabel=_LENGTH)
+    figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", ylim=(0, 20))
     axes[0, 1].legend(loc="upper right")
     return figure
 
 
+@styled
 def deviations(metrics, title, robot, order, limit_um):
     """Figures 5c and 5d: deviation of all strategies against the data set length.
 
@@ -95,6 +103,7 @@ def deviations(metrics, title, robot, order, limit_um):
     return figure
 
 
+@styled
 def bias_and_accuracy(metrics, per_dataset, titles, order):
     """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
 
@@ -119,19 +128,23 @@ def bias_and_accuracy(metrics, per_dataset, titles, order):
             averaged = metrics[(metrics.robot == robot) & (metrics.strategy == strategy) & (metrics.length > 1)]
             single = per_dataset[(per_dataset.robot == robot) & (per_dataset.strategy == strategy)]
             color = PALETTE[index]
-            axis.fill_between(single.ds, single.mean_um, single.p95_um, color=color, alpha=0.15, linewidth=0)
-            axis.plot(single.ds, single.mean_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, mean to p95")
+            axis.fill_between(single.ds, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
+            axis.plot(single.ds, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS")
             axis.plot(single.ds, single.crlb_rms_um, color=color, linestyle=":", label=f"{strategy}: Cramér-Rao bound, RMS")
-            axis.plot(averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=f"{strategy}: dev of the paper")
+            axis.plot(
+                averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=f"{strategy}: dev of the paper"
+            )
         axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
         for plain in (axis.xaxis, axis.yaxis):
             plain.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes[0, 0].set_ylabel("end-effector error (µm)")
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(order))
+    note = "bands: from the mean to the 95th percentile of one data set's error"
+    figure.legend(handles, labels, title=note, loc="outside lower center", ncols=len(order), title_fontsize=7.5)
     return figure
 
 
+@styled
 def accuracy_of_one_data_set(per_dataset, titles, order, length):
     """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own readings.
 
@@ -158,9 +171,10 @@ def accuracy_of_one_data_set(per_dataset, titles, order, length):
         axis.plot(cell.crlb_rms_um, rows, "|", color=PALETTE[1], markersize=14, markeredgewidth=2, label="Cramér-Rao bound")
         for row, efficiency in zip(rows, cell.efficiency, strict=True):
             axis.text(1, row, f"{100 * efficiency:.0f} %", va="center", fontsize=7.5)
-        axis.set(title=title, xlabel=f"RMS end-effector error after {length} configurations (µm)", yticks=rows)
+        axis.set(title=title, xlabel="RMS end-effector error (µm)", yticks=rows)
         axis.set_yticklabels(order)
         axis.grid(visible=False, axis="y")
+    figure.suptitle(f"one data set of {length} configurations; in the bars: efficiency against the bound", fontsize=9)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
@@ -176,7 +190,9 @@ def _strategy_lines(axis, metrics, robot, quantity, scale, order):
 
 def _limit(axis, value, unit):
     axis.axhline(value, color="black", linewidth=0.7)
-    axis.annotate(f"{value:g} {unit}", (1, value), (2, 0), ("axes fraction", "data"), "offset points", va="center", fontsize=7.5)
+    axis.annotate(
+        f"{value:g} {unit}", (1, value), (2, 0), ("axes fraction", "data"), "offset points", va="center", fontsize=7.5
+    )
 
 
 def _band(axis, length, value, error, color):

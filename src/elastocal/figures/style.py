@@ -1,9 +1,9 @@
 """One look for all figures: sizes, colours that colour-blind readers can tell apart, and a line style for each strategy."""
 
-import os
-
 from matplotlib import rc_context
 from matplotlib.figure import Figure
+
+from elastocal.whole_files import appearing_whole
 
 WIDTH_MM = 165
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
@@ -20,8 +20,11 @@ SETTINGS = {
     "legend.frameon": False,
     "legend.fontsize": 7.5,
     "pdf.fonttype": 42,
-    "svg.hashsalt": "elastocal",
 }
+
+
+# Legends and titles take the look that is set while they are made: decorate each figure function with it.
+styled = rc_context(SETTINGS)
 
 
 def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
@@ -39,9 +42,8 @@ def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
     figure : matplotlib.figure.Figure
     axes : ndarray of Axes (rows, columns)
     """
-    with rc_context(SETTINGS):
-        figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
-        return figure, figure.subplots(rows, columns, squeeze=False, **options)
+    figure = Figure(figsize=(width_mm / 25.4, height_mm / 25.4), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def line_style(index):
@@ -49,6 +51,7 @@ def line_style(index):
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
 
 
+@styled
 def save(figure, pdf, png):
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
 
@@ -58,8 +61,6 @@ def save(figure, pdf, png):
     pdf, png : str
         Paths; each file appears whole or not at all.
     """
-    with rc_context(SETTINGS):
-        for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 200, "metadata": {"Software": None}})):
-            partial = f"{path}.partial"
+    for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 200, "metadata": {"Software": None}})):
+        with appearing_whole(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
-            os.replace(partial, path)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.bounds import squared_error_bounds
-from elastocal.elastostatics import joint_torques, regressor
+from elastocal.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.identification import prefix_information
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.metrics import error_moment
@@ -37,7 +37,7 @@ def bound_blocks(experiment_blocks, chain, point_sets, rows, wrench_at, judge):
         sets += len(experiments.joint_angles)
         information = {}
         for name in names:
-            at = chain.end_effector if wrench_at == "end_effector" else chain.point(name)
+            at = loaded_point(chain, chain.point(name), wrench_at)
             torques = joint_torques(chain, experiments.joint_angles, experiments.wrench, at)
             jacobian = poses_and_jacobians(chain, experiments.joint_angles, chain.point(name))[2]
             matrix = np.moveaxis(regressor(jacobian, torques), (-2, -1, 1), (0, 1, 2))

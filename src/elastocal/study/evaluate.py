@@ -14,9 +14,9 @@ from elastocal.metrics import make_judge
 from elastocal.study.columns import to_deflections, to_experiments
 
 
-def judge_from(robot, test_experiments, test_deflections):
-    """Score sheet from the tables of the test configurations."""
-    return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections))
+def judge_from(robot, test_experiments, test_deflections, wrench_at):
+    """Score sheet from the tables of the test configurations; see `metrics.make_judge`."""
+    return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
 
 
 def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, deviation_of, replicates, lengths):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.elastostatics import joint_torques, regressor
+from elastocal.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.gauss_newton import identify_exactly
 from elastocal.identification import Readings, first_solvable_length, identify
 from elastocal.kinematics import poses_and_jacobians
@@ -44,7 +44,7 @@ def identified_blocks(blocks, chain, strategy, rows, wrench_at, start=None):
     wrench_at : {"end_effector", "measuring_point"}
         Reading R6.
     start : float, optional
-        Given, compliances come from Gauss-Newton on the exact kinematics, started there, rad/(N m); without it, from equation 11.
+        Given, compliances come from Gauss-Newton on the exact kinematics, started there (rad/(N m)); else from equation 11.
 
     Yields
     ------
@@ -87,7 +87,7 @@ class Situation:
         self.torques, self.measured, self.readings = {}, {}, {}
         for name in strategy.points:
             point = chain.point(name)
-            at = chain.end_effector if wrench_at == "end_effector" else point
+            at = loaded_point(chain, point, wrench_at)
             self.torques[name] = joint_torques(chain, self.joint_angles, wrench, at)
             jacobian = poses_and_jacobians(chain, self.joint_angles, point)[2]
             matrix = np.moveaxis(regressor(jacobian, self.torques[name]), (-2, -1), (0, 1))[:rows]
@@ -97,9 +97,7 @@ class Situation:
     def solved_exactly(self, start, lengths):
         """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
         start = np.full(self.chain.coordinates, start)
-        return identify_exactly(
-            self.strategy, self.chain, self.joint_angles, self.torques, self.measured, start, lengths
-        )
+        return identify_exactly(self.strategy, self.chain, self.joint_angles, self.torques, self.measured, start, lengths)
 
 
 def _configuration_first(array):

@@ -1,0 +1,1 @@
+"""The report of the study: what its text says in numbers, and the pages."""

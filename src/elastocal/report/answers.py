@@ -1,0 +1,177 @@
+"""Every number that the text of the report states, from the tables, already worded with its standard error."""
+
+import numpy as np
+
+from elastocal.comparison import ACCEPTED_Z
+from elastocal.tables import deviation_ratio, with_errors_merged, worded
+
+# The repeatability that the paper names for both robots, in µm.
+REPEATABILITY_UM = 60.0
+# What could explain a cell that lies outside, by the letter under which the report lists it.
+EXPLANATIONS = {
+    "a": (
+        "One data set of 100 configurations gives the printed figure, all data sets together do not (see the samples above): "
+        "the paper seems to print one data set's. Its maxima cannot come from all of them."
+    ),
+    "b": (
+        "The bias of 1/ĉ can only lower these values, so a printed one above the truth is noise of the paper's own run. Beside "
+        "that remain the rounding to three digits and other link lengths than those of R2."
+    ),
+    "c": (
+        "One run moves all k_Σ cells of a robot together, since their data sets are the same: these are few independent "
+        "findings. Which joints (R10) and which load of partial points (R6) the authors summed over is not printed."
+    ),
+    "d": "One run moves all dev cells of a robot together. A length that is not reached within the data sets has no z.",
+}
+
+
+def answers(comparison, table2, per_dataset, extended, solvers, metrics, replicates, noisiest, titles, cells):
+    """Facts for the report.
+
+    Parameters
+    ----------
+    comparison, table2, per_dataset, extended, solvers : DataFrame
+        Tables of the study.
+    metrics, replicates : DataFrame
+        Long, at the noise level of the tables.
+    noisiest : DataFrame
+        Long metrics at the largest noise level.
+    titles : dict of str to str
+        Names of the robots without links, by their keys.
+    cells : dict
+        noise_um, length and classical_strategy (a name) of the tables.
+
+    Returns
+    -------
+    dict
+        JSON-serialisable; strings ready to print, lists for tables.
+    """
+    noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
+    judged = comparison[comparison.table.isin(["2", "3", "4"])]
+    outside = judged[(judged.z.abs() > ACCEPTED_Z) | judged.z.isna()]
+    at = metrics[metrics.length == length]
+    single = per_dataset[(per_dataset.noise_um == noise_um)]
+    return {
+        "noise_um": f"{noise_um:g}",
+        "length": str(length),
+        "classical": classical,
+        "repeatability_um": f"{REPEATABILITY_UM:g}",
+        "accepted_z": f"{ACCEPTED_Z:g}",
+        "cells": str(len(judged)),
+        "within": str(len(judged) - len(outside)),
+        "within_percent": f"{100 * (1 - len(outside) / len(judged)):.0f}",
+        "by_table": [_count(judged, table) for table in ("2", "3", "4")],
+        "outside": [_outside_row(row) for row in outside.itertuples()],
+        "explanations": {
+            letter: EXPLANATIONS[letter] for letter in sorted({_explanation(row) for row in outside.itertuples()})
+        },
+        "text_figures": [_text_row(row) for row in comparison[comparison.table == "text"].itertuples()],
+        "one_set": _one_set_rows(comparison, table2),
+        "robots": [
+            _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest) for robot, title in titles.items()
+        ],
+        "extended": with_errors_merged(extended.drop(columns="robot")).to_dict("records"),
+        "solvers": [
+            {
+                "robot": row.robot,
+                "strategy": row.strategy,
+                "closest": row.closest_strategy,
+                "equation_11": f"{row.equation_11_difference:.0e}",
+                "gauss_newton": f"{row.gauss_newton_difference:.0e}",
+                "between": f"{row.between_solvers:.0e}",
+            }
+            for row in solvers.itertuples()
+        ],
+    }
+
+
+def _count(judged, table):
+    z = judged[judged.table == table].z
+    return {"table": table, "cells": str(len(z)), "within": str(int((z.abs() <= ACCEPTED_Z).sum()))}
+
+
+def _outside_row(row):
+    return {
+        "figure": f"Table {row.table}: {row.quantity}",
+        "robot": row.robot,
+        "strategy": row.strategy if isinstance(row.strategy, str) else "",
+        "paper": f"{row.paper:g}",
+        "ours": "not reached" if np.isinf(row.ours) else worded(row.ours, row.mc_std),
+        "z": "" if np.isnan(row.z) else f"{row.z:+.1f}",
+        "why": _explanation(row),
+    }
+
+
+def _explanation(row):
+    """Letter of what could explain a cell outside."""
+    return {"2": "a", "3": "b"}.get(row.table, "c" if "k_sigma" in row.quantity else "d")
+
+
+def _text_row(row):
+    shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
+    return {"figure": row.quantity.replace("_", " "), "paper": f"{row.paper:g}", "ours": shown, "reading": row.reading}
+
+
+def _one_set_rows(comparison, table2):
+    """The paper's Table 2 against the statistics of single data sets."""
+    rows = []
+    columns = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
+    for figure in comparison[comparison.table == "2"].itertuples():
+        found = table2[table2.robot == figure.robot]
+        if len(found):
+            column = columns[figure.quantity]
+            one, spread = float(found[f"{column}_one_set"].iloc[0]), float(found[f"{column}_one_set_std"].iloc[0])
+            z = (one - figure.paper) / spread
+            everything = f"{float(found[column].iloc[0]):.3f}"
+            rows.append(
+                {
+                    "robot": figure.robot,
+                    "quantity": figure.quantity.replace("deviation_", ""),
+                    "paper": f"{figure.paper:.3f}",
+                    "all": everything,
+                    "one": f"{one:.2f} ± {spread:.2f}",
+                    "z": f"{z:+.1f}",
+                }
+            )
+    return rows
+
+
+def _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest):
+    noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
+    averaged = at[at.robot == robot].set_index("strategy")
+    best = averaged.deviation.idxmin()
+    worst = averaged.deviation.idxmax()
+    ratio = deviation_ratio(metrics, replicates, robot, classical, best, noise_um, length)
+    own = single[single.robot == robot]
+    here = own[own.ds == length].set_index("strategy")
+    noisy = noisiest[(noisiest.robot == robot) & (noisiest.length == length)]
+    share = 100 * (1 - averaged.deviation / averaged.initial_deviation)
+    return {
+        "title": title,
+        "best": best,
+        "worst": worst,
+        "dev_classical": worded(1e6 * averaged.deviation[classical], 1e6 * averaged.deviation_std_error[classical]),
+        "dev_best": worded(1e6 * averaged.deviation[best], 1e6 * averaged.deviation_std_error[best]),
+        "dev_worst": worded(1e6 * averaged.deviation[worst], 1e6 * averaged.deviation_std_error[worst]),
+        "ratio": worded(*ratio),
+        "share": f"{share[classical]:.1f}",
+        "single_classical": worded(here.mean_um[classical], here.mean_um_std_error[classical]),
+        "single_best": worded(here.mean_um[best], here.mean_um_std_error[best]),
+        "p95_classical": worded(here.p95_um[classical], here.p95_um_std_error[classical]),
+        "p95_best": worded(here.p95_um[best], here.p95_um_std_error[best]),
+        "hidden": f"{here.mean_um[classical] / (1e6 * averaged.deviation[classical]):.1f}",
+        "efficiency_best": worded(100 * here.efficiency[best], 100 * here.efficiency_std_error[best]),
+        "efficiency_worst": worded(100 * here.efficiency.min(), 100 * here.efficiency_std_error[here.efficiency.idxmin()]),
+        "lowest_efficiency": here.efficiency.idxmin(),
+        "repeatable_classical": _length_for(own, classical),
+        "repeatable_best": _length_for(own, best),
+        "noisiest_um": f"{noisiest.noise_um.max():g}",
+        "noisiest_nonpositive": f"{100 * noisy.nonpositive_share.max():.1f}",
+        "noisiest_spread": f"{100 * noisy.relative_spread.max():.0f}",
+    }
+
+
+def _length_for(own, strategy):
+    """Fewest configurations, of the lengths evaluated, whose RMS error is within the repeatability."""
+    cell = own[(own.strategy == strategy) & (own.rms_um <= REPEATABILITY_UM)]
+    return str(int(cell.ds.min())) if len(cell) else "more than all"

@@ -1,0 +1,27 @@
+"""Files that appear whole or not at all."""
+
+import os
+from contextlib import contextmanager, suppress
+
+
+@contextmanager
+def appearing_whole(path):
+    """Write beside a file, then rename.
+
+    Parameters
+    ----------
+    path : str
+        Where the file shall be once it is complete.
+
+    Yields
+    ------
+    str
+        Where to write it. If the block raises, nothing is left behind.
+    """
+    partial = f"{path}.partial"
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        with suppress(FileNotFoundError):
+            os.remove(partial)

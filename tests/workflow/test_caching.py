@@ -1,0 +1,245 @@
+"""An edit reruns the jobs that depend on it, and no others."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from itertools import product
+
+import pytest
+from conftest import NOISE, REPOSITORY, ROBOTS, STRATEGIES
+
+SCRIPTS = sorted(
+    path.name
+    for path in (REPOSITORY / "workflow" / "scripts").glob("*.py")
+    if "snakemake)" in path.read_text(encoding="utf-8").splitlines()[-1]
+)
+REPORT = {("state_answers",), ("compile_report",), ("all",)}
+PER_DATA_SET = {("tabulate_accuracy",), ("draw_bias_and_accuracy",), ("draw_accuracy",)}
+COMPARED_STRATEGIES = {
+    ("compare_solvers", "kuka"),
+    ("tabulate_solvers",),
+    ("tabulate_strategies",),
+    ("typeset_table", "table4"),
+    ("tabulate_extended",),
+    ("draw_stiffness_errors", "a"),
+    ("draw_deviations", "c"),
+    ("compare_with_paper",),
+    ("draw_scores",),
+}
+
+
+def jobs(rule, *axes):
+    return set(product([rule], *axes))
+
+
+def identified_and_evaluated(robots=ROBOTS, noise=NOISE, strategies=STRATEGIES):
+    return jobs("identify", robots, noise, strategies) | jobs("evaluate", robots, noise, strategies)
+
+
+@pytest.fixture(scope="module")
+def every_job(small_study):
+    return small_study.planned("--forceall")
+
+
+def of_rules(every_job, *rules):
+    found = {job for job in every_job if job[0] in rules}
+    assert {job[0] for job in found} == set(rules)
+    return found
+
+
+def test_a_finished_study_has_nothing_to_do(small_study):
+    assert small_study.planned() == set()
+
+
+def test_new_times_of_unchanged_sources_rerun_nothing(finished):
+    """As after a checkout: what counts is what the files hold."""
+    for name in finished.files("Snakefile", "config.yaml", "config/**/*.*", "workflow/**/*.*", "src/**/*.*", "README.md"):
+        os.utime(finished.path(name))
+    assert finished.planned() == set()
+
+
+def test_a_comment_in_the_readme_reruns_nothing(finished):
+    finished.append("README.md", "\n<!-- a comment -->\n")
+    assert finished.planned() == set()
+
+
+def test_a_comment_in_the_configuration_reruns_nothing(finished):
+    for name in finished.files("config.yaml", "config/robots/*.yaml", "config/strategies/*.yaml"):
+        finished.append(name, "# a comment\n")
+    assert finished.planned() == set()
+
+
+def test_a_strategy_with_other_stages_reruns_that_strategy(finished):
+    """The points that it reads are the same, so the bounds are."""
+    finished.replace(
+        "config/strategies/4-6DoF-after-3DoF.yaml", "joints: [4, 5, 6], held: [1, 2, 3]", "joints: [1, 2, 3, 4, 5, 6]"
+    )
+    expected = identified_and_evaluated(strategies=["4-6DoF-after-3DoF"]) | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
+    assert finished.planned() == expected
+
+
+def test_a_strategy_with_other_points_reruns_that_strategy_and_the_bounds(finished):
+    finished.replace("config/strategies/3+6DoF-comb.yaml", "[3DoF, 6DoF]", "[2DoF, 6DoF]")
+    expected = identified_and_evaluated(strategies=["3+6DoF-comb"]) | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
+    assert finished.planned() == expected | jobs("bound", ROBOTS)
+
+
+def test_another_noise_level_runs_that_level(finished):
+    """Neither replaced levels nor their order touch the level that stays."""
+    finished.configure({"noise_um": [200, 50]})
+    expected = jobs("measure", ROBOTS, ["50"]) | identified_and_evaluated(noise=["50"])
+    assert finished.planned() == expected | {("draw_noise_impact",)} | PER_DATA_SET | REPORT
+
+
+def test_the_compliance_of_a_robot_reruns_that_robot(finished):
+    finished.replace("config/robots/kuka_extended.yaml", "[0.54, ", "[0.55, ")
+    robot = ["kuka_extended"]
+    expected = (
+        jobs("draw_experiments", robot, ["", "/test"])
+        | jobs("simulate", robot, ["", "/test"])
+        | jobs("measure", robot, NOISE)
+        | identified_and_evaluated(robot)
+        | jobs("bound", robot)
+        | jobs("summarize_initial", robot)
+        | jobs("draw_scheme", ["fig2", "fig3"])
+        | {("tabulate_initial",), ("typeset_table", "table2"), ("draw_table2_samples",)}
+        | {("tabulate_extended",), ("compare_with_paper",), ("draw_scores",)}
+    )
+    assert finished.planned() == expected | PER_DATA_SET | REPORT
+
+
+def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, every_job):
+    finished.configure({"data_sets": 13})
+    untouched = (
+        jobs("draw_experiments", ROBOTS, ["/test"])
+        | jobs("simulate", ROBOTS, ["/test"])
+        | {("tabulate_compliances",), ("typeset_table", "table1")}
+        | of_rules(every_job, "draw_scheme")
+    )
+    assert untouched < every_job
+    assert finished.planned() == every_job - untouched
+
+
+def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
+    finished.append("src/elastocal/bounds.py", "# an edit\n")
+    assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | REPORT
+
+
+def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
+    finished.append("src/elastocal/figures/strategies.py", "# an edit\n")
+    figures = {
+        ("draw_noise_impact",),
+        ("draw_stiffness_errors", "a"),
+        ("draw_deviations", "c"),
+        ("draw_bias_and_accuracy",),
+        ("draw_accuracy",),
+    }
+    assert finished.planned() == figures | {("compile_report",), ("all",)}
+
+
+def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, every_job):
+    finished.append("src/elastocal/gauss_newton.py", "# an edit\n")
+    untouched = of_rules(
+        every_job,
+        "draw_experiments",
+        "simulate",
+        "measure",
+        "summarize_initial",
+        "bound",
+        "tabulate_compliances",
+        "tabulate_initial",
+        "draw_table2_samples",
+        "draw_scheme",
+    ) | jobs("typeset_table", ["table1", "table2"])
+    assert finished.planned() == every_job - untouched
+
+
+def test_an_edit_of_the_metrics_leaves_data_and_estimates(finished, every_job):
+    finished.append("src/elastocal/metrics.py", "# an edit\n")
+    untouched = of_rules(
+        every_job, "draw_experiments", "simulate", "measure", "summarize_initial", "identify", "compare_solvers", "draw_scheme"
+    )
+    assert finished.planned() == every_job - untouched
+
+
+def test_an_edit_of_a_script_reruns_its_jobs(finished):
+    finished.replace("workflow/scripts/draw_scores.py", '"""Distance', '"""The distance')
+    assert finished.planned() == {("draw_scores",), ("compile_report",), ("all",)}
+
+
+def test_every_rule_watches_the_sources_of_its_own_script():
+    seen = []
+    for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
+        for body in re.split(r"^rule ", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
+            script = re.search(r'"\.\./scripts/(\w+\.py)"', body)[1]
+            assert re.findall(r'sources\("(\w+\.py)"\)', body) == [script]
+            seen.append(script)
+    assert sorted(seen) == SCRIPTS
+
+
+# Forks before it imports anything of the package, so that every script starts without it; other people's modules may be there.
+_LOADED = """
+import ast, json, os, sys
+from pathlib import Path
+import matplotlib.figure, numpy, pandas, pyarrow.parquet
+root = Path(sys.argv[1])
+sys.path.insert(0, str(root / "workflow" / "scripts"))
+for script in sys.argv[2:]:
+    read, write = os.pipe()
+    if not os.fork():
+        body = ast.parse((root / "workflow" / "scripts" / script).read_text()).body
+        imports = [node for node in body if isinstance(node, (ast.Import, ast.ImportFrom))]
+        exec(compile(ast.Module(imports, []), script, "exec"), {})
+        files = [Path(m.__file__) for m in list(sys.modules.values()) if getattr(m, "__file__", None)]
+        own = sorted(f.relative_to(root).as_posix() for f in files if f.is_relative_to(root))
+        os.write(write, json.dumps(own).encode())
+        os._exit(0)
+    os.close(write)
+    print(script, os.fdopen(read).read())
+    assert os.wait()[1] == 0
+"""
+
+
+@pytest.fixture(scope="module")
+def loaded(small_study):
+    """Modules of the study that the imports of each script load."""
+    done = subprocess.run(
+        [sys.executable, "-c", _LOADED, str(small_study.folder), *SCRIPTS],
+        env=small_study.command()["env"],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    return {script: json.loads(files) for script, files in (line.split(" ", 1) for line in done.stdout.splitlines())}
+
+
+@pytest.fixture(scope="module")
+def closure():
+    folder = str(REPOSITORY / "workflow" / "rules")
+    sys.path.insert(0, folder)
+    try:
+        from import_closure import closure
+    finally:
+        sys.path.remove(folder)
+    return closure
+
+
+@pytest.mark.parametrize("script", SCRIPTS)
+def test_the_import_closure_is_what_a_script_loads(script, small_study, loaded, closure):
+    scripts = small_study.path("workflow/scripts")
+    found = closure(scripts / script, [small_study.path("src"), scripts])
+    assert [file.relative_to(small_study.folder).as_posix() for file in found] == loaded[script]
+
+
+def test_the_identification_job_runs_on_numpy_and_pyarrow_alone(finished):
+    finished.append(
+        "workflow/scripts/identify.py",
+        "\nimport sys as _sys\n\nwith open('loaded.txt', 'w') as _file:\n    print(*_sys.modules, file=_file)\n",
+    )
+    finished.run("--force", "results/identified/kuka/200um/4-6DoF-after-3DoF.parquet")
+    names = {name.split(".")[0] for name in finished.path("loaded.txt").read_text(encoding="utf-8").split()}
+    assert {"numpy", "pyarrow", "elastocal"} <= names
+    assert not names & {"pandas", "scipy", "matplotlib", "jsonschema", "yaml"}

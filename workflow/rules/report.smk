@@ -1,0 +1,50 @@
+"""The report: numbers for its text, then its pages.
+
+Needs reports/tables/ and reports/figures/. Writes reports/answers.json and reports/study.pdf.
+"""
+
+
+rule state_answers:
+    input:
+        comparison=rules.compare_with_paper.output.table,
+        table2=rules.tabulate_initial.output.table,
+        per_dataset=rules.tabulate_accuracy.output.table,
+        extended=rules.tabulate_extended.output.table,
+        solvers=rules.tabulate_solvers.output.table,
+        metrics=cells("metrics", REDUCED, TABLE_NOISE),
+        replicates=cells("replicates", REDUCED, TABLE_NOISE),
+        noisiest=cells("metrics", REDUCED, f"{max(config['noise_um']):g}"),
+        sources=sources("state_answers.py"),
+    output:
+        answers="reports/answers.json",
+    log:
+        "results/logs/state_answers.log",
+    benchmark:
+        "results/timings/state_answers.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
+    script:
+        "../scripts/state_answers.py"
+
+
+rule compile_report:
+    input:
+        answers=rules.state_answers.output.answers,
+        table1=rules.tabulate_compliances.output.table,
+        table2=rules.tabulate_initial.output.table,
+        table3=rules.tabulate_identified.output.table,
+        table4=rules.tabulate_strategies.output.table,
+        figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
+        pages="src/elastocal/report/study.typ",
+        sources=sources("compile_report.py"),
+    output:
+        report="reports/study.pdf",
+    log:
+        "results/logs/compile_report.log",
+    benchmark:
+        "results/timings/compile_report.tsv"
+    params:
+        figures=FIGURES,
+    script:
+        "../scripts/compile_report.py"
