@@ -42,7 +42,7 @@ FAULTS = {
     "noise that is no number": (("noise_um", 1), float("nan"), "noise_um[1]", ["nan"]),
     "half a data set": (("data_sets",), 10.5, "data_sets", ["10.5", "integer"]),
     "data sets as a float": (("data_sets",), 10.0, "data_sets", ["10.0", "integer"]),
-    "one data set": (("data_sets",), 1, "data_sets", ["found 1", "2 or more"]),
+    "too few to resample": (("data_sets",), 9, "data_sets", ["found 9", "10 or more"]),
     "no configuration": (("configurations",), 0, "configurations", ["found 0", "1 or more"]),
     "yes": (("data_sets",), True, "data_sets", ["True", "integer"]),
     "no seed": (("seed",), None, "seed", ["nothing", "random streams"]),

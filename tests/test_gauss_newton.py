@@ -134,7 +134,6 @@ def test_later_stages_hold_what_earlier_ones_found(kuka, strategies):
     assert (alone[:, 3:] == 1e-6).all()
 
 
-def test_steps_that_do_not_settle_are_an_error(kuka, strategies, monkeypatch):
+def test_steps_that_do_not_settle_leave_no_number(kuka, strategies, monkeypatch):
     monkeypatch.setattr(gauss_newton, "STEPS", 1)
-    with pytest.raises(ArithmeticError, match="1 steps"):
-        Data(kuka).solved(strategies["6DoF"])
+    assert np.isnan(Data(kuka).solved(strategies["6DoF"])).all()

@@ -9,8 +9,8 @@ from elastocal.elastostatics import exact_deflections, regressor
 from elastocal.kinematics import poses_and_jacobians
 
 STEPS = 30
-# Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding of
-# positions of metres against deflections of millimetres, which the condition number magnifies.
+# Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
+# of positions of metres against deflections of millimetres, which the condition number magnifies.
 LAST_STEP = 1e-7
 
 

@@ -120,7 +120,7 @@ def read_blocks(path, schema, columns=None, **where):
     """
     wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
     with _opened(path) as file:
-        name = _metadata(path, file, _TABLE)
+        name = _metadata(path, file, _TABLE, schema.name)
         if name != schema.name:
             raise InputError(path, f"metadata {_TABLE}", name, schema.name)
         for column in schema.columns:
@@ -156,7 +156,7 @@ def read_table(path, schema, columns=None, **where):
     blocks = list(read_blocks(path, schema, columns, **where))
     if not blocks:
         raise InputError(
-            path, ", ".join(where) or "row groups", ", ".join(map(str, where.values())) or "none", "one that it has"
+            path, ", ".join(where) or "row groups", ", ".join(map(repr, where.values())) or "none", "values in the file"
         )
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
@@ -183,10 +183,10 @@ def _opened(path):
         raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None
 
 
-def _metadata(path, file, key):
+def _metadata(path, file, key, allowed=_AS_WRITTEN):
     text = (file.metadata.metadata or {}).get(key.encode())
     if text is None:
-        raise InputError(path, f"metadata {key}", "nothing", _AS_WRITTEN)
+        raise InputError(path, f"metadata {key}", "nothing", allowed)
     return json.loads(text)
 
 

@@ -8,7 +8,7 @@ import sys
 from itertools import product
 
 import pytest
-from conftest import NOISE, REPOSITORY, ROBOTS, STRATEGIES
+from study_folder import NOISE, REPOSITORY, ROBOTS, STRATEGIES
 
 SCRIPTS = sorted(
     path.name

@@ -1,0 +1,108 @@
+"""A folder that holds the study: made from the repository's sources, edited, run, and looked at."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import yaml
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+ROBOTS = ("kuka", "kuka_extended")
+NOISE = ("0", "200")
+STRATEGIES = ("6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb")
+SMALL = {
+    "robots": list(ROBOTS),
+    "strategies": list(STRATEGIES),
+    "noise_um": [0, 200],
+    "data_sets": 12,
+    "configurations": 20,
+    "test_configurations": 20,
+    "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
+    "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
+}
+_JOB = re.compile(r"^(?:local)?rule (\w+):\n(.*?)(?=^\[|^\S|\Z)", re.MULTILINE | re.DOTALL)
+
+
+class Study:
+    """A folder with the sources of the study and, once it has run, its outputs."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+
+    @classmethod
+    def of_sources(cls, folder):
+        """The repository's sources alone, set to the small study."""
+        study = cls(folder)
+        study.folder.mkdir(parents=True)
+        for name in SOURCES:
+            source = REPOSITORY / name
+            if source.is_dir():
+                shutil.copytree(source, study.folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+            elif source.exists():
+                shutil.copy2(source, study.folder / name)
+        if not study.path("README.md").exists():
+            study.path("README.md").write_text("# Stand-in\n", encoding="utf-8")
+        study.configure(SMALL)
+        return study
+
+    def copied_to(self, folder):
+        """The same folder elsewhere, times of its files included."""
+        shutil.copytree(self.folder, folder)
+        return Study(folder)
+
+    def path(self, name):
+        return self.folder / name
+
+    def configure(self, changes):
+        """Change keys of config.yaml; a mapping changes some keys of a mapping."""
+        file = self.path("config.yaml")
+        config = yaml.safe_load(file.read_text(encoding="utf-8"))
+        for key, value in changes.items():
+            config[key] = config[key] | value if isinstance(value, dict) else value
+        file.write_text(yaml.safe_dump(config, sort_keys=False), encoding="utf-8")
+
+    def replace(self, name, old, new):
+        """Edit a source; `old` must be there once."""
+        text = self.path(name).read_text(encoding="utf-8")
+        assert text.count(old) == 1, f"{name} holds {old!r} {text.count(old)} times"
+        self.path(name).write_text(text.replace(old, new), encoding="utf-8")
+
+    def append(self, name, text):
+        with open(self.path(name), "a", encoding="utf-8") as file:
+            file.write(text)
+
+    def command(self, *arguments):
+        """Arguments of a `subprocess` call that runs Snakemake here."""
+        environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "OMP_NUM_THREADS": "1"}
+        return {"args": [sys.executable, "-m", "snakemake", *arguments], "cwd": self.folder, "env": environment}
+
+    def snakemake(self, *arguments):
+        return subprocess.run(**self.command(*arguments), capture_output=True, text=True, timeout=600)
+
+    def run(self, *arguments):
+        """Run Snakemake, which must succeed."""
+        done = self.snakemake("-j2", *arguments)
+        assert done.returncode == 0, done.stderr[-3000:]
+        return done
+
+    def planned(self, *arguments):
+        """Jobs that Snakemake would run, as (rule, wildcard, wildcard, ...)."""
+        done = self.snakemake("-n", *arguments)
+        assert done.returncode == 0, done.stderr[-3000:]
+        jobs = []
+        for rule, body in _JOB.findall(done.stdout):
+            wildcards = re.search(r"^    wildcards: (.*)$", body, re.MULTILINE)
+            values = [pair.split("=", 1)[1] for pair in wildcards[1].split(", ")] if wildcards else []
+            jobs.append((rule, *values))
+        total = re.search(r"^total +(\d+)$", done.stdout, re.MULTILINE)
+        assert len(jobs) == (int(total[1]) if total else 0), done.stdout
+        assert total or "Nothing to be done" in done.stdout
+        return set(jobs)
+
+    def files(self, *patterns):
+        """Relative paths of files by glob patterns, sorted."""
+        return sorted(p.relative_to(self.folder).as_posix() for pattern in patterns for p in self.folder.glob(pattern))

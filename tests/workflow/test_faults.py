@@ -1,0 +1,140 @@
+"""Bad input ends with one line that names the file, the key and what is allowed, and leaves nothing that looks finished."""
+
+import subprocess
+import time
+
+import psutil
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+KUKA = "config/robots/kuka.yaml"
+MEASURED = "data/simulated/kuka/200um/measured.parquet"
+IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
+
+
+def _unknown_point(study):
+    study.replace("config/strategies/3+6DoF-comb.yaml", "[3DoF, 6DoF]", "[3DoF, 7DoF]")
+
+
+FAULTS = {
+    "typo in a key": (
+        lambda study: study.replace("config.yaml", "data_sets:", "data_set:"),
+        ["config.yaml: data_set: ", "allowed: 'data_sets'?"],
+    ),
+    "typo in a key of a section": (
+        lambda study: study.replace("config.yaml", "wrench_at:", "wrench:"),
+        ["config.yaml: readings.wrench: ", "allowed: 'wrench_at'?"],
+    ),
+    "value outside its range": (
+        lambda study: study.configure({"readings": {"joint_range": "half_turn"}}),
+        ["config.yaml: readings.joint_range: ", "'half_turn'", "allowed: full_turn | limits"],
+    ),
+    "unknown strategy": (
+        lambda study: study.configure({"strategies": ["6DoF", "3+6DoF-com"]}),
+        ["config.yaml: strategies", "'3+6DoF-com'", "allowed: a file of config/strategies: '3+6DoF-comb'?"],
+    ),
+    "unknown robot": (
+        lambda study: study.configure({"robots": ["kuka", "abb"]}),
+        ["config.yaml: robots", "'abb'", "allowed: a file of config/robots: fanuc, kuka, kuka_extended"],
+    ),
+    "negative noise level": (
+        lambda study: study.configure({"noise_um": [200, -50]}),
+        ["config.yaml: noise_um[1]: ", "found -50", "allowed: 0 or more"],
+    ),
+    "chain that does not parse": (
+        lambda study: study.replace(KUKA, "Rz(q1)", "Rz q1"),
+        [f"{KUKA}: chain: ", "'Rz'", "allowed: Tx(length)"],
+    ),
+    "wrong number of compliances": (
+        lambda study: study.replace(KUKA, "[0.54, ", "["),
+        [f"{KUKA}: compliance_urad_per_Nm: ", "found 5 entries", "allowed: one for each of the 6 joints"],
+    ),
+    "strategy with an unknown point": (
+        _unknown_point,
+        ["config/strategies/3+6DoF-comb.yaml: stages[1].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
+    ),
+    "data set too short to solve": (
+        lambda study: study.configure(
+            {"configurations": 1, "readings": {"measured": "position"}, "evaluation": {"lengths": [1]}, "tables": {"length": 1}}
+        ),
+        ["config.yaml: configurations: ", "found 1", "allowed: 2 or more"],
+    ),
+    "evaluation beyond the configurations": (
+        lambda study: study.configure({"evaluation": {"lengths": [5, 20, 21]}}),
+        ["config.yaml: evaluation.lengths[2]: ", "found 21", "allowed: up to configurations = 20"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_nothing_starts_and_one_line_says_why(fault, unstarted):
+    spoil, said = FAULTS[fault]
+    spoil(unstarted)
+    ended = unstarted.snakemake("-j1")
+    assert ended.returncode != 0
+    lines = (ended.stdout + ended.stderr).splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith(said[0])
+    assert all(part in lines[0] for part in said)
+    assert unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
+
+
+def _truncate(path):
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+
+
+def _edit_one_value(path):
+    """Rewrite the file with all its metadata and row groups, and one deflection 1 nm off."""
+    file = pq.ParquetFile(path)
+    groups = [file.read_row_group(group) for group in range(file.num_row_groups)]
+    metadata = {k: v for k, v in file.metadata.metadata.items() if k != b"ARROW:schema"}
+    last = groups[-1]
+    values = last.column("dx").to_pylist()
+    values[7] += 1e-9
+    groups[-1] = last.set_column(last.schema.get_field_index("dx"), last.schema.field("dx"), pa.array(values))
+    file.close()
+    with pq.ParquetWriter(path, groups[0].schema.with_metadata(None)) as writer:
+        for group in groups:
+            writer.write_table(group.replace_schema_metadata(None))
+        writer.add_key_value_metadata(metadata)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"), [(_truncate, "no readable Parquet file"), (_edit_one_value, "values that were edited")]
+)
+def test_spoilt_data_end_the_job_that_reads_them(spoil, said, finished):
+    spoil(finished.path(MEASURED))
+    ended = finished.snakemake("-j1", IDENTIFIED)
+    assert ended.returncode != 0
+    log = finished.path("results/logs/identify/kuka/200um/6DoF.log").read_text(encoding="utf-8").splitlines()
+    assert len(log) == 1
+    assert log[0].startswith(f"{MEASURED}: ")
+    assert said in log[0]
+    assert "allowed: the file as the pipeline wrote it" in log[0]
+    assert log[0] in ended.stderr.splitlines()
+    assert "Traceback" not in ended.stderr
+    assert not finished.path(IDENTIFIED).exists()
+    assert finished.files("results/identified/**/*.partial") == []
+
+
+def test_a_killed_job_leaves_no_file_under_the_final_name(finished):
+    """Killed after its first block, with no chance to tidy up."""
+    finished.append(
+        "src/elastocal/study/measure.py",
+        "\n_blocks = measured_blocks\n\n\ndef measured_blocks(*arguments):\n    import time\n\n"
+        "    for block in _blocks(*arguments):\n        yield block\n        time.sleep(600)\n",
+    )
+    finished.path(MEASURED).unlink()
+    started = subprocess.Popen(
+        **finished.command("-j1", MEASURED), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+    partial, latest = finished.path(f"{MEASURED}.partial"), time.monotonic() + 60
+    while not (partial.exists() and partial.stat().st_size > 4):
+        assert started.poll() is None
+        assert time.monotonic() < latest
+        time.sleep(0.05)
+    for process in [*psutil.Process(started.pid).children(recursive=True), started]:
+        process.kill()
+    assert started.wait() != 0
+    assert not finished.path(MEASURED).exists()

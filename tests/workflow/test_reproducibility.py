@@ -1,0 +1,63 @@
+"""The same seeds give the same study: on one core or two, and whatever else is asked for beside them."""
+
+import pyarrow.parquet as pq
+import pytest
+from study_folder import NOISE, ROBOTS, SMALL, STRATEGIES
+
+REPORTS = ("reports/**/*.csv", "reports/**/*.md", "reports/**/*.tex", "reports/**/*.json", "reports/**/*.pdf")
+MEASURED = [f"data/simulated/{robot}/{noise}um/measured.parquet" for robot in ROBOTS for noise in NOISE]
+KEYS = [(name, "ascending") for name in ("point", "data_set", "configuration")]
+
+
+def first_data_sets(path):
+    """Rows of the data sets that the small study has, in an order of their own."""
+    table = pq.ParquetFile(path).read()
+    table = table.set_column(0, "point", table.column("point").cast("string")).sort_by(KEYS)
+    return table.filter([number < SMALL["data_sets"] for number in table.column("data_set").to_pylist()])
+
+
+def test_one_core_and_two_make_the_same_reports(small_study, serial_study):
+    names = small_study.files(*REPORTS)
+    assert {"reports/tables/table4.csv", "reports/tables/table4.tex", "reports/figures/fig4.pdf"} < set(names)
+    assert "reports/study.pdf" in names
+    assert serial_study.files(*REPORTS) == names
+    differing = [name for name in names if small_study.path(name).read_bytes() != serial_study.path(name).read_bytes()]
+    assert differing == []
+
+
+def test_one_core_and_two_make_the_same_data(small_study, serial_study):
+    names = small_study.files("data/**/*.parquet", "results/**/*.parquet")
+    assert len(names) > len(ROBOTS) * len(NOISE) * len(STRATEGIES) * 4
+    assert serial_study.files("data/**/*.parquet", "results/**/*.parquet") == names
+    differing = []
+    for name in names:
+        ours, theirs = (pq.ParquetFile(study.path(name)).read() for study in (small_study, serial_study))
+        bits = [[chunk.buffers()[-1].to_pybytes() for chunk in column.chunks] for column in _plain(ours)]
+        if not ours.schema.equals(theirs.schema) or bits != [
+            [chunk.buffers()[-1].to_pybytes() for chunk in column.chunks] for column in _plain(theirs)
+        ]:
+            differing.append(name)
+    assert differing == []
+
+
+@pytest.mark.parametrize("change", ["more data sets", "another order", "other blocks"])
+def test_existing_rows_stay_with(change, unstarted, small_study):
+    if change == "more data sets":
+        unstarted.configure({"data_sets": SMALL["data_sets"] + 3})
+    elif change == "another order":
+        unstarted.configure({key: SMALL[key][::-1] for key in ("robots", "strategies", "noise_um")})
+    else:
+        unstarted.replace("src/elastocal/study/__init__.py", "SETS_PER_BLOCK = 200", "SETS_PER_BLOCK = 5")
+    unstarted.run(*MEASURED)
+    for name in MEASURED:
+        before, after = first_data_sets(small_study.path(name)), first_data_sets(unstarted.path(name))
+        assert before.num_rows == 4 * SMALL["data_sets"] * SMALL["configurations"]
+        assert after.equals(before), name
+
+
+def test_other_blocks_really_are_other_blocks(small_study, unstarted):
+    """The test above holds for a reason: the edited constant does change the row groups."""
+    unstarted.replace("src/elastocal/study/__init__.py", "SETS_PER_BLOCK = 200", "SETS_PER_BLOCK = 5")
+    name = "data/simulated/kuka/experiments.parquet"
+    unstarted.run(name)
+    assert [pq.ParquetFile(study.path(name)).num_row_groups for study in (small_study, unstarted)] == [1, 3]
