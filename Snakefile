@@ -1,5 +1,6 @@
 """The study: every table and figure of the paper, from seeds. `snakemake -j2` makes all of it."""
 
+
 configfile: "config.yaml"
 
 

@@ -44,3 +44,8 @@ def robot_document(wildcards):
 
 def strategy_document(wildcards):
     return STUDY.strategies[wildcards.strategy]
+
+
+def cells(kind, robots, noise, strategies=config["strategies"]):
+    """Results of one kind for robots, noise levels and strategies."""
+    return expand(f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet", robot=robots, noise=noise, strategy=strategies)

@@ -4,11 +4,6 @@ Needs results/. Writes reports/tables/*.csv and, for each, the same as Markdown 
 """
 
 
-def cells(kind, robots, noise, strategies=config["strategies"]):
-    """Results of one kind for robots, noise levels and strategies."""
-    return expand(f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet", robot=robots, noise=noise, strategy=strategies)
-
-
 rule summarize_initial:
     input:
         ideal="data/simulated/{robot}/ideal.parquet",

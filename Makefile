@@ -1,0 +1,46 @@
+# make paper: the whole study from nothing.  make test: the tests.  See README.md.
+PYTHON ?= python3
+BIN = .venv/bin
+CORES ?= 2
+
+.PHONY: paper test lint bench pictures lock clean
+
+paper: .venv/ready
+	$(BIN)/snakemake -j$(CORES)
+
+test: .venv/ready-for-tests
+	$(BIN)/python -m pytest -q
+
+lint: .venv/ready-for-tests
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/python workflow/lint.py
+
+bench: .venv/ready-for-tests
+	$(BIN)/python benchmarks/run.py
+
+# Pictures of the README, from the figures of a finished study.
+pictures: .venv/ready
+	$(BIN)/snakemake -j$(CORES) pictures
+
+# New pins. The index is the caller's own; none is written into the lock files.
+lock:
+	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
+	uv pip compile pyproject.toml --extra build --extra test --universal --python-version 3.11 --generate-hashes --no-header \
+	    -c requirements.lock -o requirements-test.lock
+
+clean:
+	rm -rf .venv .snakemake data/simulated results/[a-z]* reports/[a-z]*
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+
+.venv/ready: requirements.lock pyproject.toml | .venv/bin/python
+	$(BIN)/python -m pip install -q --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	touch $@
+
+.venv/ready-for-tests: requirements-test.lock .venv/ready
+	$(BIN)/python -m pip install -q --require-hashes -r requirements-test.lock
+	touch $@

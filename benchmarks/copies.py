@@ -1,0 +1,80 @@
+"""Copies of the study in a temporary folder, and Snakemake in them."""
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+import time
+
+from common import ROOT
+
+SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "src")
+
+
+def copy_study(folder):
+    """Copy the sources of the study, without anything that it has made.
+
+    Parameters
+    ----------
+    folder : Path
+        Created.
+
+    Returns
+    -------
+    Path
+        `folder`.
+    """
+    folder.mkdir()
+    for name in SOURCES:
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+        else:
+            shutil.copy(ROOT / name, folder / name)
+    return folder
+
+
+def reduce_to_touching(folder):
+    """Rewrite the scripts of a copy: they import what they import and touch their outputs.
+
+    Parameters
+    ----------
+    folder : Path
+        From `copy_study`.
+    """
+    for script in (folder / "workflow" / "scripts").glob("*.py"):
+        if script.name == "job.py":
+            continue
+        tree = ast.parse(script.read_text(encoding="utf-8"))
+        imports = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+        touch = "for path in snakemake.output:\n    open(path, 'w').close()\n"
+        script.write_text("\n".join([*imports, touch]), encoding="utf-8")
+
+
+def snakemake(folder, *arguments):
+    """Run Snakemake in a copy, with the package of the copy.
+
+    Parameters
+    ----------
+    folder : Path
+    *arguments : str
+
+    Returns
+    -------
+    seconds : float
+    output : str
+        What it printed.
+
+    Raises
+    ------
+    SystemExit
+        Where it fails; with what it printed.
+    """
+    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
+    command = [sys.executable, "-m", "snakemake", *arguments]
+    start = time.perf_counter()
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    seconds = time.perf_counter() - start
+    if done.returncode:
+        sys.exit(f"{done.stdout}{done.stderr}\nfailed: {' '.join(command)} in {folder}")
+    return seconds, done.stdout + done.stderr

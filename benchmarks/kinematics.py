@@ -1,0 +1,67 @@
+"""Jacobians of 100,000 configurations against a Python loop over pinocchio, one thread each."""
+
+from statistics import median
+
+import numpy as np
+import pinocchio as pin
+from common import Row, interleaved, load_robot
+
+from elastocal.kinematics import poses_and_jacobians
+
+ROBOTS = ("kuka", "fanuc")
+CONFIGURATIONS = 100_000
+REPETITIONS = 9
+TARGET = 5
+TOLERANCE = 1e-12
+
+
+def rows(work):
+    """Rows of the report, one for each robot; `work` is not used."""
+    return [_row(name) for name in ROBOTS]
+
+
+def pinocchio_model(chain):
+    """Model of a chain whose joints turn in the positive sense, and the index of its end-effector frame.
+
+    Parameters
+    ----------
+    chain : Chain
+
+    Returns
+    -------
+    model : pinocchio.Model
+    frame : int
+    """
+    joints = (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+    model, parent, placement = pin.Model(), 0, pin.SE3.Identity()
+    for transform in chain.transforms:
+        step = transform.constant * np.eye(3)[transform.axis]
+        placement = placement * (pin.SE3(np.eye(3), step) if transform.kind == "T" else pin.SE3(pin.exp3(step), np.zeros(3)))
+        if transform.coordinate is not None:
+            if (transform.kind, transform.sign) != ("R", 1.0):
+                raise ValueError(f"{transform}: not a joint that turns in the positive sense")
+            parent = model.addJoint(parent, joints[transform.axis](), placement, f"q{transform.coordinate + 1}")
+            placement = pin.SE3.Identity()
+    return model, model.addFrame(pin.Frame("end-effector", parent, placement, pin.FrameType.OP_FRAME))
+
+
+def _row(name):
+    chain = load_robot(name).chain
+    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (CONFIGURATIONS, chain.coordinates))
+    model, frame = pinocchio_model(chain)
+    data, aligned = model.createData(), pin.LOCAL_WORLD_ALIGNED
+
+    def loop():
+        for q in angles:
+            pin.computeFrameJacobian(model, data, q, frame, aligned)
+
+    jacobian = poses_and_jacobians(chain, angles, chain.end_effector)[2]
+    expected = np.stack([pin.computeFrameJacobian(model, data, q, frame, aligned) for q in angles])
+    np.testing.assert_allclose(jacobian, expected, rtol=0, atol=TOLERANCE)
+    functions = {f"elastocal on {name}": lambda: poses_and_jacobians(chain, angles, chain.end_effector), "pinocchio": loop}
+    ours, theirs = map(median, interleaved(functions, REPETITIONS))
+    how = (
+        f"poses_and_jacobians on {CONFIGURATIONS} random configurations against pin.computeFrameJacobian in a Python loop, "
+        f"one thread, median of {REPETITIONS}, Jacobians equal to {TOLERANCE:g}"
+    )
+    return Row(f"kinematics {name}", ours, theirs, theirs / ours, f">= {TARGET}", theirs / ours >= TARGET, how)
