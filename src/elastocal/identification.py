@@ -8,6 +8,7 @@ Inside this module the batch lies last in memory, as (..., configuration, data s
 """
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -114,7 +115,7 @@ def estimate_compliance(strategy, readings, joints):
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        triangle = prefix_triangles(_stacked_system(stage, readings), pivots)
+        triangle = prefix_triangles(_systems(stage, readings), pivots)
         right = triangle[:, :, -1]
         for column, joint in enumerate(stage.held, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
@@ -144,29 +145,32 @@ def covariance(strategy, readings, triangles):
 
     Notes
     -----
-    A stage solves N_II c_I = sum_p (A_p^T y_p)_I - N_IH c_H, with N the information of its points, I the joints identified and
-    H those held. With e_p the noise at point p, the estimates are c + sum_p B_p A_p^T e_p, so their covariance is
-    sum_p B_p N_p B_p^T. A stage that identifies every joint forgets the stages before it.
+    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced readings
+    z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the covariance of
+    the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared readings) R_t^-1. A stage that identifies
+    every joint forgets the stages before it.
     """
     joints = next(iter(readings.values())).regressor.shape[1]
-    start = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
-    stages = list(zip(strategy.stages, triangles, strict=True))[start:]
-    if len(stages) == 1 and len(stages[0][0].identified) == joints:
-        order = np.argsort(stages[0][0].identified)
-        return _stage_inverse(*stages[0])[..., order, :][..., order]
-    names = tuple(dict.fromkeys(name for stage, _ in stages for name in stage.points))
-    information = {name: prefix_information(readings[name].regressor) for name in names}
-    gain = {name: np.zeros_like(information[name]) for name in names}
-    for stage, triangle in stages:
-        pivots, held = list(stage.identified), list(stage.held)
-        stage_inverse = _stage_inverse(stage, triangle)
-        coupling = sum(information[name][..., pivots, :][..., held] for name in stage.points)
-        for name in names:
-            right = -coupling @ gain[name][..., held, :]
-            if name in stage.points:
-                right[..., range(len(pivots)), pivots] += 1.0
-            gain[name][..., pivots, :] = stage_inverse @ right
-    return sum(gain[name] @ information[name] @ np.swapaxes(gain[name], -1, -2) for name in names)
+    first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
+    stages, gains, inverses = strategy.stages[first:], [], []
+    for stage, triangle in zip(stages, triangles[first:], strict=True):
+        pivots, size = list(stage.identified), len(stage.identified)
+        inverse = _row_major(inverse_triangles(triangle[:, :, :size]))
+        back = inverse @ _row_major(triangle[:, :, size:-1])
+        for gain in gains:
+            gain[..., pivots, :] = -back @ gain[..., list(stage.held), :]
+        gains.append(np.zeros((*inverse.shape[:2], joints, size)))
+        gains[-1][..., pivots, :] = inverse
+        inverses.append(inverse)
+    total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
+    for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
+        if shared := set(earlier.points) & set(later.points):
+            information = sum(prefix_information(readings[name].regressor) for name in sorted(shared))
+            products = information[..., list(earlier.identified), :][..., list(later.identified)]
+            between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
+            cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
+            total += cross + np.swapaxes(cross, -1, -2)
+    return total
 
 
 def condition_numbers(strategy, triangles):
@@ -192,13 +196,13 @@ def condition_numbers(strategy, triangles):
     return largest
 
 
-def prefix_triangles(system, pivots):
+def prefix_triangles(systems, pivots):
     """Triangular factor of the first k configurations, for every k, by Householder reflections.
 
     Parameters
     ----------
-    system : ndarray (rows, columns, configurations, sets)
-        Unknowns first, right-hand side last.
+    systems : iterable of ndarray (rows, columns, sets)
+        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten.
     pivots : int
         How many leading columns are unknowns to eliminate.
 
@@ -212,11 +216,9 @@ def prefix_triangles(system, pivots):
     The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
     row of the triangle and the new rows only.
     """
-    _, columns, configurations, sets = system.shape
-    triangle = np.zeros((pivots, columns, sets))
-    prefixes = np.empty((configurations, pivots, columns, sets))
-    for configuration in range(configurations):
-        new = system[:, :, configuration].copy()
+    prefixes, triangle = [], None
+    for new in systems:
+        triangle = np.zeros((pivots, *new.shape[1:])) if triangle is None else triangle.copy()
         for k in range(pivots):
             head, tail = triangle[k, k], new[:, k]
             norm = np.sqrt(head * head + (tail * tail).sum(axis=0))
@@ -228,8 +230,8 @@ def prefix_triangles(system, pivots):
             triangle[k, k + 1 :] -= lead * weight
             new[:, k + 1 :] -= tail[:, None] * weight
             triangle[k, k] = reflected
-        prefixes[configuration] = triangle
-    return prefixes
+        prefixes.append(triangle)
+    return np.stack(prefixes)
 
 
 def inverse_triangles(triangle):
@@ -270,20 +272,13 @@ def prefix_information(regressor):
     return np.cumsum(np.swapaxes(matrices, -1, -2) @ matrices, axis=0)
 
 
-def _stacked_system(stage, readings):
-    """Rows of all points of a stage; columns: joints identified, joints held, measured deflection."""
+def _systems(stage, readings):
+    """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
     order = list(stage.identified + stage.held)
-    blocks = []
-    for name in stage.points:
-        point = readings[name]
-        blocks.append(np.concatenate([point.regressor[:, order], point.deflection[:, None]], axis=1))
-    return np.concatenate(blocks)
-
-
-def _stage_inverse(stage, triangle):
-    """Inverse information of the joints that a stage identifies, (configurations, sets, m, m), in the order of the stage."""
-    inverse = _row_major(inverse_triangles(triangle[:, :, : len(stage.identified)]))
-    return inverse @ np.swapaxes(inverse, -1, -2)
+    points = [readings[name] for name in stage.points]
+    for configuration in range(points[0].regressor.shape[2]):
+        sides = [(point.regressor[:, order, configuration], point.deflection[:, None, configuration]) for point in points]
+        yield np.concatenate([np.concatenate(pair, axis=1) for pair in sides])
 
 
 def _row_major(matrices):

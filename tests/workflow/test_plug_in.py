@@ -1,0 +1,111 @@
+"""To add a robot, a strategy or a noise level is to add one file or one entry; every switch of the configuration runs."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+UR10 = """\
+name: UR10
+chain: >-
+  Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) [2DoF] Ry(q3) Tx(0.5723) [3DoF] Ry(q4) Rz(q5) Tz(-0.1157) [5DoF]
+  Ry(q6) Ty(0.0922) [6DoF]
+joint_limits_deg: [[-360, 360], [-360, 360], [-180, 180], [-360, 360], [-360, 360], [-360, 360]]
+compliance_urad_per_Nm: [11, 12, 13, 21, 22, 23]
+"""
+SIX_AFTER_FIVE = """\
+name: 6DoF after 5DoF
+stages:
+  - {points: [5DoF], joints: [1, 2, 3, 4, 5]}
+  - {points: [6DoF], joints: [6], held: [1, 2, 3, 4, 5]}
+"""
+TWO_AND_SIX = """\
+name: 2+6DoF comb
+stages:
+  - {points: [2DoF, 6DoF], joints: [1, 2, 3, 4, 5, 6]}
+"""
+TABLE4, PER_DATA_SET = "reports/tables/table4.csv", "reports/tables/per_dataset.csv"
+
+
+def table(study, name):
+    return pd.read_csv(study.path(name))
+
+
+def add(study, name, text):
+    study.path(name).write_text(text, encoding="utf-8")
+
+
+def test_another_robot_strategy_and_noise_level_make_a_study_of_their_own(unstarted):
+    """A robot and points that the paper knows nothing of, without any of its robots, through every table and figure."""
+    add(unstarted, "config/robots/ur10.yaml", UR10)
+    add(unstarted, "config/strategies/6DoF-after-5DoF.yaml", SIX_AFTER_FIVE)
+    unstarted.configure({"robots": ["ur10"], "strategies": ["6DoF", "6DoF-after-5DoF"], "noise_um": [12.5, 200]})
+    unstarted.run()
+    assert set(table(unstarted, "reports/tables/table1.csv").robot) == {"ur10"}
+    table4 = table(unstarted, TABLE4)
+    assert set(zip(table4.robot, table4.strategy, strict=True)) == {("ur10", "6DoF"), ("ur10", "6DoF after 5DoF")}
+    per_data_set = table(unstarted, PER_DATA_SET)
+    assert set(zip(per_data_set.strategy, per_data_set.noise_um, strict=True)) == {
+        (strategy, noise) for strategy in ("6DoF", "6DoF after 5DoF") for noise in (12.5, 200)
+    }
+    assert unstarted.path("results/identified/ur10/12.5um/6DoF-after-5DoF.parquet").exists()
+    assert unstarted.path("reports/study.pdf").exists()
+
+
+def test_an_added_robot_runs_no_job_of_the_others(finished):
+    add(finished, "config/robots/ur10.yaml", UR10)
+    finished.configure({"robots": ["kuka", "kuka_extended", "ur10"]})
+    grid = {"draw_experiments", "simulate", "measure", "identify", "evaluate", "bound", "summarize_initial", "compare_solvers"}
+    planned = {job for job in finished.planned() if job[0] in grid}
+    assert {job[0] for job in planned} == grid
+    assert {job[1] for job in planned} == {"ur10"}
+
+
+def test_an_added_strategy_runs_no_job_of_the_others(finished):
+    add(finished, "config/strategies/2+6DoF-comb.yaml", TWO_AND_SIX)
+    finished.configure({"strategies": ["6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb", "2+6DoF-comb"]})
+    planned = finished.planned()
+    assert {job[3] for job in planned if job[0] in ("identify", "evaluate")} == {"2+6DoF-comb"}
+    assert {job[0] for job in planned}.isdisjoint({"draw_experiments", "simulate", "measure", "summarize_initial"})
+
+
+# Beside each switch, the first step whose results it changes: the steps before it have nothing to do.
+SWITCHES = {
+    "joint_range limits": ({"readings": {"joint_range": "limits"}}, "draw_experiments"),
+    "offset_frame tool": ({"readings": {"offset_frame": "tool"}}, "draw_experiments"),
+    "tool offset": ({"readings": {"tool_offset_m": [0.1, 0.05, 0.02]}}, "simulate"),
+    "wrench_at measuring_point": ({"readings": {"wrench_at": "measuring_point"}}, "simulate"),
+    "position with tool offset": (
+        {"readings": {"measured": "position", "tool_offset_m": [0.1, 0.05, 0.02]}},
+        "simulate",
+    ),
+    "average compliance": ({"readings": {"average": "compliance"}}, "evaluate"),
+    "average median": ({"readings": {"average": "median"}}, "evaluate"),
+    "deviation_of each_data_set": ({"readings": {"deviation_of": "each_data_set"}}, "evaluate"),
+    "solver gauss_newton": ({"identification": {"solver": "gauss_newton"}}, "identify"),
+}
+STEPS = ["draw_experiments", "simulate", "measure", "identify", "evaluate", "tabulate_strategies"]
+
+
+@pytest.fixture(scope="module")
+def tiny_study(small_study, tmp_path_factory):
+    """The small study with fewer cells, finished as far as Table 4."""
+    study = small_study.copied_to(tmp_path_factory.mktemp("tiny") / "study")
+    study.configure({"robots": ["kuka"], "strategies": ["6DoF", "3+6DoF-comb"], "noise_um": [200]})
+    study.run(TABLE4)
+    return study
+
+
+@pytest.mark.parametrize("switch", SWITCHES)
+def test_a_switch_runs_and_changes_the_results(switch, tiny_study, tmp_path):
+    changes, first = SWITCHES[switch]
+    study = tiny_study.copied_to(tmp_path / "study")
+    study.configure(changes)
+    ran = study.run(TABLE4).stderr
+    for step in STEPS:
+        assert (f"rule {step}:" in ran) == (STEPS.index(step) >= STEPS.index(first)), step
+    before, after = table(tiny_study, TABLE4), table(study, TABLE4)
+    assert list(before.columns) == list(after.columns)
+    assert (before.strategy == after.strategy).all()
+    measure = "dev_20_um" if "deviation" in switch else "k_sigma_20_percent"
+    assert np.isfinite(after[measure]).all()
+    assert (before[measure] != after[measure]).all()
