@@ -26,8 +26,8 @@ def test_only_shares_and_ratios_go_without_a_unit(make):
 
 def test_there_is_one_column_for_each_joint_and_one_covariance_for_each_pair():
     for joints in (3, 7):
-        names = {column.name for column in table_schemas.identified(joints).columns}
-        assert {f"c{j + 1}" for j in range(joints)} <= names
+        assert {f"c{j + 1}" for j in range(joints)} <= {column.name for column in table_schemas.identified(joints).columns}
+        names = {column.name for column in table_schemas.design(joints).columns}
         pairs = table_schemas.covariance_columns(joints)
         assert len(pairs) == joints * (joints + 1) // 2 and {name for name, _, _ in pairs} <= names
         assert {(i, j) for _, i, j in pairs} == {(i, j) for i in range(joints) for j in range(i + 1)}

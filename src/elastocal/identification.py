@@ -86,13 +86,31 @@ def identify(strategy, readings, joints):
     compliance, triangles = estimate_compliance(strategy, readings, joints)
     spread = covariance(strategy, readings, triangles)
     condition = condition_numbers(strategy, triangles)
-    rows = next(iter(readings.values())).regressor.shape[0]
-    unsolvable = ~(condition < LARGEST_CONDITION)
-    unsolvable[: first_solvable_length(strategy, rows) - 1] = True
-    np.moveaxis(compliance, 1, -1)[unsolvable] = np.nan
-    spread[unsolvable] = np.nan
-    condition[unsolvable] = np.nan
+    undetermined = undetermined_prefixes(strategy, readings, condition)
+    np.moveaxis(compliance, 1, -1)[undetermined] = np.nan
+    spread[undetermined] = np.nan
+    condition[undetermined] = np.nan
     return Estimates(compliance, spread, condition)
+
+
+def undetermined_prefixes(strategy, readings, condition):
+    """Which prefixes of which data sets do not determine the compliances: too few readings, or not the right ones.
+
+    Parameters
+    ----------
+    strategy, readings
+        As in `identify`.
+    condition : ndarray (configurations, sets)
+        From `condition_numbers`.
+
+    Returns
+    -------
+    ndarray of bool (configurations, sets)
+    """
+    rows = next(iter(readings.values())).regressor.shape[0]
+    undetermined = ~(condition < LARGEST_CONDITION)
+    undetermined[: first_solvable_length(strategy, rows) - 1] = True
+    return undetermined
 
 
 def estimate_compliance(strategy, readings, joints):

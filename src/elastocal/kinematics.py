@@ -139,37 +139,42 @@ def _blocks(size):
 
 
 def _sweep(chain, coordinates, point):
-    """Walk the chain up to `point`: axes of the frame, target, and (kind, axis, origin) of each coordinate on the way."""
+    """Walk the chain up to `point`: axes of the frame, target, and (kind, sign, axis, origin) of each coordinate on the way."""
+    transforms = chain.transforms[: point.after]
+    turns = _cosines_and_sines(coordinates, [t.coordinate for t in transforms if t.kind == "R" and t.coordinate is not None])
     axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     origin = [0.0, 0.0, 0.0]
     screws = [None] * chain.coordinates
-    for transform in chain.transforms[: point.after]:
-        amount, axis = transform.constant, transform.axis
-        if transform.coordinate is not None:
-            moved = coordinates[transform.coordinate]
-            amount = _product_sum(transform.sign, moved, 1.0, amount)
-            screws[transform.coordinate] = (transform.kind, transform.sign, axes[axis], origin)
+    for transform in transforms:
+        axis, coordinate, sign = transform.axis, transform.coordinate, transform.sign
+        if coordinate is not None:
+            screws[coordinate] = (transform.kind, sign, axes[axis], origin)
         if transform.kind == "T":
+            amount = transform.constant if coordinate is None else _product(sign, coordinates[coordinate])
             origin = _moved(origin, amount, axes[axis])
+            continue
+        if coordinate is None:
+            cosine, sine = math.cos(transform.constant), math.sin(transform.constant)
         else:
-            cosine, sine = _cosine_and_sine(amount)
-            second, third = axes[axis - 2], axes[axis - 1]
-            axes = list(axes)
-            axes[axis - 2] = [_product_sum(cosine, a, sine, b) for a, b in zip(second, third, strict=True)]
-            axes[axis - 1] = [_product_difference(cosine, b, sine, a) for a, b in zip(second, third, strict=True)]
+            cosine, sine = turns[coordinate][0], _product(sign, turns[coordinate][1])
+        second, third = axes[axis - 2], axes[axis - 1]
+        axes = list(axes)
+        axes[axis - 2] = [_product_sum(cosine, a, sine, b) for a, b in zip(second, third, strict=True)]
+        axes[axis - 1] = [_product_difference(cosine, b, sine, a) for a, b in zip(second, third, strict=True)]
     for axis, length in zip(axes, point.offset_m, strict=True):
         origin = _moved(origin, length, axis)
     return axes, origin, screws
 
 
-def _cosine_and_sine(angle):
-    """Cosine and sine by the tangent of the half angle, which numpy computes four times as fast as either of them."""
-    if isinstance(angle, float):
-        return math.cos(angle), math.sin(angle)
-    tangent = np.tan(0.5 * angle)
-    square = tangent * tangent
-    scale = 1.0 / (1.0 + square)
-    return (1.0 - square) * scale, 2.0 * tangent * scale
+def _cosines_and_sines(coordinates, turning):
+    """Cosine and sine of each turning coordinate by the tangent of its half, which numpy computes faster than either of them."""
+    tangent = np.tan(0.5 * coordinates[turning])
+    scale = tangent * tangent
+    scale += 1.0
+    np.divide(2.0, scale, out=scale)
+    tangent *= scale
+    scale -= 1.0
+    return dict(zip(turning, zip(scale, tangent, strict=True), strict=True))
 
 
 def _moved(origin, amount, axis):

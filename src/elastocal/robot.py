@@ -25,7 +25,7 @@ _NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POI
 
 @dataclass(frozen=True)
 class Transform:
-    """One elementary transform: ``constant + sign * coordinate`` along or about an axis of the moving frame.
+    """One elementary transform along or about an axis of the moving frame, fixed or moved by a coordinate.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Transform:
     axis : int
         0, 1, 2 for x, y, z.
     constant : float
-        The part that does not move (m or rad).
+        How far, where it is fixed (m or rad).
     coordinate : int or None
-        Index of the coordinate that moves it: a joint, or a spring of the extended model.
+        Index of the coordinate that says how far, where it moves: a joint, or a spring of the extended model.
     sign : float
         Sense of the coordinate, +1 or -1.
     """

@@ -227,15 +227,33 @@ def _digest(array):
     return hashlib.sha256(data).hexdigest()[:32]
 
 
+# Arrays go to and from Arrow through their buffers: every other way makes pyarrow import pandas, which takes longer than a job.
 def _to_arrow(column, array, rows):
-    if column.type != "string":
-        return pa.array(array)
-    return pa.DictionaryArray.from_arrays(pa.array(np.zeros(rows, np.int32)), pa.array([array[0]]))
+    if column.type == "string":
+        text = array[0].encode()
+        name = pa.Array.from_buffers(pa.string(), 1, [None, _buffer(np.array([0, len(text)], np.int32)), pa.py_buffer(text)])
+        return pa.DictionaryArray.from_arrays(_plain(pa.int32(), np.zeros(rows, np.int32)), name)
+    return _plain(_arrow_type(column), np.packbits(array, bitorder="little") if column.type == "bool" else array, rows)
+
+
+def _plain(arrow_type, array, rows=None):
+    return pa.Array.from_buffers(arrow_type, len(array) if rows is None else rows, [None, _buffer(array)])
+
+
+def _buffer(array):
+    return pa.py_buffer(np.ascontiguousarray(array))
 
 
 def _to_numpy(column, chunked):
     array = chunked.combine_chunks() if chunked.num_chunks != 1 else chunked.chunk(0)
     if column.type == "string":
         names = np.array(array.dictionary.to_pylist(), dtype=object)
-        return names[array.indices.to_numpy(zero_copy_only=False)]
-    return array.to_numpy(zero_copy_only=False)
+        return names[_values(array.indices, np.int32)]
+    if column.type == "bool":
+        bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
+        return bits[array.offset : array.offset + len(array)].astype(bool)
+    return _values(array, column.type)
+
+
+def _values(array, dtype):
+    return np.frombuffer(array.buffers()[1], dtype)[array.offset : array.offset + len(array)]

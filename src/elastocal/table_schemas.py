@@ -46,18 +46,23 @@ def covariance_columns(joints):
     return [(f"cov_{i + 1}_{j + 1}", i, j) for i in range(joints) for j in range(i + 1)]
 
 
+def design(joints):
+    """What the experiments can tell a strategy, whatever the noise; one row for each data set and length."""
+    covariances = [
+        Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit reading variance", missing=True)
+        for name, i, j in covariance_columns(joints)
+    ]
+    condition = Column("condition", "float32", "", "condition number of the identification Jacobian, worst stage", missing=True)
+    return TableSchema("design", (_SET, _LENGTH, *covariances, condition))
+
+
 def identified(joints):
     """What a strategy identified; one row for each data set and length."""
     compliances = [
         Column(f"c{j}", "float64", "rad/(N m)", f"identified compliance of joint {j}", missing=True)
         for j in range(1, joints + 1)
     ]
-    covariances = [
-        Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit reading variance", missing=True)
-        for name, i, j in covariance_columns(joints)
-    ]
-    condition = Column("condition", "float32", "", "condition number of the identification Jacobian, worst stage", missing=True)
-    return TableSchema("identified", (_SET, _LENGTH, *compliances, *covariances, condition))
+    return TableSchema("identified", (_SET, _LENGTH, *compliances))
 
 
 def metrics(joints):

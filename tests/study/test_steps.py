@@ -14,6 +14,7 @@ from elastocal.simulation import Loading, measurement_noise
 from elastocal.study import simulate
 from elastocal.study.bound import bound_blocks
 from elastocal.study.columns import to_deflections, to_experiments
+from elastocal.study.design import design_blocks
 from elastocal.study.evaluate import evaluated, judge_from
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.study.measure import measured_blocks
@@ -46,7 +47,8 @@ def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka")
 
 def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector", start=None):
     needed = {name: deflections[name] for name in strategy.points}
-    blocks = identified_blocks(paired_blocks(experiments, needed), robot.chain, strategy, rows, at, start)
+    designs = design_blocks(experiments, robot.chain, strategy, rows, at)
+    blocks = identified_blocks(paired_blocks(experiments, needed), designs, robot.chain, strategy, rows, at, start)
     return joined(list(blocks))
 
 
@@ -141,6 +143,12 @@ def test_gauss_newton_gets_through_positions_that_are_too_few_to_tell_the_wrist_
 def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
     experiments = experiments_of(kuka)
     table = identified(kuka, strategies["6DoF"], experiments, deflections_of(kuka, experiments, 2e-4))
+    assert table["data_set"].tolist() == np.repeat(range(5), 4).tolist()
+    assert table["length"].tolist() == [1, 2, 3, 4] * 5
+
+
+def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
+    table = joined(list(design_blocks(experiments_of(kuka), kuka.chain, strategies["6DoF"], 6, "end_effector")))
     assert table["data_set"].tolist() == np.repeat(range(5), 4).tolist()
     assert table["length"].tolist() == [1, 2, 3, 4] * 5
     # More configurations, less variance; never a condition number below one.

@@ -5,7 +5,7 @@ from elastocal.robot import parse_chain, with_target_offset
 from elastocal.storage import read_blocks, write_table
 from elastocal.strategies import strategy_from_document
 from elastocal.study.identify import identified_blocks, paired_blocks
-from elastocal.table_schemas import DEFLECTIONS, experiments, identified
+from elastocal.table_schemas import DEFLECTIONS, design, experiments, identified
 
 from job import run
 
@@ -18,7 +18,8 @@ def identify(job):
         read_blocks(job.input.experiments, experiments(chain.coordinates)),
         {name: read_blocks(job.input.measured, DEFLECTIONS, point=name) for name in strategy.points},
     )
-    solved = identified_blocks(blocks, chain, strategy, settings.rows, settings.wrench_at, settings.start)
+    designs = read_blocks(job.input.design, design(chain.coordinates), ["condition"])
+    solved = identified_blocks(blocks, designs, chain, strategy, settings.rows, settings.wrench_at, settings.start)
     write_table(job.output.identified, identified(chain.coordinates), solved, provenance(settings, **dict(job.wildcards)))
 
 

@@ -3,11 +3,9 @@
 import numpy as np
 
 from elastocal.bounds import squared_error_bounds
-from elastocal.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.identification import prefix_information
-from elastocal.kinematics import poses_and_jacobians
 from elastocal.metrics import error_moment
-from elastocal.study.columns import to_experiments
+from elastocal.study.design import Design
 
 
 def bound_blocks(experiment_blocks, chain, point_sets, rows, wrench_at, judge):
@@ -30,18 +28,12 @@ def bound_blocks(experiment_blocks, chain, point_sets, rows, wrench_at, judge):
         Columns of one block of the bounds table.
     """
     point_sets = list(dict.fromkeys(tuple(sorted(points)) for points in point_sets))
-    names = {name for points in point_sets for name in points}
+    names = sorted({name for points in point_sets for name in points})
     moment, sums, sets = error_moment(judge), dict.fromkeys(point_sets, 0.0), 0
     for block in experiment_blocks:
-        experiments = to_experiments(block)
-        sets += len(experiments.joint_angles)
-        information = {}
-        for name in names:
-            at = loaded_point(chain, chain.point(name), wrench_at)
-            torques = joint_torques(chain, experiments.joint_angles, experiments.wrench, at)
-            jacobian = poses_and_jacobians(chain, experiments.joint_angles, chain.point(name))[2]
-            matrix = np.moveaxis(regressor(jacobian, torques), (-2, -1, 1), (0, 1, 2))
-            information[name] = prefix_information(matrix[:rows])
+        regressors = Design(block, chain, names, rows, wrench_at).regressors
+        information = {name: prefix_information(matrix) for name, matrix in regressors.items()}
+        sets += regressors[names[0]].shape[-1]
         for points in point_sets:
             sums[points] = sums[points] + squared_error_bounds(sum(information[p] for p in points), moment).sum(axis=1)
     for points, total in sums.items():

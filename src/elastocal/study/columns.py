@@ -17,6 +17,11 @@ def index_columns(sets, configurations):
     }
 
 
+def prefix_index_columns(sets, lengths):
+    """Columns that number the rows of a block with one row for each data set and prefix length."""
+    return {"data_set": np.repeat(np.asarray(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), len(sets))}
+
+
 def experiment_columns(sets, experiments):
     """Block of the experiments table."""
     columns = index_columns(sets, experiments.joint_angles.shape[1])

@@ -1,15 +1,11 @@
 """Step 3: one strategy on measured data sets, every prefix length."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from elastocal.elastostatics import joint_torques, loaded_point, regressor
 from elastocal.gauss_newton import identify_exactly
-from elastocal.identification import Readings, first_solvable_length, identify
-from elastocal.kinematics import poses_and_jacobians
-from elastocal.study.columns import to_deflections, to_experiments
-from elastocal.table_schemas import covariance_columns
+from elastocal.identification import Readings, estimate_compliance
+from elastocal.study.columns import prefix_index_columns, to_deflections
+from elastocal.study.design import Design, configuration_first
 
 
 def paired_blocks(experiments, deflections):
@@ -30,13 +26,15 @@ def paired_blocks(experiments, deflections):
         yield block, dict(zip(deflections, measured, strict=True))
 
 
-def identified_blocks(blocks, chain, strategy, rows, wrench_at, start=None):
-    """Compliances, covariances and condition numbers, in blocks.
+def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=None):
+    """Compliances in blocks; not a number where the design says that a prefix does not determine them.
 
     Parameters
     ----------
     blocks : iterable of (dict, dict of str to dict)
         Blocks of the experiments table and, for each measuring point, of the deflections table.
+    designs : iterable of dict
+        Blocks of the design table of the strategy, for the same data sets.
     chain : Chain
     strategy : Strategy
     rows : int
@@ -51,16 +49,17 @@ def identified_blocks(blocks, chain, strategy, rows, wrench_at, start=None):
     dict
         Columns of one block of the identified table.
     """
-    for experiments, deflections in blocks:
+    for (experiments, deflections), design in zip(blocks, designs, strict=True):
         sets = np.unique(experiments["data_set"])
         situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
-        estimates = identify(strategy, situation.readings, chain.coordinates)
-        if start is not None:
-            lengths = range(first_solvable_length(strategy, rows), len(estimates.compliance) + 1)
-            exact = np.full_like(estimates.compliance, np.nan)
-            exact[lengths[0] - 1 :] = situation.solved_exactly(start, lengths)
-            estimates = replace(estimates, compliance=exact)
-        yield _columns(sets, estimates)
+        condition = design["condition"].reshape(len(sets), -1).T
+        if start is None:
+            compliance = estimate_compliance(strategy, situation.readings, chain.coordinates)[0]
+        else:
+            compliance = situation.solved_exactly(start, range(1, len(condition) + 1))
+        np.moveaxis(compliance, 1, -1)[np.isnan(condition)] = np.nan
+        columns = prefix_index_columns(sets, len(compliance))
+        yield columns | {f"c{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
 
 
 class Situation:
@@ -80,40 +79,16 @@ class Situation:
     """
 
     def __init__(self, experiments, deflections, chain, strategy, rows, wrench_at):
-        loaded = to_experiments(experiments)
         self.chain, self.strategy = chain, strategy
-        self.joint_angles = _configuration_first(loaded.joint_angles)
-        wrench = _configuration_first(loaded.wrench)
-        self.torques, self.measured, self.readings = {}, {}, {}
-        for name in strategy.points:
-            point = chain.point(name)
-            at = loaded_point(chain, point, wrench_at)
-            self.torques[name] = joint_torques(chain, self.joint_angles, wrench, at)
-            jacobian = poses_and_jacobians(chain, self.joint_angles, point)[2]
-            matrix = np.moveaxis(regressor(jacobian, self.torques[name]), (-2, -1), (0, 1))[:rows]
-            self.measured[name] = _configuration_first(to_deflections(deflections[name]))[..., :rows]
-            self.readings[name] = Readings(matrix, np.moveaxis(self.measured[name], -1, 0))
+        self.design = Design(experiments, chain, strategy.points, rows, wrench_at)
+        self.measured = {name: configuration_first(to_deflections(deflections[name]))[..., :rows] for name in strategy.points}
+        self.readings = {
+            name: Readings(self.design.regressors[name], np.moveaxis(self.measured[name], -1, 0)) for name in strategy.points
+        }
 
     def solved_exactly(self, start, lengths):
         """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
         start = np.full(self.chain.coordinates, start)
-        return identify_exactly(self.strategy, self.chain, self.joint_angles, self.torques, self.measured, start, lengths)
-
-
-def _configuration_first(array):
-    """(sets, configurations, k) to (configurations, sets, k) with memory in the order k, configurations, sets."""
-    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1)
-
-
-def _columns(sets, estimates):
-    configurations, joints, _ = estimates.compliance.shape
-    columns = {
-        "data_set": np.repeat(sets, configurations),
-        "length": np.tile(np.arange(1, configurations + 1), len(sets)),
-    }
-    for j in range(joints):
-        columns[f"c{j + 1}"] = estimates.compliance[:, j].T.ravel()
-    for name, i, j in covariance_columns(joints):
-        columns[name] = estimates.covariance[..., i, j].T.ravel()
-    columns["condition"] = estimates.condition.T.ravel()
-    return columns
+        return identify_exactly(
+            self.strategy, self.chain, self.design.joint_angles, self.design.torques, self.measured, start, lengths
+        )

@@ -1,0 +1,22 @@
+"""What the experiments of one robot can tell one strategy."""
+
+from elastocal.provenance import provenance
+from elastocal.robot import parse_chain, with_target_offset
+from elastocal.storage import read_blocks, write_table
+from elastocal.strategies import strategy_from_document
+from elastocal.study.design import design_blocks
+from elastocal.table_schemas import design, experiments
+
+from job import run
+
+
+def judge_design(job):
+    settings = job.params
+    chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
+    strategy = strategy_from_document(settings.strategy)
+    blocks = read_blocks(job.input.experiments, experiments(chain.coordinates))
+    judged = design_blocks(blocks, chain, strategy, settings.rows, settings.wrench_at)
+    write_table(job.output.design, design(chain.coordinates), judged, provenance(settings, **dict(job.wildcards)))
+
+
+run(judge_design, snakemake)
