@@ -57,7 +57,9 @@ def rows(work):
 
 
 def _readings(robot, strategy, sets):
-    experiments = random_experiments(robot, 1, "kuka", LOADING, "identification", sets, CONFIGURATIONS)
+    experiments = random_experiments(
+        robot.chain, robot.joint_limits, 1, "kuka", LOADING, "identification", sets, CONFIGURATIONS
+    )
     point = robot.chain.end_effector
     noise = NOISE * measurement_noise(1, "kuka", point.name, sets, CONFIGURATIONS)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise

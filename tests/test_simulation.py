@@ -15,7 +15,7 @@ PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 
 
 def drawn(robot, loading=PAPER, seed=1, key="kuka", purpose="identification", data_sets=range(4), configurations=5):
-    return random_experiments(robot, seed, key, loading, purpose, data_sets, configurations)
+    return random_experiments(robot.chain, robot.joint_limits, seed, key, loading, purpose, data_sets, configurations)
 
 
 def test_experiments_have_the_axes_set_configuration_component(kuka):

@@ -2,12 +2,16 @@
 
 import difflib
 import math
+from functools import cache
 from importlib import resources
 
 import jsonschema
 import yaml
 
 from elastocal.errors import InputError
+
+# The safe loader, in C where libyaml is there: the study is read at every call of snakemake.
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 # Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
 _Validator = jsonschema.validators.extend(
@@ -39,7 +43,7 @@ def read_document(path):
     """
     try:
         with open(path, encoding="utf-8") as file:
-            return yaml.safe_load(file)
+            return yaml.load(file, Loader=_Loader)
     except OSError as error:
         raise InputError(path, "", error.strerror or str(error), "a readable file") from None
     except UnicodeDecodeError as error:
@@ -50,9 +54,11 @@ def read_document(path):
         raise InputError(path, where, getattr(error, "problem", None) or str(error), "YAML") from None
 
 
+@cache
 def read_schema(name):
     """One of the package's schemas: ``config``, ``robot`` or ``strategy``."""
-    return yaml.safe_load(resources.files("elastocal").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8"))
+    text = resources.files("elastocal").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8")
+    return yaml.load(text, Loader=_Loader)
 
 
 def check_document(document, schema, source):

@@ -167,7 +167,7 @@ def _sweep(chain, coordinates, point):
 
 
 def _cosines_and_sines(coordinates, turning):
-    """Cosine and sine of each turning coordinate by the tangent of its half, which numpy computes faster than either of them."""
+    """Cosine and sine of each turning coordinate by the tangent of its half, which is faster in numpy than either of them."""
     tangent = np.tan(0.5 * coordinates[turning])
     scale = tangent * tangent
     scale += 1.0

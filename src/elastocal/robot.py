@@ -259,6 +259,35 @@ def stretches(chain):
     return tuple(found)
 
 
+def joint_limits(limits_deg, joints, source):
+    """Joint limits in rad.
+
+    Parameters
+    ----------
+    limits_deg : sequence of (float, float)
+        Lower and upper limit of each joint.
+    joints : int
+        How many there must be.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    ndarray (joints, 2)
+
+    Raises
+    ------
+    InputError
+        Where there are too few or too many, or a lower limit is not below the upper one.
+    """
+    if len(limits_deg) != joints:
+        raise InputError(source, "joint_limits_deg", f"{len(limits_deg)} entries", f"one for each of the {joints} joints")
+    for joint, (low, high) in enumerate(limits_deg):
+        if low >= high:
+            raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
+    return np.radians(np.array(limits_deg, float))
+
+
 def robot_from_document(document, source="robot"):
     """Make a robot from the contents of its file, already validated against the robot schema.
 
@@ -280,13 +309,9 @@ def robot_from_document(document, source="robot"):
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
     n = chain.coordinates
-    for key in ("joint_limits_deg", "compliance_urad_per_Nm"):
-        if len(document[key]) != n:
-            raise InputError(source, key, f"{len(document[key])} entries", f"one for each of the {n} joints")
-    limits = np.radians(np.array(document["joint_limits_deg"], float))
-    if (limits[:, 0] >= limits[:, 1]).any():
-        joint = int(np.argmax(limits[:, 0] >= limits[:, 1]))
-        raise InputError(source, f"joint_limits_deg[{joint}]", document["joint_limits_deg"][joint], "[lower, upper]")
+    if len(document["compliance_urad_per_Nm"]) != n:
+        found = f"{len(document['compliance_urad_per_Nm'])} entries"
+        raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {n} joints")
     reported = document.get("reported_joints", {})
     matrix = reported.get("matrix", np.eye(n).tolist())
     offset = reported.get("offset_deg", [0.0] * n)
@@ -297,7 +322,7 @@ def robot_from_document(document, source="robot"):
         name=document["name"],
         chain=chain,
         compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
-        joint_limits=limits,
+        joint_limits=joint_limits(document["joint_limits_deg"], n, source),
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
         reported_offset=np.radians(np.array(offset, float)),

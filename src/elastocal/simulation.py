@@ -36,12 +36,14 @@ class Loading:
     joint_range: str
 
 
-def random_experiments(robot, seed, key, loading, purpose, data_sets, configurations):
+def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, configurations):
     """Random configurations and wrenches.
 
     Parameters
     ----------
-    robot : Robot
+    chain : Chain
+    limits : ndarray (n, 2)
+        Joint limits in rad.
     seed : int
     key : str
         Name of the robot's file; part of the name of the random streams.
@@ -56,13 +58,13 @@ def random_experiments(robot, seed, key, loading, purpose, data_sets, configurat
     -------
     Experiments
     """
-    n = robot.joints
+    n = chain.coordinates
     turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
-    low, high = robot.joint_limits.T if loading.joint_range == "limits" else (np.full(n, -np.pi), np.full(n, np.pi))
+    low, high = limits.T if loading.joint_range == "limits" else (np.full(n, -np.pi), np.full(n, np.pi))
     joint_angles = low + (high - low) * turns
     normal = draw(seed, key, f"{purpose}/force", data_sets, lambda stream: stream.standard_normal((configurations, 3)))
     force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
-    rotation = poses(robot.chain, joint_angles, robot.chain.end_effector)[1] if loading.offset_frame == "tool" else None
+    rotation = poses(chain, joint_angles, chain.end_effector)[1] if loading.offset_frame == "tool" else None
     return Experiments(joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation))
 
 

@@ -26,7 +26,7 @@ AT = ("end_effector", "measuring_point")
 
 
 def experiments_of(robot, sets=5, configurations=4, purpose="identification", key="kuka"):
-    return list(experiment_blocks(robot, key, 1, PAPER, purpose, sets, configurations))
+    return list(experiment_blocks(robot.chain, robot.joint_limits, key, 1, PAPER, purpose, sets, configurations))
 
 
 def as_read(blocks):

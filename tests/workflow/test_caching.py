@@ -38,6 +38,11 @@ def identified_and_evaluated(robots=ROBOTS, noise=NOISE, strategies=STRATEGIES):
     return jobs("identify", robots, noise, strategies) | jobs("evaluate", robots, noise, strategies)
 
 
+def designed(robots=ROBOTS, strategies=STRATEGIES):
+    """Holds for all noise levels."""
+    return jobs("judge_design", robots, strategies)
+
+
 @pytest.fixture(scope="module")
 def every_job(small_study):
     return small_study.planned("--forceall")
@@ -76,14 +81,16 @@ def test_a_strategy_with_other_stages_reruns_that_strategy(finished):
     finished.replace(
         "config/strategies/4-6DoF-after-3DoF.yaml", "joints: [4, 5, 6], held: [1, 2, 3]", "joints: [1, 2, 3, 4, 5, 6]"
     )
-    expected = identified_and_evaluated(strategies=["4-6DoF-after-3DoF"]) | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
-    assert finished.planned() == expected
+    strategy = ["4-6DoF-after-3DoF"]
+    expected = designed(strategies=strategy) | identified_and_evaluated(strategies=strategy)
+    assert finished.planned() == expected | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
 
 
 def test_a_strategy_with_other_points_reruns_that_strategy_and_the_bounds(finished):
     finished.replace("config/strategies/3+6DoF-comb.yaml", "[3DoF, 6DoF]", "[2DoF, 6DoF]")
-    expected = identified_and_evaluated(strategies=["3+6DoF-comb"]) | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
-    assert finished.planned() == expected | jobs("bound", ROBOTS)
+    strategy = ["3+6DoF-comb"]
+    expected = designed(strategies=strategy) | identified_and_evaluated(strategies=strategy) | jobs("bound", ROBOTS)
+    assert finished.planned() == expected | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
 
 
 def test_another_noise_level_runs_that_level(finished):
@@ -100,6 +107,7 @@ def test_the_compliance_of_a_robot_reruns_that_robot(finished):
         jobs("draw_experiments", robot, ["", "/test"])
         | jobs("simulate", robot, ["", "/test"])
         | jobs("measure", robot, NOISE)
+        | designed(robot)
         | identified_and_evaluated(robot)
         | jobs("bound", robot)
         | jobs("summarize_initial", robot)
@@ -148,6 +156,7 @@ def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, 
         "measure",
         "summarize_initial",
         "bound",
+        "judge_design",
         "tabulate_compliances",
         "tabulate_initial",
         "draw_table2_samples",
@@ -159,7 +168,15 @@ def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, 
 def test_an_edit_of_the_metrics_leaves_data_and_estimates(finished, every_job):
     finished.append("src/elastocal/metrics.py", "# an edit\n")
     untouched = of_rules(
-        every_job, "draw_experiments", "simulate", "measure", "summarize_initial", "identify", "compare_solvers", "draw_scheme"
+        every_job,
+        "draw_experiments",
+        "simulate",
+        "measure",
+        "summarize_initial",
+        "judge_design",
+        "identify",
+        "compare_solvers",
+        "draw_scheme",
     )
     assert finished.planned() == every_job - untouched
 
@@ -173,9 +190,10 @@ def test_every_rule_watches_the_sources_of_its_own_script():
     seen = []
     for file in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk")):
         for body in re.split(r"^rule ", file.read_text(encoding="utf-8"), flags=re.MULTILINE)[1:]:
-            script = re.search(r'"\.\./scripts/(\w+\.py)"', body)[1]
-            assert re.findall(r'sources\("(\w+\.py)"\)', body) == [script]
-            seen.append(script)
+            scripts = re.findall(r'"\.\./scripts/(\w+\.py)"', body)
+            assert re.findall(r'sources\("(\w+\.py)"\)', body) == scripts
+            assert len(scripts) == ("script:" in body)
+            seen += scripts
     assert sorted(seen) == SCRIPTS
 
 

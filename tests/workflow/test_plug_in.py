@@ -54,7 +54,8 @@ def test_another_robot_strategy_and_noise_level_make_a_study_of_their_own(unstar
 def test_an_added_robot_runs_no_job_of_the_others(finished):
     add(finished, "config/robots/ur10.yaml", UR10)
     finished.configure({"robots": ["kuka", "kuka_extended", "ur10"]})
-    grid = {"draw_experiments", "simulate", "measure", "identify", "evaluate", "bound", "summarize_initial", "compare_solvers"}
+    data = {"draw_experiments", "simulate", "measure"}
+    grid = data | {"judge_design", "identify", "evaluate", "bound", "summarize_initial", "compare_solvers"}
     planned = {job for job in finished.planned() if job[0] in grid}
     assert {job[0] for job in planned} == grid
     assert {job[1] for job in planned} == {"ur10"}
@@ -64,7 +65,7 @@ def test_an_added_strategy_runs_no_job_of_the_others(finished):
     add(finished, "config/strategies/2+6DoF-comb.yaml", TWO_AND_SIX)
     finished.configure({"strategies": ["6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb", "2+6DoF-comb"]})
     planned = finished.planned()
-    assert {job[3] for job in planned if job[0] in ("identify", "evaluate")} == {"2+6DoF-comb"}
+    assert {job[-1] for job in planned if job[0] in ("judge_design", "identify", "evaluate")} == {"2+6DoF-comb"}
     assert {job[0] for job in planned}.isdisjoint({"draw_experiments", "simulate", "measure", "summarize_initial"})
 
 

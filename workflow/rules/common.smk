@@ -33,8 +33,9 @@ wildcard_constraints:
 
 
 def sources(script):
-    """Package modules that a script runs: an edit of one of them reruns the jobs that depend on it, and no others."""
-    files = closure(ROOT / "workflow" / "scripts" / script, [ROOT / "src", ROOT / "workflow" / "scripts"])
+    """A script and the package modules that it runs: an edit of one reruns the jobs that depend on it, and no others."""
+    path = ROOT / "workflow" / "scripts" / script
+    files = [path, *closure(path, [ROOT / "src", ROOT / "workflow" / "scripts"])]
     return [file.relative_to(ROOT).as_posix() for file in files]
 
 

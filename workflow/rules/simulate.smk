@@ -15,7 +15,9 @@ rule draw_experiments:
     benchmark:
         "results/timings/draw_experiments/{robot}{test}.tsv"
     params:
-        robot=robot_document,
+        chain=lambda wildcards: robot_document(wildcards)["chain"],
+        lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
+        joint_limits_deg=lambda wildcards: robot_document(wildcards)["joint_limits_deg"],
         seed=config["seed"],
         loading=config["loading"] | {key: READINGS[key] for key in ("offset_frame", "joint_range")},
         purpose=lambda wildcards: "test" if wildcards.test else "identification",

@@ -1,7 +1,7 @@
 """Random configurations and wrenches of one robot."""
 
 from elastocal.provenance import provenance
-from elastocal.robot import robot_from_document
+from elastocal.robot import joint_limits, parse_chain
 from elastocal.simulation import Loading
 from elastocal.storage import write_table
 from elastocal.study.simulate import experiment_blocks
@@ -11,13 +11,14 @@ from job import run
 
 
 def draw_experiments(job):
-    settings = job.params
-    robot = robot_from_document(settings.robot)
+    settings, robot = job.params, job.wildcards.robot
+    chain = parse_chain(settings.chain, settings.lengths_m, robot)
+    limits = joint_limits(settings.joint_limits_deg, chain.coordinates, robot)
     loading = Loading(**settings.loading)
     blocks = experiment_blocks(
-        robot, job.wildcards.robot, settings.seed, loading, settings.purpose, settings.data_sets, settings.configurations
+        chain, limits, robot, settings.seed, loading, settings.purpose, settings.data_sets, settings.configurations
     )
-    write_table(job.output.experiments, experiments(robot.joints), blocks, provenance(settings))
+    write_table(job.output.experiments, experiments(chain.coordinates), blocks, provenance(settings))
 
 
 run(draw_experiments, snakemake)

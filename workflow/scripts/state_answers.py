@@ -25,7 +25,7 @@ def state_answers(job):
         titles=settings.titles,
         cells=settings.cells,
     )
-    write_text(job.output.answers, json.dumps(facts, indent=1, ensure_ascii=False))
+    write_text(job.output.answers, json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False))
 
 
 run(state_answers, snakemake)

@@ -16,7 +16,8 @@ if __name__ == "__main__":
     robot = robot_from_document(read_document("config/robots/kuka_extended.yaml"))
     readings = {key: config["readings"][key] for key in ("offset_frame", "joint_range")}
     experiments = random_experiments(
-        robot,
+        robot.chain,
+        robot.joint_limits,
         config["seed"],
         "kuka_extended",
         Loading(**config["loading"], **readings),

@@ -109,7 +109,8 @@ def _explanation(row):
 
 def _text_row(row):
     shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
-    return {"figure": row.quantity.replace("_", " "), "paper": f"{row.paper:g}", "ours": shown, "reading": row.reading}
+    reading = row.reading if isinstance(row.reading, str) else ""
+    return {"figure": row.quantity.replace("_", " "), "paper": f"{row.paper:g}", "ours": shown, "reading": reading}
 
 
 def _one_set_rows(comparison, table2):
@@ -139,7 +140,8 @@ def _one_set_rows(comparison, table2):
 def _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest):
     noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
     averaged = at[at.robot == robot].set_index("strategy")
-    best = averaged.deviation.idxmin()
+    # Strategies that are the same estimator differ by rounding; the first one listed speaks for them.
+    best = averaged.deviation.round(12).idxmin()
     worst = averaged.deviation.idxmax()
     ratio = deviation_ratio(metrics, replicates, robot, classical, best, noise_um, length)
     own = single[single.robot == robot]

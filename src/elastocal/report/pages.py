@@ -30,8 +30,8 @@ def write_report(path, facts, tables, figures):
         source.write_text(
             resources.files("elastocal.report").joinpath("study.typ").read_text(encoding="utf-8"), encoding="utf-8"
         )
-        (Path(folder) / "facts.json").write_text(json.dumps(facts), encoding="utf-8")
-        (Path(folder) / "tables.json").write_text(json.dumps(tables), encoding="utf-8")
+        (Path(folder) / "facts.json").write_text(json.dumps(facts, allow_nan=False), encoding="utf-8")
+        (Path(folder) / "tables.json").write_text(json.dumps(tables, allow_nan=False), encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)
         with appearing_whole(path) as partial:

@@ -7,12 +7,14 @@ from elastocal.study import SETS_PER_BLOCK
 from elastocal.study.columns import deflection_columns, experiment_columns, to_experiments
 
 
-def experiment_blocks(robot, key, seed, loading, purpose, data_sets, configurations):
+def experiment_blocks(chain, limits, key, seed, loading, purpose, data_sets, configurations):
     """Random experiments, in blocks of data sets.
 
     Parameters
     ----------
-    robot : Robot
+    chain : Chain
+    limits : ndarray (n, 2)
+        Joint limits in rad.
     key : str
         Name of the robot's file.
     seed : int
@@ -28,7 +30,7 @@ def experiment_blocks(robot, key, seed, loading, purpose, data_sets, configurati
     """
     for first in range(0, data_sets, SETS_PER_BLOCK):
         sets = range(first, min(first + SETS_PER_BLOCK, data_sets))
-        yield experiment_columns(sets, random_experiments(robot, seed, key, loading, purpose, sets, configurations))
+        yield experiment_columns(sets, random_experiments(chain, limits, seed, key, loading, purpose, sets, configurations))
 
 
 def ideal_blocks(experiments, robot, wrench_at):
