@@ -117,7 +117,7 @@ def average(blocks, judge, method, deviation_of, test_weights):
             values = compliance if method == "compliance" else 1.0 / compliance
             sums = sums + np.tensordot(weights, values, axes=1)
         if deviation_of == "each_data_set":
-            scores = scores + weights @ mean_deviation(judge, compliance)  # of these very test configurations
+            scores = scores + weights @ mean_deviation(judge, compliance)
     if method != "median":
         averaged = sums / total[:, None, None]
         averaged = averaged if method == "compliance" else 1.0 / averaged

@@ -238,14 +238,13 @@ def per_dataset_table(accuracy, bounds, points):
         noise.
     """
     frame = accuracy.rename(columns={"length": "ds"}).copy()
-    rms_per_noise = [
-        bounds[robot].query("points == @key").set_index("length").rms_per_noise.loc[ds]
-        for robot, key, ds in zip(frame.robot, ["+".join(sorted(points[s])) for s in frame.strategy], frame.ds, strict=True)
-    ]
+    limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()]).rename(columns={"length": "ds"})
+    frame["points"] = frame.strategy.map({strategy: "+".join(sorted(names)) for strategy, names in points.items()})
+    frame = frame.merge(limits, on=["robot", "points", "ds"], how="left", validate="many_to_one")
     result = frame[["strategy", "robot", "noise_um", "ds"]].copy()
     for name in ("mean", "rms", "p95", "max"):
         result[f"{name}_um"] = MICRO * frame[name]
-    result["crlb_rms_um"] = np.array(rms_per_noise) * frame.noise_um
+    result["crlb_rms_um"] = frame.rms_per_noise * frame.noise_um
     result["efficiency"] = (result.crlb_rms_um / result.rms_um).where(result.noise_um > 0) ** 2
     for name in ("mean", "rms", "p95", "max"):
         result[f"{name}_um_std_error"] = MICRO * frame[f"{name}_std_error"]

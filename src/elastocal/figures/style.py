@@ -61,6 +61,6 @@ def save(figure, pdf, png):
     pdf, png : str
         Paths; each file appears whole or not at all.
     """
-    for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 200, "metadata": {"Software": None}})):
+    for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
         with appearing_whole(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)

@@ -5,7 +5,7 @@ Covariance and condition number depend on configurations and loads alone, so the
 
 import numpy as np
 
-from elastocal.elastostatics import joint_torques, loaded_point, regressor
+from elastocal.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.identification import Readings, condition_numbers, covariance, estimate_compliance, undetermined_prefixes
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.study.columns import prefix_index_columns, to_experiments
@@ -35,15 +35,19 @@ class Design:
     """
 
     def __init__(self, experiments, chain, points, rows, wrench_at):
-        loaded = to_experiments(experiments)
-        self.joint_angles = configuration_first(loaded.joint_angles)
-        wrench = configuration_first(loaded.wrench)
-        self.torques, self.regressors = {}, {}
-        for name in points:
-            point = chain.point(name)
-            self.torques[name] = joint_torques(chain, self.joint_angles, wrench, loaded_point(chain, point, wrench_at))
-            jacobian = poses_and_jacobians(chain, self.joint_angles, point)[2]
-            self.regressors[name] = np.moveaxis(regressor(jacobian, self.torques[name]), (-2, -1), (0, 1))[:rows]
+        loads = to_experiments(experiments)
+        self.joint_angles, wrench = configuration_first(loads.joint_angles), configuration_first(loads.wrench)
+        loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
+        measured = {name: chain.point(name) for name in points}
+        jacobians = {
+            point: poses_and_jacobians(chain, self.joint_angles, point)[2] for point in {*loaded.values(), *measured.values()}
+        }
+        forces = {point: generalized_forces(jacobians[point], wrench) for point in {*loaded.values()}}
+        self.torques = {name: forces[loaded[name]] for name in points}
+        self.regressors = {
+            name: np.moveaxis(regressor(jacobians[measured[name]], self.torques[name]), (-2, -1), (0, 1))[:rows]
+            for name in points
+        }
 
 
 def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):

@@ -28,6 +28,7 @@ def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
         Columns of one block of the solvers table: one strategy in one block of data sets.
     """
     for experiments, deflections in blocks:
+        experiments, deflections = _first(experiments, length), {n: _first(d, length) for n, d in deflections.items()}
         sets = np.unique(experiments["data_set"])
         for strategy in strategies:
             situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
@@ -37,3 +38,9 @@ def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
             for j in range(chain.coordinates):
                 columns[f"equation_11_c{j + 1}"], columns[f"gauss_newton_c{j + 1}"] = linear[j], exact[j]
             yield columns
+
+
+def _first(block, length):
+    """Rows of the first configurations of each data set."""
+    kept = block["configuration"] < length
+    return {name: values[kept] for name, values in block.items()}
