@@ -239,14 +239,15 @@ def prefix_triangles(systems, pivots):
         triangle = np.zeros((pivots, *new.shape[1:])) if triangle is None else triangle.copy()
         for k in range(pivots):
             head, tail = triangle[k, k], new[:, k]
-            norm = np.sqrt(head * head + (tail * tail).sum(axis=0))
+            norm = np.sqrt(head * head + np.einsum("rs,rs->s", tail, tail))
             reflected = -np.copysign(norm, head)
             lead = head - reflected
             scale = norm * np.abs(lead)
-            weight = lead * triangle[k, k + 1 :] + (tail[:, None] * new[:, k + 1 :]).sum(axis=0)
+            weight = lead * triangle[k, k + 1 :] + np.einsum("rs,rcs->cs", tail, new[:, k + 1 :])
             weight /= np.where(scale > 0, scale, 1.0)
             triangle[k, k + 1 :] -= lead * weight
-            new[:, k + 1 :] -= tail[:, None] * weight
+            for row, factor in zip(new[:, k + 1 :], tail, strict=True):
+                row -= factor * weight
             triangle[k, k] = reflected
         prefixes.append(triangle)
     return np.stack(prefixes)

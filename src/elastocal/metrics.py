@@ -7,6 +7,9 @@ import numpy as np
 from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
 from elastocal.kinematics import poses_and_jacobians
 
+# Bounds the memory in which averaged models are scored.
+GROUPS_AT_A_TIME = 16
+
 
 @dataclass(frozen=True)
 class Judge:
@@ -118,8 +121,13 @@ def mean_deviation(judge, compliance, test_weights=None):
     """
     if test_weights is None:
         test_weights = np.ones((len(compliance), len(judge.initial_errors)))
-    means = [position_errors(judge, group) @ weights for group, weights in zip(compliance, test_weights, strict=True)]
-    return np.stack(means) / test_weights.sum(axis=1, keepdims=True)
+    groups, models, joints = compliance.shape
+    means = np.empty((groups, models))
+    for start in range(0, groups, GROUPS_AT_A_TIME):
+        part = slice(start, start + GROUPS_AT_A_TIME)
+        errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
+        means[part] = (errors @ test_weights[part, :, None])[..., 0]
+    return means / test_weights.sum(axis=1, keepdims=True)
 
 
 def relative_stiffness_error(compliance, true_compliance):
