@@ -9,7 +9,7 @@ import time
 
 from common import ROOT
 
-SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "src")
+SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src")
 
 
 def copy_study(folder):

@@ -257,3 +257,13 @@ def test_points_with_an_offset_are_shifted_in_their_own_frame(kuka):
         shifted, same = poses(kuka.chain, angles, replace(point, offset_m=(0.1, 0.2, -0.3)))
         np.testing.assert_allclose(shifted, position + rotation @ np.array([0.1, 0.2, -0.3]), rtol=0, atol=ROUNDING)
         np.testing.assert_array_equal(same, rotation)
+
+
+def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
+    rng, point = np.random.default_rng(5), kuka.chain.end_effector
+    first, second = random_angles(rng, kuka.chain, 12).reshape(3, 4, 6), random_angles(rng, kuka.chain, 12).reshape(3, 4, 6)
+    held = poses_and_jacobians(kuka.chain, first, point)
+    again = poses_and_jacobians(kuka.chain, second, point, out=held)
+    for new, old, expected in zip(again, held, poses_and_jacobians(kuka.chain, second, point), strict=True):
+        assert np.shares_memory(new, old)
+        np.testing.assert_array_equal(new, expected)

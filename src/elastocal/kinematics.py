@@ -38,7 +38,7 @@ def poses(chain, coordinates, point):
     return _batch_first(position, batch), _batch_first(rotation, batch)
 
 
-def poses_and_jacobians(chain, coordinates, point):
+def poses_and_jacobians(chain, coordinates, point, out=None):
     """Pose of a measuring point and its geometric Jacobian with respect to every coordinate of the chain.
 
     Parameters
@@ -47,6 +47,8 @@ def poses_and_jacobians(chain, coordinates, point):
     coordinates : array_like (..., n)
         Joint angles in rad (and springs of an extended chain in m or rad).
     point : MeasuringPoint
+    out : tuple, optional
+        What an earlier call for as many configurations returned; the results overwrite it and no memory is allocated.
 
     Returns
     -------
@@ -63,8 +65,12 @@ def poses_and_jacobians(chain, coordinates, point):
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]
-    position, rotation = np.empty((3, size)), np.empty((3, 3, size))
-    jacobian = np.empty((6, chain.coordinates, size))
+    shapes = ((3,), (3, 3), (6, chain.coordinates))
+    if out is None:
+        results = [np.empty((*shape, size)) for shape in shapes]
+    else:
+        results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
+    position, rotation, jacobian = results
     for part in _blocks(size):
         axes, origin, screws = _sweep(chain, np.ascontiguousarray(components[:, part]), point)
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
@@ -126,6 +132,12 @@ def _component_first(coordinates):
     coordinates = np.asarray(coordinates, float)
     batch = coordinates.shape[:-1]
     return np.moveaxis(coordinates, -1, 0).reshape(coordinates.shape[-1], -1), batch
+
+
+def _component_first_view(array, axes):
+    """Memory of a result of this module, component first."""
+    components = np.moveaxis(array, range(-axes, 0), range(axes))
+    return components.reshape(*components.shape[:axes], -1)
 
 
 def _batch_first(components, batch):
