@@ -104,10 +104,8 @@ def test_the_compliance_of_a_robot_reruns_that_robot(finished):
     finished.replace("config/robots/kuka_extended.yaml", "[0.54, ", "[0.55, ")
     robot = ["kuka_extended"]
     expected = (
-        jobs("draw_experiments", robot, ["", "/test"])
-        | jobs("simulate", robot, ["", "/test"])
+        jobs("simulate", robot, ["", "/test"])
         | jobs("measure", robot, NOISE)
-        | designed(robot)
         | identified_and_evaluated(robot)
         | jobs("bound", robot)
         | jobs("summarize_initial", robot)
