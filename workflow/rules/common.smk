@@ -1,6 +1,5 @@
 """What all rules share: the checked configuration, the names that paths are made of, and the sources behind each script."""
 
-import os
 import sys
 from pathlib import Path
 
@@ -16,10 +15,6 @@ try:
     STUDY = check_study(config, "config")
 except InputError as error:
     sys.exit(str(error))
-
-# glibc hands large arrays back to the kernel at each free and gets them again page by page; jobs keep them instead.
-for name in ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"):
-    os.environ.setdefault(name, str(2**30))
 
 NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"
