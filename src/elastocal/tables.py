@@ -79,15 +79,11 @@ def table3(metrics, robots, strategy, noise_um, length):
     """
     rows = []
     for robot in robots:
-        cell = _cell(metrics, robot, noise_um, strategy).set_index("length").loc[length]
-        names = [
-            f"compliance_{j}"
-            for j in range(1, len(cell) + 1)
-            if f"compliance_{j}" in cell and np.isfinite(cell[f"compliance_{j}"])
-        ]
+        cell = _by_length(metrics, robot, noise_um, strategy).loc[length]
         row = {"robot": robot}
-        for j, name in enumerate(names, 1):
-            row |= {f"c{j}": MICRO * cell[name], f"c{j}_std_error": MICRO * cell[f"{name}_std_error"]}
+        # A robot with fewer joints than another one of the same frame has empty columns for those that it lacks.
+        for j in range(1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1):
+            row |= {f"c{j}": MICRO * cell[f"compliance_{j}"], f"c{j}_std_error": MICRO * cell[f"compliance_{j}_std_error"]}
         rows.append(row)
     return pd.DataFrame(rows)
 
@@ -115,7 +111,7 @@ def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_li
     rows = []
     for strategy in strategies:
         for robot in robots:
-            cell = _cell(metrics, robot, noise_um, strategy).set_index("length")
+            cell = _by_length(metrics, robot, noise_um, strategy)
             drawn = _cell(replicates, robot, noise_um, strategy)
             at = cell.loc[length]
             row = {"strategy": strategy, "robot": robot}
@@ -151,7 +147,7 @@ def extended_table(metrics, replicates, robots, strategies, noise_um, length):
     rows = []
     for robot in robots:
         for strategy in strategies:
-            at = _cell(metrics, robot, noise_um, strategy).set_index("length").loc[length]
+            at = _by_length(metrics, robot, noise_um, strategy).loc[length]
             share, error = share_compensated(metrics, replicates, robot, strategy, noise_um, length)
             rows.append(
                 {
@@ -185,7 +181,7 @@ def share_compensated(metrics, replicates, robot, strategy, noise_um, length):
     -------
     share, std_error : float
     """
-    cell = _cell(metrics, robot, noise_um, strategy).set_index("length")
+    cell = _by_length(metrics, robot, noise_um, strategy)
     if cell.empty:
         return np.nan, np.nan
     at, drawn = cell.loc[length], _cell(replicates, robot, noise_um, strategy).query("length == @length")
@@ -210,7 +206,7 @@ def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length
     """
     values, drawn = [], []
     for name in (strategy, over):
-        cell = _cell(metrics, robot, noise_um, name).set_index("length")
+        cell = _by_length(metrics, robot, noise_um, name)
         if cell.empty:
             return np.nan, np.nan
         values.append(cell.deviation.loc[length])
@@ -294,7 +290,7 @@ def solver_summary(frames):
 
 
 def with_errors_merged(frame, digits=3):
-    """The same table for people: each value with its standard error behind a ± sign, an infinite length as "> longest".
+    """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
     Parameters
     ----------
@@ -363,6 +359,10 @@ def _largest_difference(values, others):
 
 def _cell(frame, robot, noise_um, strategy):
     return frame[(frame.robot == robot) & (frame.noise_um == noise_um) & (frame.strategy == strategy)]
+
+
+def _by_length(metrics, robot, noise_um, strategy):
+    return _cell(metrics, robot, noise_um, strategy).set_index("length")
 
 
 def _curves(drawn, name):
