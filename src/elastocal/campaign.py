@@ -1,0 +1,676 @@
+"""A measured campaign: what a tracker read of a robot, checked before anything is fitted to it.
+
+A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or ``measurements.parquet``, one row for each reading of
+one target. All that can be told wrong without fitting anything is refused here, in one line; a unit that only a fit can tell
+wrong is left for the diagnosis to trace.
+"""
+
+import csv
+import difflib
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+
+from elastocal.documents import check_document, read_document
+from elastocal.errors import InputError
+from elastocal.robot import Robot, robot_from_document
+from elastocal.storage import Column
+from elastocal.table_schemas import WRENCH
+from elastocal.whole_files import appearing_whole
+
+DOCUMENT, CSV, PARQUET = "campaign.yaml", "measurements.csv", "measurements.parquet"
+DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
+# Below these a fit or a test says nothing.
+FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
+
+# Readings of one pose share their joint angles up to what a controller's servo error can differ.
+_SAME_POSE_RAD = 0.02
+# No joint of a serial arm reports more than one and a half turns unless its limits say so.
+_FARTHEST_RAD = 3.0 * np.pi
+# A joint this far beyond its limits is no joint at its limit.
+_BEYOND_LIMITS_RAD = 0.5
+# Positions spread over more reaches than this are not in metres. Millimetres spread so unless all lie within centimetres.
+_FARTHEST_REACHES = 10.0
+# A target sits at most about this far from its measuring point.
+_LONGEST_TOOL_M = 1.0
+
+
+@dataclass(frozen=True)
+class Target:
+    """What is tracked.
+
+    Attributes
+    ----------
+    name : str
+    point : str
+        Measuring point of the chain on which it sits.
+    offset_m : tuple of float or None
+        In the frame of the point; None where unknown and fitted.
+    """
+
+    name: str
+    point: str
+    offset_m: tuple | None
+
+
+@dataclass(frozen=True)
+class Readings:
+    """One entry for each reading of one target; arrays of N.
+
+    Attributes
+    ----------
+    session, pose, load, repeat : ndarray of int32 (N,)
+        Session 0 where the file has no such column; load 0 is unloaded.
+    target : ndarray of int32 (N,)
+        Index into the campaign's targets.
+    joint_angles : ndarray (N, n)
+        The model's, rad: ``reported_matrix @ reported + reported_offset``.
+    wrench : ndarray (N, 6)
+        External wrench at the origin of the last measuring point, base axes; N, N m.
+    position : ndarray (N, 3)
+        m, in the campaign's frame.
+    rotation_vector : ndarray (N, 3) or None
+        rad; None where positions are measured.
+    approach : ndarray (N, n) or None
+        Sense in which each of the model's joints was approached, -1, 0 (not known) or +1.
+    time_s, temperature_c : ndarray (N,) or None
+    row : ndarray of int32 (N,)
+        Row in the file, 1 for the first of data; for messages.
+    """
+
+    session: np.ndarray
+    pose: np.ndarray
+    load: np.ndarray
+    repeat: np.ndarray
+    target: np.ndarray
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    position: np.ndarray
+    rotation_vector: np.ndarray | None
+    approach: np.ndarray | None
+    time_s: np.ndarray | None
+    temperature_c: np.ndarray | None
+    row: np.ndarray
+
+    def __len__(self):
+        return len(self.pose)
+
+    def select(self, mask_or_index):
+        """The readings of a mask or of an index array, in its order.
+
+        Parameters
+        ----------
+        mask_or_index : ndarray of bool (N,) or of int (M,)
+
+        Returns
+        -------
+        Readings
+        """
+        arrays = {field.name: getattr(self, field.name) for field in fields(self)}
+        return Readings(**{name: None if array is None else array[mask_or_index] for name, array in arrays.items()})
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign that holds together.
+
+    Attributes
+    ----------
+    name : str
+    robot : Robot
+    measured : {"position", "pose"}
+    frame : {"tracker", "base"}
+        tracker: the placement of the base in it is unknown, and another one in each session.
+    targets : tuple of Target
+    compliance : {"nominal", "identify"}
+    declared : tuple of str
+        Effects of the catalogue that the model already has.
+    noise : dict or None
+        ``position_m`` and maybe ``orientation_rad``, where the campaign declares them.
+    holdout : dict
+        ``fraction`` and ``seed``, or ``poses``, or ``campaign``.
+    readings : Readings
+    """
+
+    name: str
+    robot: Robot
+    measured: str
+    frame: str
+    targets: tuple
+    compliance: str
+    declared: tuple
+    noise: dict | None
+    holdout: dict
+    readings: Readings
+
+
+def measurement_columns(joints):
+    """Every column that a file of measurements may have.
+
+    Parameters
+    ----------
+    joints : int
+
+    Returns
+    -------
+    dict of str to Column
+    """
+    numbers = range(1, joints + 1)
+    columns = [
+        Column("session", "int32", "", "sessions have each their own tracker frame; 0 throughout where absent"),
+        Column("pose", "int32", "", "number of the pose in its session"),
+        Column("load", "int32", "", "number of the load, 0 where unloaded"),
+        Column("repeat", "int32", "", "number of the fresh approach to this pose and load"),
+        Column("target", "string", "", "name of the target that was read"),
+        *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} as the controller reports it") for j in numbers),
+        *(Column(name, "float64", unit, f"external {meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
+        *(Column(axis, "float64", "m", f"measured position along {axis}") for axis in "xyz"),
+        *(Column(f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}") for axis in "xyz"),
+        *(Column(f"approach{j}", "float64", "", f"sense of approach of joint {j}: -1, 0, +1") for j in numbers),
+        Column("time_s", "float64", "s", "time since any instant"),
+        Column("temperature_c", "float64", "°C", "temperature"),
+    ]
+    return {column.name: column for column in columns}
+
+
+def read_campaign(folder, robots_folder, effects=None):
+    """Read a campaign and check it as a whole.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Holds ``campaign.yaml`` and the measurements.
+    robots_folder : str or Path
+        Holds the robots that a campaign may name.
+    effects : iterable of str, optional
+        Names that ``declared`` may have; not checked without.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    InputError
+        The first fault found: file, row and column or key, what stands there and what may.
+    """
+    folder = Path(folder)
+    source = (folder / DOCUMENT).as_posix()
+    document = read_document(source)
+    check_document(document, "campaign", source)
+    robot = _robot(document["robot"], folder, robots_folder, source)
+    targets = _targets(document["targets"], robot.chain, source)
+    holdout = _holdout(document.get("holdout", DEFAULT_HOLDOUT), folder, source)
+    declared = tuple(document.get("declared", ()))
+    for index, name in enumerate(declared):
+        if effects is not None and name not in set(effects):
+            raise InputError(source, f"declared[{index}]", repr(name), _hinted(name, sorted(effects)))
+    measurements, columns, rows = _read_measurements(folder)
+    table = _Table(measurements, columns, rows, document["measured"], robot.joints)
+    readings = _readings(table, robot, targets)
+    _check_readings(readings, table, robot, targets, source)
+    _held_out(holdout, readings, source)
+    return Campaign(
+        name=document["campaign"],
+        robot=robot,
+        measured=document["measured"],
+        frame=document["frame"],
+        targets=targets,
+        compliance=document.get("compliance", "nominal"),
+        declared=declared,
+        noise=document.get("noise"),
+        holdout=holdout,
+        readings=readings,
+    )
+
+
+def split(campaign):
+    """Readings to fit and readings to test, parted by whole poses.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    training, held_out : Readings
+        In the order of the file, on which the choice of poses does not depend. Where another campaign is the test, all readings
+        are training and `held_out` is empty: see `held_out_campaign`.
+
+    Raises
+    ------
+    InputError
+        Too few poses, or poses that are not there.
+    """
+    held_out = _held_out(campaign.holdout, campaign.readings, campaign.name)
+    return campaign.readings.select(~held_out), campaign.readings.select(held_out)
+
+
+def held_out_campaign(campaign, folder, robots_folder, effects=None):
+    """The other campaign that tests this one.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    folder : str or Path
+        Folder of `campaign`.
+    robots_folder : str or Path
+    effects : iterable of str, optional
+        As in `read_campaign`.
+
+    Returns
+    -------
+    Campaign or None
+        With its own targets and frame; all of its readings are for the test. None where this campaign holds out its own.
+
+    Raises
+    ------
+    InputError
+        A fault of the other campaign, or another chain than this one's.
+    """
+    if "campaign" not in campaign.holdout:
+        return None
+    other_folder = Path(folder) / campaign.holdout["campaign"]
+    other = read_campaign(other_folder, robots_folder, effects)
+    source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
+    if other.robot.chain != campaign.robot.chain:
+        raise InputError(
+            source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
+        )
+    poses = len(_poses(other.readings)[0])
+    if poses < FEWEST_HELD_OUT_POSES:
+        raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
+    return other
+
+
+def write_campaign(folder, document, table, joints, kind="parquet"):
+    """Write a campaign's folder; each file appears whole or not at all, ``campaign.yaml`` last.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made where it is not there.
+    document : dict
+        Contents of ``campaign.yaml``.
+    table : dict of str to sequence
+        Columns of one length, named as in `measurement_columns`.
+    joints : int
+    kind : {"parquet", "csv"}
+
+    Raises
+    ------
+    InputError
+        A document that the schema refuses, or a column that the format does not have.
+    """
+    folder = Path(folder)
+    check_document(document, "campaign", (folder / DOCUMENT).as_posix())
+    known = measurement_columns(joints)
+    path = folder / (PARQUET if kind == "parquet" else CSV)
+    for name in table:
+        if name not in known:
+            raise InputError(path.as_posix(), "columns", repr(name), _hinted(name, list(known)))
+    columns = [known[name] for name in known if name in table]
+    folder.mkdir(parents=True, exist_ok=True)
+    # The folder is no campaign until its document is there, nor may it hold measurements of both kinds.
+    for name in (DOCUMENT, CSV, PARQUET):
+        (folder / name).unlink(missing_ok=True)
+    with appearing_whole(path) as partial:
+        _write_table(partial, columns, table, kind)
+    with appearing_whole(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
+        yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+
+
+def _write_table(path, columns, table, kind):
+    if kind == "csv":
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([column.name for column in columns])
+            # repr of a float is the shortest text that reads back as the same number.
+            writer.writerows(zip(*(np.asarray(table[column.name]).tolist() for column in columns), strict=True))
+        return
+    schema = pa.schema(
+        [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
+    )
+    arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in schema]
+    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path, compression="zstd")
+
+
+def _hinted(name, known):
+    """What is allowed instead of a name: the closest first."""
+    lower = {other.lower(): other for other in known}
+    close = difflib.get_close_matches(str(name).lower(), lower, n=1)
+    return f"{lower[close[0]]!r}? ({', '.join(known)})" if close else ", ".join(known)
+
+
+def _robot(name, folder, robots_folder, source):
+    known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
+    path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
+    if not path.is_file():
+        allowed = f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {_hinted(name, known)}"
+        raise InputError(source, "robot", repr(name), allowed)
+    document = read_document(path)
+    check_document(document, "robot", path.as_posix())
+    return robot_from_document(document, path.as_posix())
+
+
+def _targets(described, chain, source):
+    points = [point.name for point in chain.points]
+    targets = []
+    for name, target in described.items():
+        if not isinstance(name, str):
+            raise InputError(
+                source, "targets", f"the name {name!r}, which YAML takes for no text", "a name, in quotes where need be"
+            )
+        if target["point"] not in points:
+            allowed = f"a measuring point of the chain: {_hinted(target['point'], points)}"
+            raise InputError(source, f"targets.{name}.point", repr(target["point"]), allowed)
+        offset = target["offset_m"]
+        targets.append(Target(name, target["point"], None if offset == "unknown" else tuple(map(float, offset))))
+    return tuple(targets)
+
+
+def _holdout(described, folder, source):
+    ways = [way for way in ("fraction", "poses", "campaign") if way in described]
+    if len(ways) != 1 or ("seed" in described and ways != ["fraction"]):
+        allowed = "{fraction, seed}, {poses} or {campaign}"
+        raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
+    if "campaign" in described and not (folder / described["campaign"] / DOCUMENT).is_file():
+        raise InputError(
+            source, "holdout.campaign", repr(described["campaign"]), f"a folder with a {DOCUMENT}, relative to this one"
+        )
+    return {"fraction": described["fraction"], "seed": described.get("seed", 1)} if ways == ["fraction"] else dict(described)
+
+
+def _poses(readings):
+    """Sorted (session, pose) pairs (P, 2), and the index of each reading's pair (N,)."""
+    pairs = np.column_stack([readings.session, readings.pose])
+    unique, index = np.unique(pairs, axis=0, return_inverse=True)
+    return unique, index.ravel()
+
+
+def _held_out(holdout, readings, source):
+    """Mask (N,) of the readings that are held out."""
+    pairs, index = _poses(readings)
+    total, chosen = len(pairs), np.zeros(len(pairs), bool)
+    if "campaign" in holdout:
+        if total < FEWEST_TRAINING_POSES:
+            raise InputError(source, "holdout", f"{total} poses to fit", f"{FEWEST_TRAINING_POSES} or more poses")
+        return chosen[index]
+    if "poses" in holdout:
+        for entry in holdout["poses"]:
+            match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
+            if not match.any():
+                raise InputError(
+                    source, "holdout.poses", str(entry), f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
+                )
+            chosen |= match
+    else:
+        order = np.random.Generator(np.random.PCG64(holdout["seed"])).permutation(total)
+        chosen[order[: round(holdout["fraction"] * total)]] = True
+    held_out = int(chosen.sum())
+    if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
+        found = f"{total - held_out} poses to fit and {held_out} held out"
+        raise InputError(
+            source, "holdout", found, f"at least {FEWEST_TRAINING_POSES} to fit and {FEWEST_HELD_OUT_POSES} held out"
+        )
+    return chosen[index]
+
+
+def _read_measurements(folder):
+    """File, its columns (a list of cells or an array each) and the row number of each entry."""
+    there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
+    if len(there) != 1:
+        found = "both" if there else "neither"
+        raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
+    path = there[0].as_posix()
+    columns, rows = (_read_csv if there[0].name == CSV else _read_parquet)(path)
+    if len(rows) == 0:
+        raise InputError(path, "", "no row of data", "one row for each reading of one target")
+    return path, columns, rows
+
+
+def _read_csv(path):
+    try:
+        # A byte order mark is what spreadsheets write.
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            lines = list(csv.reader(file, skipinitialspace=True, strict=True))
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    except csv.Error as error:
+        raise InputError(path, "", str(error), "comma-separated values") from None
+    if not lines:
+        raise InputError(path, "", "an empty file", "a header and one row for each reading of one target")
+    header = [cell.strip() for cell in lines[0]]
+    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+        raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
+    for name in header:
+        if header.count(name) > 1:
+            raise InputError(path, "header", f"column {name!r} twice", "each column once")
+    kept = [(number, cells) for number, cells in enumerate(lines[1:], 1) if any(cell.strip() for cell in cells)]
+    for number, cells in kept:
+        if len(cells) != len(header):
+            raise InputError(path, f"row {number}", f"{len(cells)} cells", f"{len(header)}, one for each column of the header")
+    columns = dict(zip(header, zip(*(cells for _, cells in kept), strict=True), strict=True)) if kept else {}
+    return columns, np.array([number for number, _ in kept], np.int32)
+
+
+def _read_parquet(path):
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
+    for name in table.column_names:
+        if table.column_names.count(name) > 1:
+            raise InputError(path, "header", f"column {name!r} twice", "each column once")
+    return {name: table.column(name).to_pylist() for name in table.column_names}, np.arange(
+        1, table.num_rows + 1, dtype=np.int32
+    )
+
+
+class _Table:
+    """Columns of a file of measurements, checked one by one as they are asked for."""
+
+    def __init__(self, path, columns, rows, measured, joints):
+        self.path, self.columns, self.rows = path, columns, rows
+        known = measurement_columns(joints)
+        self.angles = [f"q{j}" for j in range(1, joints + 1)]
+        self.approach = [f"approach{j}" for j in range(1, joints + 1)]
+        self.wrench = [name for name, _, _ in WRENCH]
+        self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
+        for name in columns:
+            if name not in known:
+                raise self.fault(
+                    "header", f"the unknown column {name!r}", _hinted(name, [k for k in known if k not in columns])
+                )
+        required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
+        for group in (self.wrench, self.approach):
+            required += group if any(name in columns for name in group) else []
+        for name in required:
+            if name not in columns:
+                unit = f" in {known[name].unit}" if known[name].unit else ""
+                raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
+
+    def fault(self, key, found, allowed):
+        return InputError(self.path, key, found, allowed)
+
+    def cell_fault(self, index, name, found, allowed):
+        """Fault of one cell; `index` counts the readings."""
+        return self.fault(f"row {self.rows[index]}, column {name}", found, allowed)
+
+    def has(self, names):
+        return all(name in self.columns for name in names)
+
+    def numbers(self, names):
+        """ndarray (N, len(names)) of finite numbers."""
+        return np.column_stack([self._column(name) for name in names])
+
+    def integers(self, name):
+        """ndarray of int32 (N,)."""
+        values = self._column(name)
+        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
+        if wrong.any():
+            index = int(np.argmax(wrong))
+            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "an integer")
+        return values.astype(np.int32)
+
+    def texts(self, name):
+        """list of str (N,)."""
+        return [str(cell).strip() for cell in self.columns[name]]
+
+    def _column(self, name):
+        try:
+            values = np.array(self.columns[name], float)
+        except (ValueError, TypeError):
+            index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
+            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "a number with a decimal point") from None
+        if not np.isfinite(values).all():
+            index = int(np.argmin(np.isfinite(values)))
+            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "a finite number")
+        return values
+
+
+def _is_number(cell):
+    try:
+        np.array([cell], float)
+    except (ValueError, TypeError):
+        return False
+    return True
+
+
+def _shown(cell):
+    text = str(cell).strip() if cell is not None else ""
+    return repr(text[:40]) if text else "nothing"
+
+
+def _readings(table, robot, targets):
+    reported = table.numbers(table.angles)
+    _check_angles(reported, table, robot)
+    names = {target.name: index for index, target in enumerate(targets)}
+    labels = table.texts("target")
+    for index, label in enumerate(labels):
+        if label not in names:
+            raise table.cell_fault(index, "target", _shown(label), f"a target of {DOCUMENT}: {_hinted(label, list(names))}")
+    matrix = robot.reported_matrix
+    approach = None
+    if table.has(table.approach):
+        senses = table.numbers(table.approach)
+        wrong = ~np.isin(senses, (-1.0, 0.0, 1.0))
+        if wrong.any():
+            index, joint = np.argwhere(wrong)[0]
+            raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
+        # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
+        approach = np.sign(senses @ matrix.T)
+    return Readings(
+        session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
+        pose=table.integers("pose"),
+        load=table.integers("load"),
+        repeat=table.integers("repeat"),
+        target=np.array([names[label] for label in labels], np.int32),
+        joint_angles=reported @ matrix.T + robot.reported_offset,
+        wrench=table.numbers(table.wrench) if table.has(table.wrench) else np.zeros((len(table.rows), 6)),
+        position=table.numbers("xyz"),
+        rotation_vector=table.numbers(table.orientation) if table.orientation else None,
+        approach=approach,
+        time_s=table.numbers(["time_s"])[:, 0] if table.has(["time_s"]) else None,
+        temperature_c=table.numbers(["temperature_c"])[:, 0] if table.has(["temperature_c"]) else None,
+        row=table.rows,
+    )
+
+
+def _check_angles(reported, table, robot):
+    """Refuse degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps."""
+    low, high = robot.joint_limits.T
+    farthest = max(_FARTHEST_RAD, np.abs(robot.joint_limits).max())
+
+    def model(angles):
+        return angles @ robot.reported_matrix.T + robot.reported_offset
+
+    in_degrees = model(np.radians(reported))
+    beyond = (model(reported) < low - _BEYOND_LIMITS_RAD) | (model(reported) > high + _BEYOND_LIMITS_RAD)
+    wrong = (np.abs(reported) > farthest) | (beyond & (in_degrees >= low) & (in_degrees <= high))
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        limits = f"{low[joint]:.2f} to {high[joint]:.2f}"
+        raise table.cell_fault(
+            index, table.angles[joint], f"{reported[index, joint]:g}", f"rad, not degrees; the joint goes {limits} rad"
+        )
+
+
+def _check_readings(readings, table, robot, targets, source):
+    _check_duplicates(readings, table, targets)
+    _check_loads(readings, table)
+    _check_poses(readings, table)
+    _check_units(readings, table, robot, targets)
+    for index, target in enumerate(targets):
+        if not (readings.target == index).any():
+            raise InputError(
+                source, f"targets.{target.name}", "no reading of it", f"targets that {Path(table.path).name} has readings of"
+            )
+
+
+def _check_duplicates(readings, table, targets):
+    key = np.column_stack([readings.session, readings.pose, readings.load, readings.repeat, readings.target])
+    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    again = first[inverse.ravel()] != np.arange(len(readings))
+    if again.any():
+        index = int(np.argmax(again))
+        session, pose, load, repeat, target = key[index]
+        of_session = f"session {session}, " if "session" in table.columns else ""
+        found = f"{of_session}pose {pose}, load {load}, repeat {repeat}, target {targets[target].name} again"
+        earlier = table.rows[first[inverse.ravel()[index]]]
+        raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
+
+
+def _check_loads(readings, table):
+    unloaded = readings.load == 0
+    if not table.has(table.wrench) and not unloaded.all():
+        index = int(np.argmin(unloaded))
+        raise table.cell_fault(
+            index, "load", str(readings.load[index]), f"0 where there are no columns {', '.join(table.wrench)}"
+        )
+    wrong = unloaded[:, None] & (readings.wrench != 0)
+    if wrong.any():
+        index, component = np.argwhere(wrong)[0]
+        raise table.cell_fault(
+            index, table.wrench[component], f"{readings.wrench[index, component]:g} with load 0", "0 where load is 0"
+        )
+
+
+def _check_poses(readings, table):
+    pairs, pose_of = _poses(readings)
+    first = np.full(len(pairs), len(readings))
+    np.minimum.at(first, pose_of, np.arange(len(readings)))
+    reported = table.numbers(table.angles)
+    away = np.abs(reported - reported[first[pose_of]])
+    wrong = away > _SAME_POSE_RAD
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        earlier = table.rows[first[pose_of[index]]]
+        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
+        raise table.cell_fault(index, table.angles[joint], found, f"readings of one pose within {_SAME_POSE_RAD} rad")
+
+
+def _check_units(readings, table, robot, targets):
+    tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
+    reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
+    for session in np.unique(readings.session):
+        members = np.flatnonzero(readings.session == session)
+        position = readings.position[members]
+        away = np.abs(position - np.median(position, axis=0))
+        if away.max() > _FARTHEST_REACHES * reach:
+            index, axis = np.unravel_index(np.argmax(away), away.shape)
+            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the readings"
+            raise table.cell_fault(
+                members[index], "xyz"[axis], found, f"metres, not millimetres; the robot reaches {reach:.3g} m"
+            )
+    if readings.rotation_vector is not None:
+        angle = np.linalg.norm(readings.rotation_vector, axis=1)
+        if angle.max() > _FARTHEST_RAD:
+            index = int(np.argmax(angle))
+            raise table.cell_fault(
+                index, "rx, ry, rz", f"a turn of {angle[index]:.4g}", "a rotation vector in rad, not degrees"
+            )
