@@ -1,0 +1,24 @@
+"""A foundation that gives: shift and tilt of the foot under the load.
+
+Catalogue row 7: [I, -[p]x] C_b (F, p x F). Its compliance about the vertical is that of joint 1 and not counted again.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "base_compliance", "elastic"
+_PARAMETERS = (
+    Parameter("horizontal", "m/N", 2e-8),
+    Parameter("vertical", "m/N", 2e-8),
+    Parameter("tilt", "rad/(N m)", 1e-7),
+)
+
+
+def candidates(sites):
+    """One candidate, at the foot."""
+    tx, ty, tz, rx, ry, _ = sites.base
+
+    def displacement(circumstances):
+        load = circumstances.load
+        return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
+
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]

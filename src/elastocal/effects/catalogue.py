@@ -1,0 +1,62 @@
+"""All effects that are there: each module of this package that has a NAME."""
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+import elastocal.effects
+from elastocal.errors import InputError
+
+
+@cache
+def effects():
+    """Modules of the catalogue by the name of their effect.
+
+    Returns
+    -------
+    dict of str to module
+    """
+    names = sorted(module.name for module in pkgutil.iter_modules(elastocal.effects.__path__))
+    modules = [import_module(f"elastocal.effects.{name}") for name in names]
+    return {module.NAME: module for module in modules if hasattr(module, "NAME")}
+
+
+def candidates_on(sites):
+    """Every way in which an effect of the catalogue can act on a robot.
+
+    Parameters
+    ----------
+    sites : Sites
+
+    Returns
+    -------
+    dict of str to Candidate
+        By their keys.
+    """
+    found = [candidate for module in effects().values() for candidate in module.candidates(sites)]
+    return {candidate.key: candidate for candidate in found}
+
+
+def declared_candidates(names, sites, source="declared"):
+    """All candidates of the effects that a campaign declares.
+
+    Parameters
+    ----------
+    names : sequence of str
+    sites : Sites
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    list of Candidate
+
+    Raises
+    ------
+    InputError
+        An effect that the catalogue does not have.
+    """
+    for name in names:
+        if name not in effects():
+            raise InputError(source, "declared", repr(name), ", ".join(effects()))
+    return [candidate for name in names for candidate in effects()[name].candidates(sites)]

@@ -1,0 +1,25 @@
+"""Torque of a spring or gas gravity compensator on the shoulder.
+
+Catalogue row 10: T = K a L (1 - s0/s) sin(alpha + q), s^2 = a^2 + L^2 + 2 a L cos(alpha + q). For a short
+crank, a << L, it is a sine of q and of 2q with unknown phases; the compliance of the joint turns it into an angle.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "compensator_torque", "gravity"
+_PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order in (1, 2) for wave in ("cos", "sin"))
+
+
+def candidates(sites):
+    """One candidate, on the first joint that carries weight."""
+    joint = sites.shoulder
+    if joint is None:
+        return []
+
+    def displacement(circumstances):
+        angle = circumstances.joint_angles[:, joint]
+        return [{joint: wave(order * angle)} for order in (1, 2) for wave in (np.cos, np.sin)]
+
+    return [Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)]

@@ -1,0 +1,23 @@
+"""A tracker or a foot that wanders: a rigid motion of all readings, linear in time.
+
+Catalogue row 23.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "frame_drift", "drift"
+_PARAMETERS = (
+    *(Parameter(f"d{axis}", "m/h", 2e-4) for axis in "xyz"),
+    *(Parameter(f"r{axis}", "rad/h", 1e-4) for axis in "xyz"),
+)
+_HOUR_S = 3600.0
+
+
+def candidates(sites):
+    """One candidate, at the foot."""
+
+    def displacement(circumstances):
+        hours = (circumstances.time_s - circumstances.time_s.min()) / _HOUR_S
+        return [{coordinate: hours} for coordinate in sites.base]
+
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}))]

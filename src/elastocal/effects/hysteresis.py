@@ -1,0 +1,21 @@
+"""Friction and backlash that hold a joint back on the side from which it came: J_i h_i s_i, s_i the sense of approach.
+
+Catalogue row 14. Where the approach is not recorded this is part of the repeatability.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+NAME, FAMILY = "hysteresis", "gearbox"
+_PARAMETERS = (Parameter("half_width", "rad", 1e-4),)
+
+
+def candidates(sites):
+    """One candidate a joint."""
+
+    def at(joint):
+        def displacement(circumstances):
+            return [{joint: circumstances.approach[:, joint]}]
+
+        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"approach"}))
+
+    return per_joint(sites, at)

@@ -1,0 +1,16 @@
+"""The reduced model itself: each joint a spring, theta_i = c_i tau_i (equation 7).
+
+No NAME, for it is no missing effect: the declared model has it where the compliances are to be identified.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+
+def candidate(sites):
+    """Compliances of all joints as one candidate."""
+
+    def displacement(circumstances):
+        return [{joint: circumstances.load[:, joint]} for joint in range(sites.joints)]
+
+    parameters = tuple(Parameter(f"c{joint + 1}", "rad/(N m)", 1e-5) for joint in range(sites.joints))
+    return Candidate("joint_compliance", "declared", (), "", parameters, displacement, frozenset({"load"}))

@@ -1,0 +1,24 @@
+"""A joint compliance that changes with the angle of the joint: J_i tau_i (u cos q_i + v sin q_i).
+
+Catalogue row 16.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+NAME, FAMILY = "joint_dependent_stiffness", "elastic"
+_PARAMETERS = (Parameter("cos_q", "rad/(N m)", 2e-7), Parameter("sin_q", "rad/(N m)", 2e-7))
+
+
+def candidates(sites):
+    """One candidate a joint."""
+
+    def at(joint):
+        def displacement(circumstances):
+            angle, torque = circumstances.joint_angles[:, joint], circumstances.load[:, joint]
+            return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
+
+        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))
+
+    return per_joint(sites, at)

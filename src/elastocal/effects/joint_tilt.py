@@ -1,0 +1,24 @@
+"""A bearing that tilts across its axis under the moment that it carries.
+
+Catalogue row 6: a turn (e . M_i) / k about each of the two axes e across the joint's own, at the joint.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+NAME, FAMILY = "joint_tilt", "elastic"
+
+
+def candidates(sites):
+    """One candidate a joint, with one compliance for each axis across its own."""
+
+    def at(joint):
+        across = [axis for axis in range(3) if axis != sites.joint_axes[joint]]
+        parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7) for axis in across)
+        coordinates = [sites.tilt[joint][axis] for axis in across]
+
+        def displacement(circumstances):
+            return [{c: circumstances.load[:, c]} for c in coordinates]
+
+        return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
+
+    return per_joint(sites, at)

@@ -1,0 +1,41 @@
+"""A link that bends and twists: a cantilever between two joints.
+
+Catalogue row 5, Euler-Bernoulli and St Venant: with the wrench at the far end in a frame with x along the link,
+y = F_y l^3/3EI + M_z l^2/2EI, r_z = F_y l^2/2EI + M_z l/EI, likewise in the other plane, r_x = M_x l/GJ. Linear in 1/EI
+and 1/GJ. Stretching is some hundred times less than bending and left out.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "link_elasticity", "elastic"
+# One per mille of the bending compliance of a solid steel rod of 0.1 m is 1e-9; thin-walled cast arms reach 1e-6.
+_PARAMETERS = (Parameter("bending_1_over_EI", "1/(N m^2)", 3e-7), Parameter("torsion_1_over_GJ", "1/(N m^2)", 3e-7))
+_SHORTEST_M = 0.05
+
+
+def candidates(sites):
+    """One candidate a link with a length, named by the joint before it; the column before joint 1 is `base_compliance`."""
+    long = [k for k in range(1, sites.joints + 1) if np.linalg.norm(sites.link_vectors_m[k]) > _SHORTEST_M]
+    return [_candidate(sites, link) for link in long]
+
+
+def _candidate(sites, link):
+    vector = sites.link_vectors_m[link]
+    length = np.linalg.norm(vector)
+    along = vector / length
+    coordinates = sites.link_end[link]
+
+    def displacement(circumstances):
+        force, moment = np.split(circumstances.load[:, coordinates], 2, axis=1)
+        across, twist = force - np.outer(force @ along, along), np.outer(moment @ along, along)
+        bending = moment - twist
+        shift = length**3 / 3 * across + length**2 / 2 * np.cross(bending, along)
+        turn = length**2 / 2 * np.cross(along, across) + length * bending
+        return [
+            dict(zip(coordinates, np.concatenate([shift, turn], axis=1).T, strict=True)),
+            dict(zip(coordinates[3:], (length * twist).T, strict=True)),
+        ]
+
+    return Candidate(NAME, FAMILY, (link,), "", _PARAMETERS, displacement, frozenset({"load"}))

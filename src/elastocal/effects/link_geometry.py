@@ -1,0 +1,27 @@
+"""Wrong dimensions of a link: a constant displacement and turn at its far end, in the frame of the chain there.
+
+Catalogue row 2: what Denavit-Hartenberg (or Hayati) parameters can be wrong by, to first order, without their singularities.
+Components that other links, the base or the tool make as well are not identifiable and are held by the fit.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+NAME, FAMILY = "link_geometry", "geometry"
+_PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(
+    Parameter(f"r{axis}", "rad", 1e-3) for axis in "xyz"
+)
+
+
+def candidates(sites):
+    """One candidate a link behind a joint, named by that joint; the column before joint 1 belongs to the base."""
+
+    def at(joint):
+        def displacement(circumstances):
+            ones = np.ones(len(circumstances.joint_angles))
+            return [{coordinate: ones} for coordinate in sites.link_end[joint + 1]]
+
+        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)
+
+    return per_joint(sites, at)

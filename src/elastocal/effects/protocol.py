@@ -1,0 +1,181 @@
+"""What every effect of the catalogue is: candidates, each with named parameters and the displacements that they make.
+
+An effect is a module of this package with
+
+- ``NAME`` and ``FAMILY``, as in the design's table;
+- ``candidates(sites)``, which lists where on this robot the effect can act.
+
+Nothing else knows the effects by name: a new module is a new effect.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.elastostatics import generalized_forces
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.robot import MeasuringPoint
+from elastocal.sites import Sites
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One unknown of an effect.
+
+    Attributes
+    ----------
+    name, unit : str
+    plausible : float
+        Magnitude that such an effect can reach on a real robot; a parameter that the data cannot tell from zero even at this
+        size is not estimated.
+    """
+
+    name: str
+    unit: str
+    plausible: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """An unknown in which the effect is not linear.
+
+    Attributes
+    ----------
+    name, unit : str
+    start : float
+        Where the search starts.
+    lowest, highest : float
+        Range in which the law keeps its meaning.
+    """
+
+    name: str
+    unit: str
+    start: float
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way in which one effect can act on this robot.
+
+    Attributes
+    ----------
+    effect, family : str
+    joints : tuple of int
+        Joints concerned, counted from 1; empty where the effect belongs to no joint.
+    detail : str
+        Which variant, where an effect has more than one for these joints.
+    parameters : tuple of Parameter
+        In which the displacement is linear.
+    displacement : callable
+        ``displacement(circumstances, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
+        displacement per unit of the parameter, ndarray (S,).
+    needs : frozenset of str
+        What must be in the data: "load", "approach", "time", "temperature".
+    shapes : tuple of Shape
+    distinct_angles : int
+        How many different angles of its joints the law needs to be told from a smooth one.
+    """
+
+    effect: str
+    family: str
+    joints: tuple
+    detail: str
+    parameters: tuple
+    displacement: Callable
+    needs: frozenset = frozenset()
+    shapes: tuple = ()
+    distinct_angles: int = 0
+
+    @property
+    def key(self):
+        """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
+        where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
+        return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """Everything that an effect may depend on, for S states of the robot.
+
+    Attributes
+    ----------
+    sites : Sites
+    compliance : ndarray (n,)
+        Joint compliances, rad/(N m).
+    joint_angles : ndarray (S, n)
+        rad.
+    wrench : ndarray (S, 6)
+        N, N m, at the last measuring point, base axes.
+    load : ndarray (S, C)
+        Generalized force of that wrench on every coordinate of the sites (equation 7): N on translations, N m on rotations.
+    weight : ndarray (n + 1, S, C)
+        Generalized force on every coordinate of one kilogram at the far end of each link.
+    end_jacobian : ndarray (S, 6, n)
+        Of the last measuring point, with respect to the joints.
+    end_rotation : ndarray (S, 3, 3)
+    approach : ndarray (S, n) or None
+    time_s, temperature_c : ndarray (S,) or None
+    """
+
+    sites: Sites
+    compliance: np.ndarray
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    load: np.ndarray
+    weight: np.ndarray
+    end_jacobian: np.ndarray
+    end_rotation: np.ndarray
+    approach: np.ndarray | None = None
+    time_s: np.ndarray | None = None
+    temperature_c: np.ndarray | None = None
+
+    def joint_deflections(self, wrench):
+        """Turn of each joint under another wrench at the last measuring point: c J^T w, ndarray (S, n)."""
+        return generalized_forces(self.end_jacobian, wrench) * self.compliance
+
+
+def circumstances_of(sites, compliance, states):
+    """What effects may depend on, in some states.
+
+    Parameters
+    ----------
+    sites : Sites
+    compliance : ndarray (n,)
+        rad/(N m).
+    states : States
+
+    Returns
+    -------
+    Circumstances
+    """
+    chain, n = sites.chain, sites.joints
+    coordinates = np.zeros((len(states), chain.coordinates))
+    coordinates[:, :n] = states.joint_angles
+    end = MeasuringPoint("end", chain.end_effector.after)
+    _, rotation, jacobian = poses_and_jacobians(chain, coordinates, end)
+    weight = np.empty((n + 1, len(states), chain.coordinates))
+    for link in range(n + 1):
+        weight[link] = -STANDARD_GRAVITY * poses_and_jacobians(chain, coordinates, sites.far_end(link))[2][:, 2]
+    return Circumstances(
+        sites,
+        np.asarray(compliance),
+        states.joint_angles,
+        states.wrench,
+        generalized_forces(jacobian, states.wrench),
+        weight,
+        jacobian[..., :n],
+        rotation,
+        states.approach,
+        states.time_s,
+        states.temperature_c,
+    )
+
+
+def per_joint(sites, make):
+    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each joint."""
+    return [make(joint) for joint in range(sites.joints)]

@@ -1,0 +1,229 @@
+"""Robust generalized least squares on the composite model, by Gauss-Newton steps on exact predictions.
+
+What the data cannot tell is named and held: going through the parameters in their order, one that its predecessors explain so
+well that its standard error would exceed its plausible size keeps its value and is listed. Nothing is regularised.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import brentq
+from scipy.stats import chi2
+from statsmodels.robust.norms import HuberT
+
+from elastocal.model import circumstances, linearize, parameters, residuals, stepped
+from elastocal.noise import Noise
+from elastocal.registration import registered
+from elastocal.whitening import Whitening, whitening
+
+_STEPS = 30
+# Largest step that remains, in standard errors.
+_SETTLED = 1e-3
+# Observations beyond this quantile of their distance lose weight.
+_HUBER_QUANTILE = 0.99
+_DISCREPANCY_ROUNDS = 6
+# Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
+_ABOVE_NOISE = 1.02
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to observations.
+
+    Attributes
+    ----------
+    model : Model
+    estimate : Estimate
+    noise : Noise
+    discrepancy_m : float
+        See `whitening.whitening`; brings the mean square of the whitened residual to one.
+    held : ndarray of bool (P,)
+        Parameters that the data cannot tell.
+    covariance : ndarray (P, P)
+        Of the parameters; zero where held.
+    weights : ndarray (M,)
+        Robust weight of each observation.
+    whitener : Whitening
+    residual : ndarray (M, rows)
+        m and rad, base axes.
+    """
+
+    model: object
+    estimate: object
+    noise: Noise
+    discrepancy_m: float
+    held: np.ndarray
+    covariance: np.ndarray
+    weights: np.ndarray
+    whitener: Whitening
+    residual: np.ndarray
+
+    @property
+    def parameters(self):
+        """As `model.parameters`."""
+        return parameters(self.model, self.estimate)
+
+    @property
+    def degrees_of_freedom(self):
+        """Rows less fitted parameters."""
+        return self.residual.size - int((~self.held).sum())
+
+    def whitened(self, values):
+        """Rows (M, rows, ...) weighted and whitened as in the fit."""
+        weights = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
+        return self.whitener.apply(values * weights)
+
+
+def fit(model, observations, noise, start=None):
+    """Fit a model.
+
+    Parameters
+    ----------
+    model : Model
+    observations : Observations
+    noise : Noise
+    start : Estimate, optional
+        Of this model; by `registered` without.
+
+    Returns
+    -------
+    Fit
+    """
+    start = registered(model, observations) if start is None else start
+    discrepancy = 0.0
+    found = _robustly(model, observations, noise, start, discrepancy)
+    for _ in range(_DISCREPANCY_ROUNDS):
+        before, discrepancy = discrepancy, _discrepancy(found, observations)
+        if abs(discrepancy - before) <= 0.01 * max(discrepancy, before):
+            break
+        found = _robustly(model, observations, noise, found.estimate, discrepancy)
+    return found
+
+
+def fit_frames(fitted, model, observations, noise):
+    """Fit frames and targets of other observations; everything else stays as it was found.
+
+    Parameters
+    ----------
+    fitted : Fit
+    model : Model
+        The same effects with the targets of these observations.
+    observations : Observations
+    noise : Noise
+
+    Returns
+    -------
+    Estimate
+    """
+    start = registered(model, observations)
+    start = replace(start, coefficients=fitted.estimate.coefficients, shapes=fitted.estimate.shapes)
+    frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
+    return _robustly(model, observations, noise, start, fitted.discrepancy_m, frozen).estimate
+
+
+def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
+    rows = observations.rows
+    norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
+    plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
+    typical = np.sqrt(chi2.median(rows) / rows)
+    weights = np.ones(len(observations))
+    for step_number in range(_STEPS):
+        around = circumstances(model, estimate, observations.states)
+        line = linearize(model, estimate, observations, around)
+        whitener = whitening(observations, line.coordinate_jacobian[..., : model.sites.joints], noise, discrepancy)
+        if step_number:
+            distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
+            weights = norm.weights(distance / max(np.median(distance) / typical, 1.0))
+        root = np.sqrt(weights)
+        right = whitener.apply(line.residual * root[:, None]).reshape(-1)
+        left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
+        step, covariance, held = solve_identifiable(left, right, plausible, frozen)
+        estimate = stepped(model, estimate, step)
+        deviation = np.sqrt(np.diag(covariance))
+        if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
+            break
+    residual = residuals(model, estimate, observations, circumstances(model, estimate, observations.states))
+    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual)
+
+
+def solve_identifiable(left, right, plausible, frozen=False):
+    """Least squares over the parameters that the data can tell.
+
+    Parameters
+    ----------
+    left : ndarray (R, P)
+        Whitened sensitivities.
+    right : ndarray (R,)
+        Whitened residual.
+    plausible : ndarray (P,)
+        Plausible size of each parameter.
+    frozen : bool or ndarray of bool (P,)
+        Parameters not to move.
+
+    Returns
+    -------
+    step : ndarray (P,)
+        Zero where held.
+    covariance : ndarray (P, P)
+    held : ndarray of bool (P,)
+    """
+    scaled = left * plausible
+    gram = scaled.T @ scaled
+    held = ~identifiable(gram, np.broadcast_to(frozen, len(plausible)))
+    free = np.flatnonzero(~held)
+    step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
+    if len(free):
+        inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
+        step[free] = plausible[free] * (inverse.T @ (inverse @ (scaled[:, free].T @ right)))
+        covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
+    return step, covariance, held
+
+
+def identifiable(gram, frozen):
+    """Which parameters the data can tell from zero at their plausible size, given the parameters before them.
+
+    Parameters
+    ----------
+    gram : ndarray (P, P)
+        Information on the parameters, each in units of its plausible size.
+    frozen : ndarray of bool (P,)
+        Left out from the start.
+
+    Returns
+    -------
+    ndarray of bool (P,)
+    """
+    kept = []
+    factor = np.zeros_like(gram)
+    for number in range(len(gram)):
+        if frozen[number]:
+            continue
+        row = solve_triangular(factor[: len(kept), : len(kept)], gram[kept, number], lower=True) if kept else np.zeros(0)
+        left_over = gram[number, number] - row @ row
+        # Rounding of the squares counts as nothing.
+        if left_over > max(1.0, 1e-11 * gram[number, number]):
+            factor[len(kept), : len(kept)], factor[len(kept), len(kept)] = row, np.sqrt(left_over)
+            kept.append(number)
+    mask = np.zeros(len(gram), bool)
+    mask[kept] = True
+    return mask
+
+
+def _discrepancy(found, observations):
+    """Standard deviation that brings the mean square of the whitened residual to one."""
+    around = circumstances(found.model, found.estimate, observations.states)
+    joints = found.model.sites.joints
+    jacobian = linearize(
+        replace(found.model, effects=()), replace(found.estimate, coefficients=(), shapes=()), observations, around
+    ).coordinate_jacobian[..., :joints]
+    weighted = found.residual * np.sqrt(found.weights)[:, None]
+    freedom = found.degrees_of_freedom
+
+    def excess(discrepancy):
+        whitened = whitening(observations, jacobian, found.noise, discrepancy).apply(weighted)
+        return (whitened**2).sum() / freedom - 1.0
+
+    if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
+        return 0.0
+    return brentq(excess, 0.0, 10 * np.sqrt((weighted[:, :3] ** 2).mean()) + found.noise.position_m, rtol=1e-3)

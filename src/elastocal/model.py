@@ -1,0 +1,409 @@
+"""The composite measurement model: nominal robot + frames + targets + any set of effects, with exact poses and sensitivities.
+
+Effects move the robot through the coordinates of its `Sites`; the exact kinematics of that chain predicts every reading, and
+the chain's Jacobian times the displacement per parameter is the sensitivity. Residuals are in base axes, whatever frame was
+measured in.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.protocol import Parameter, circumstances_of
+from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.sites import Sites, sites_of
+
+_LENGTH = ("dx", "dy", "dz")
+_TURN = ("rx", "ry", "rz")
+# Frames and targets may be anywhere in a workshop.
+_ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
+# Relative step of the central difference in a shape parameter.
+_SHAPE_STEP = 1e-4
+
+
+@dataclass(frozen=True)
+class Model:
+    """What is taken to make the readings.
+
+    Attributes
+    ----------
+    sites : Sites
+    targets : tuple of Target
+        As in the campaign; those without an offset are fitted.
+    fitted_frames : bool
+        Whether the placement of the base is unknown, one for each session.
+    rows : int
+        3 where positions are measured, 6 where poses are.
+    nominal_compliance : ndarray (n,)
+        rad/(N m).
+    effects : tuple of Candidate
+        Joint compliances, where they are identified, among them.
+    """
+
+    sites: Sites
+    targets: tuple
+    fitted_frames: bool
+    rows: int
+    nominal_compliance: np.ndarray
+    effects: tuple = ()
+
+    @property
+    def identifies_compliance(self):
+        """Whether the joint compliances are parameters."""
+        return any(effect.effect == "joint_compliance" for effect in self.effects)
+
+    def with_effects(self, effects):
+        """The same model with more effects."""
+        return replace(self, effects=(*self.effects, *effects))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Values of everything that a model leaves open.
+
+    Attributes
+    ----------
+    sessions : tuple of int
+    frame_rotation, frame_position : ndarray (K, 3, 3), (K, 3)
+        Placement of the base in the frame of each session.
+    target_offset, target_rotation : ndarray (T, 3), (T, 3, 3)
+        Each target in the frame of its measuring point, m.
+    coefficients : tuple of ndarray
+        Linear parameters of each effect.
+    shapes : tuple of ndarray
+        Shape parameters of each effect.
+    """
+
+    sessions: tuple
+    frame_rotation: np.ndarray
+    frame_position: np.ndarray
+    target_offset: np.ndarray
+    target_rotation: np.ndarray
+    coefficients: tuple = ()
+    shapes: tuple = ()
+
+    def with_effects(self, effects):
+        """The same estimate with more effects, all of them at zero."""
+        return replace(
+            self,
+            coefficients=(*self.coefficients, *(np.zeros(len(effect.parameters)) for effect in effects)),
+            shapes=(*self.shapes, *(np.array([shape.start for shape in effect.shapes]) for effect in effects)),
+        )
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """A model about an estimate, for M observations.
+
+    Attributes
+    ----------
+    residual : ndarray (M, rows)
+        Measured less predicted, base axes, m and rad.
+    coordinate_jacobian : ndarray (M, rows, C)
+        Of each target with respect to the coordinates of the sites.
+    sensitivities : ndarray (M, rows, P)
+        With respect to `parameters`.
+    """
+
+    residual: np.ndarray
+    coordinate_jacobian: np.ndarray
+    sensitivities: np.ndarray
+
+
+def declared_model(campaign, effects=()):
+    """The model that a campaign declares.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    effects : sequence of Candidate
+        Declared effects.
+
+    Returns
+    -------
+    Model
+    """
+    sites = sites_of(campaign.robot.chain)
+    springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
+    return Model(
+        sites,
+        campaign.targets,
+        campaign.frame == "tracker",
+        6 if campaign.measured == "pose" else 3,
+        campaign.robot.compliance,
+        (*springs, *effects),
+    )
+
+
+def circumstances(model, estimate, states):
+    """What the effects of a model may depend on, in some states.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+        Its joint compliances, where they are parameters, turn loads into deflections.
+    states : States
+
+    Returns
+    -------
+    Circumstances
+    """
+    return circumstances_of(model.sites, joint_compliances(model, estimate), states)
+
+
+def joint_compliances(model, estimate):
+    """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones where they are parameters."""
+    for effect, values in zip(model.effects, estimate.coefficients, strict=True):
+        if effect.effect == "joint_compliance":
+            return values
+    return model.nominal_compliance
+
+
+def parameters(model, estimate):
+    """Everything that is fitted, in the order of the sensitivities.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+
+    Returns
+    -------
+    list of (str, Parameter)
+        What it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
+    """
+    found = []
+    shift = [Parameter(name, "m", _ANYWHERE_M) for name in _LENGTH]
+    turn = [Parameter(name, "rad", _ANYWHERE_RAD) for name in _TURN]
+    if model.fitted_frames:
+        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in (*shift, *turn)]
+    for target in model.targets:
+        if target.offset_m is None:
+            found += [(f"target {target.name}", parameter) for parameter in (*shift, *(turn if model.rows == 6 else ()))]
+    for effect in model.effects:
+        found += [(effect.key, parameter) for parameter in effect.parameters]
+        found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
+    return found
+
+
+def predict(model, estimate, observations, circumstances):
+    """Exact poses of the targets, in base axes.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    observations : Observations
+    circumstances : Circumstances
+        Of the states of the observations.
+
+    Returns
+    -------
+    position : ndarray (M, 3)
+    rotation : ndarray (M, 3, 3)
+    """
+    coordinates = displaced_coordinates(model, estimate, circumstances)
+    position, rotation = np.empty((len(observations), 3)), np.empty((len(observations), 3, 3))
+    for index, point in _points(model, estimate):
+        mask = observations.target == index
+        position[mask], rotation[mask] = poses(model.sites.chain, coordinates[observations.state[mask]], point)
+        rotation[mask] = rotation[mask] @ estimate.target_rotation[index]
+    return position, rotation
+
+
+def residuals(model, estimate, observations, circumstances):
+    """Measured less predicted, in base axes.
+
+    Parameters
+    ----------
+    model, estimate, observations, circumstances
+        As in `predict`.
+
+    Returns
+    -------
+    ndarray (M, rows)
+        m and, where poses are measured, rad.
+    """
+    position, rotation = predict(model, estimate, observations, circumstances)
+    return _differences(measured_in_base(estimate, observations), position, rotation)
+
+
+def linearize(model, estimate, observations, circumstances):
+    """Residuals of a model and their sensitivities.
+
+    Parameters
+    ----------
+    model, estimate, observations, circumstances
+        As in `predict`.
+
+    Returns
+    -------
+    Linearization
+    """
+    coordinates = displaced_coordinates(model, estimate, circumstances)
+    count, rows = len(observations), model.rows
+    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+    jacobian = np.empty((rows, model.sites.chain.coordinates, count))
+    for index, point in _points(model, estimate):
+        mask = observations.target == index
+        position[mask], rotation[mask], at_point = poses_and_jacobians(
+            model.sites.chain, coordinates[observations.state[mask]], point
+        )
+        jacobian[..., mask] = np.moveaxis(at_point, 0, -1)[:rows]
+    residual = _differences(
+        measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
+    )
+    jacobian = np.moveaxis(jacobian, -1, 0)
+    columns = []
+    if model.fitted_frames:
+        at_base = jacobian[..., list(model.sites.base)]
+        for session in estimate.sessions:
+            in_session = observations.states.session[observations.state] == session
+            columns.append(at_base * in_session[:, None, None])
+    for index, target in enumerate(model.targets):
+        if target.offset_m is None:
+            columns.append(_target_columns(rotation, observations.target == index, rows))
+    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        columns.append(effect_columns([(effect, shapes)], circumstances, jacobian, observations.state))
+        columns.append(_shape_columns(effect, values, shapes, circumstances, jacobian, observations.state))
+    sensitivities = np.concatenate(columns, axis=-1) if columns else np.empty((count, rows, 0))
+    return Linearization(residual, jacobian, sensitivities)
+
+
+def effect_columns(effects, circumstances, coordinate_jacobian, state):
+    """Sensitivities of the readings to the linear parameters of effects.
+
+    Parameters
+    ----------
+    effects : sequence of (Candidate, sequence of float)
+        With their shape parameters.
+    circumstances : Circumstances
+    coordinate_jacobian : ndarray (M, rows, C)
+    state : ndarray (M,)
+        State of each observation.
+
+    Returns
+    -------
+    ndarray (M, rows, D)
+    """
+    laws = [law for effect, shapes in effects for law in effect.displacement(circumstances, *shapes)]
+    columns = np.empty((coordinate_jacobian.shape[1], len(laws), len(state)))
+    jacobian = np.moveaxis(coordinate_jacobian, 0, -1)
+    for number, law in enumerate(laws):
+        columns[:, number] = sum(jacobian[:, coordinate] * values[state] for coordinate, values in law.items())
+    return np.moveaxis(columns, -1, 0)
+
+
+def displaced_coordinates(model, estimate, circumstances):
+    """Coordinates of the sites in each state: joint angles, springs under load and effects.
+
+    Returns
+    -------
+    ndarray (S, C)
+    """
+    displaced = np.zeros((len(circumstances.joint_angles), model.sites.chain.coordinates))
+    displaced[:, : model.sites.joints] = circumstances.joint_angles
+    if not model.identifies_compliance:
+        displaced[:, : model.sites.joints] += circumstances.load[:, : model.sites.joints] * model.nominal_compliance
+    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        for value, law in zip(values, effect.displacement(circumstances, *shapes), strict=True):
+            for coordinate, per_unit in law.items():
+                displaced[:, coordinate] += value * per_unit
+    return displaced
+
+
+def stepped(model, estimate, step):
+    """An estimate after a step of all parameters, in the order of `parameters`.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    step : ndarray (P,)
+
+    Returns
+    -------
+    Estimate
+    """
+    left = list(step)
+
+    def take(count):
+        taken, left[:] = np.array(left[:count]), left[count:]
+        return taken
+
+    frame_rotation, frame_position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
+    if model.fitted_frames:
+        for number in range(len(estimate.sessions)):
+            shift, turn = take(3), take(3)
+            frame_position[number] += frame_rotation[number] @ shift
+            frame_rotation[number] = frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
+    target_offset, target_rotation = estimate.target_offset.copy(), estimate.target_rotation.copy()
+    for number, target in enumerate(model.targets):
+        if target.offset_m is None:
+            target_offset[number] += take(3)
+            if model.rows == 6:
+                target_rotation[number] = Rotation.from_rotvec(take(3)).as_matrix() @ target_rotation[number]
+    coefficients, shapes = [], []
+    for effect, values, bent in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        coefficients.append(values + take(len(values)))
+        limits = np.array([(shape.lowest, shape.highest) for shape in effect.shapes]).reshape(-1, 2)
+        shapes.append(np.clip(bent + take(len(bent)), *limits.T))
+    return Estimate(
+        estimate.sessions,
+        frame_rotation,
+        frame_position,
+        target_offset,
+        target_rotation,
+        tuple(coefficients),
+        tuple(shapes),
+    )
+
+
+def measured_in_base(estimate, observations):
+    """Measured poses, taken from the frames of the sessions into base axes.
+
+    Returns
+    -------
+    position : ndarray (M, 3)
+    rotation : ndarray (M, 3, 3) or None
+    """
+    session = np.searchsorted(estimate.sessions, observations.states.session[observations.state])
+    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
+    position = (into_base @ (observations.position - estimate.frame_position[session])[..., None])[..., 0]
+    return position, None if observations.rotation is None else into_base @ observations.rotation
+
+
+def _differences(measured, position, rotation):
+    if measured[1] is None:
+        return measured[0] - position
+    return pose_differences(*measured, position, rotation)
+
+
+def _points(model, estimate):
+    for index, target in enumerate(model.targets):
+        point = model.sites.chain.point(target.point)
+        yield index, replace(point, offset_m=tuple(estimate.target_offset[index]))
+
+
+def _target_columns(rotation, mask, rows):
+    """Shift of a target along the axes of its measuring point and, for poses, its turn about them."""
+    columns = np.zeros((len(mask), rows, rows))
+    for first in range(0, rows, 3):
+        columns[mask, first : first + 3, first : first + 3] = rotation[mask]
+    return columns
+
+
+def _shape_columns(effect, values, shapes, circumstances, jacobian, state):
+    columns = np.zeros((*jacobian.shape[:2], len(shapes)))
+    for number in range(len(shapes)):
+        step = _SHAPE_STEP * shapes[number]
+        sides = []
+        for sign in (1, -1):
+            moved = shapes.copy()
+            moved[number] += sign * step
+            sides.append(effect_columns([(effect, moved)], circumstances, jacobian, state) @ values)
+        columns[..., number] = (sides[0] - sides[1]) / (2 * step)
+    return columns

@@ -1,0 +1,176 @@
+"""Noise of the readings: a sensor part, alike in all directions, and the repeatability of the joints, seen through the
+Jacobian.
+
+Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
+targets together, while the sensor errs for each target on its own.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import helmert
+from scipy.optimize import minimize
+from scipy.stats import chi2
+
+from elastocal.model import circumstances, linearize
+from elastocal.observations import each_approach
+
+# Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.
+FEWEST_FOR_JOINTS = 60
+# Fewer than this say nothing of their own.
+FEWEST = 9
+# How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
+# power.
+_UPPER = 0.8
+_SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of one reading.
+
+    Attributes
+    ----------
+    source : {"repeats", "declared"}
+    position_m, orientation_rad : float
+        Sensor part, each component.
+    joint_rad : ndarray (n,)
+        Repeatability of each joint.
+    degrees_of_freedom : int
+        Contrasts of repeats behind the figures; 0 where they are declared.
+    """
+
+    source: str
+    position_m: float
+    orientation_rad: float
+    joint_rad: np.ndarray
+    degrees_of_freedom: int = 0
+
+
+def declared_noise(campaign):
+    """Noise as a campaign declares it, without a joint part; None where it does not."""
+    if not campaign.noise:
+        return None
+    position = campaign.noise["position_m"]
+    return Noise("declared", position, campaign.noise.get("orientation_rad", position), np.zeros(campaign.robot.joints))
+
+
+def noise_from_repeats(model, estimate, readings):
+    """Noise by restricted maximum likelihood from the differences between repeats.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+        Its frames turn readings into base axes; nothing else of it matters.
+    readings : Readings
+
+    Returns
+    -------
+    Noise or None
+        None where there are too few repeats.
+    """
+    contrasts, jacobians = _contrasts(model, estimate, readings)
+    total = sum(part.size for part in contrasts)
+    if total < FEWEST:
+        return None
+    rows, joints = model.rows, model.sites.joints
+    position = np.concatenate([part.reshape(-1, rows)[:, :3].ravel() for part in contrasts]).std()
+    orientation = np.concatenate([part.reshape(-1, rows)[:, 3:].ravel() for part in contrasts]).std() if rows == 6 else position
+    sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
+    if total < FEWEST_FOR_JOINTS:
+        return sensor
+    data, nothing = (contrasts, jacobians, rows), np.full(joints, np.log(_SMALLEST_RAD))
+    both = [np.log(position), np.log(orientation)][: rows // 3]
+    start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
+    bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
+    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", bounds=bounds)
+    # Akaike: the joints' part must be worth its parameters.
+    if fitted.fun + joints > minimize(lambda logs: _negative_log_likelihood([*logs, *nothing], *data), both).fun:
+        return sensor
+    values = np.exp(fitted.x)
+    per_joint = max(total // (joints + 1), 1)
+    inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
+    return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
+
+
+def taken_noise(campaign, model, estimate, readings):
+    """Noise from repeats where there are enough, else as declared.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model, estimate, readings
+        As in `noise_from_repeats`.
+
+    Returns
+    -------
+    noise : Noise or None
+        None where there are neither.
+    warnings : list of str
+    """
+    repeats, declared = noise_from_repeats(model, estimate, readings), declared_noise(campaign)
+    if repeats is None:
+        return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
+    if declared is None:
+        return repeats, []
+    ratio = repeats.position_m / declared.position_m
+    low, high = np.sqrt(chi2.ppf([0.005, 0.995], repeats.degrees_of_freedom) / repeats.degrees_of_freedom)
+    if low < ratio < high:
+        return repeats, []
+    return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
+
+
+def reading_covariances(noise, jacobians, rows):
+    """Covariance of all readings of one approach.
+
+    Parameters
+    ----------
+    noise : Noise
+    jacobians : ndarray (G, k, rows, n)
+        Of the k targets, with respect to the joints.
+    rows : int
+        3 for positions, 6 for poses.
+
+    Returns
+    -------
+    ndarray (G, k * rows, k * rows)
+    """
+    groups, targets = jacobians.shape[:2]
+    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
+    sensor = np.tile(np.repeat([noise.position_m, noise.orientation_rad], 3)[:rows] ** 2, targets)
+    covariance = stacked @ stacked.transpose(0, 2, 1)
+    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += sensor
+    return covariance
+
+
+def _contrasts(model, estimate, readings):
+    """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
+    bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
+    observations, repeated = each_approach(readings)
+    line = linearize(bare, at, observations, circumstances(bare, at, observations.states))
+    seen = np.bincount(observations.state)
+    start = np.concatenate([[0], np.cumsum(seen)])
+    contrasts, jacobians = {}, {}
+    for state in range(repeated.max() + 1):
+        members = np.flatnonzero(repeated == state)
+        targets = observations.target[start[members[0]] : start[members[0] + 1]]
+        members = [m for m in members if np.array_equal(observations.target[start[m] : start[m + 1]], targets)]
+        if len(members) < 2:
+            continue
+        residual = np.array([line.residual[start[m] : start[m + 1]].ravel() for m in members])
+        jacobian = line.coordinate_jacobian[start[members[0]] : start[members[0] + 1], :, : model.sites.joints]
+        contrasts.setdefault(len(targets), []).extend(helmert(len(members)) @ residual)
+        jacobians.setdefault(len(targets), []).extend([jacobian] * (len(members) - 1))
+    return [np.array(found) for found in contrasts.values()], [np.array(found) for found in jacobians.values()]
+
+
+def _negative_log_likelihood(logs, contrasts, jacobians, rows):
+    values = np.exp(logs)
+    noise = Noise("", values[0], values[rows // 3 - 1], values[rows // 3 :])
+    total = 0.0
+    for vectors, jacobian in zip(contrasts, jacobians, strict=True):
+        covariance = reading_covariances(noise, jacobian, rows)
+        total += 0.5 * np.linalg.slogdet(covariance)[1].sum()
+        total += 0.5 * (vectors * np.linalg.solve(covariance, vectors[..., None])[..., 0]).sum()
+    return total

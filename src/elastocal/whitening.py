@@ -1,0 +1,75 @@
+"""Generalized least squares: residuals and sensitivities divided by the noise of the states in which they were taken."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.noise import reading_covariances
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """What turns correlated rows into independent ones of unit variance.
+
+    Attributes
+    ----------
+    blocks : tuple of (ndarray (G, k), ndarray (G, k * rows, k * rows))
+        For the states with k targets: indices of their observations, and the inverse Cholesky factor of their covariance.
+    """
+
+    blocks: tuple
+
+    def apply(self, values):
+        """Whitened values.
+
+        Parameters
+        ----------
+        values : ndarray (M, rows, ...)
+
+        Returns
+        -------
+        ndarray (M, rows, ...)
+        """
+        whitened = np.empty_like(values)
+        tail = values.shape[2:]
+        for members, factor in self.blocks:
+            stacked = values[members].reshape(*factor.shape[:2], -1)
+            whitened[members] = (factor @ stacked).reshape(*members.shape, values.shape[1], *tail)
+        return whitened
+
+
+def whitening(observations, jacobian, noise, discrepancy_m=0.0):
+    """Whitening of averaged observations.
+
+    Parameters
+    ----------
+    observations : Observations
+    jacobian : ndarray (M, rows, n)
+        With respect to the joints.
+    noise : Noise
+        Of one reading.
+    discrepancy_m : float
+        Standard deviation, in positions, of what the model lacks and repeats do not average out; orientations get the share
+        that they have of the noise.
+
+    Returns
+    -------
+    Whitening
+    """
+    rows = observations.rows
+    lacking = np.repeat([discrepancy_m, discrepancy_m * noise.orientation_rad / noise.position_m], 3)[:rows] ** 2
+    blocks = []
+    for members in _members(observations.state):
+        covariance = reading_covariances(noise, jacobian[members], rows)
+        covariance /= observations.states.repeats[observations.state[members[:, 0]]][:, None, None]
+        diagonal = np.arange(covariance.shape[1])
+        covariance[:, diagonal, diagonal] += np.tile(lacking, members.shape[1])
+        blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
+    return Whitening(tuple(blocks))
+
+
+def _members(state):
+    """Observations of each state, for each number of targets in a state: arrays (G, k)."""
+    seen = np.bincount(state)
+    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
+    return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]
