@@ -228,6 +228,28 @@ def read_campaign(folder, robots_folder, effects=None):
     )
 
 
+def read_robot(path):
+    """Read a robot file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        As in `robot_from_document`, and a document that its schema refuses.
+    """
+    source = Path(path).as_posix()
+    document = read_document(source)
+    check_document(document, "robot", source)
+    return robot_from_document(document, source)
+
+
 def split(campaign):
     """Readings to fit and readings to test, parted by whole poses.
 
@@ -352,9 +374,7 @@ def _robot(name, folder, robots_folder, source):
     if not path.is_file():
         allowed = f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {_hinted(name, known)}"
         raise InputError(source, "robot", repr(name), allowed)
-    document = read_document(path)
-    check_document(document, "robot", path.as_posix())
-    return robot_from_document(document, path.as_posix())
+    return read_robot(path)
 
 
 def _targets(described, chain, source):
@@ -594,10 +614,11 @@ def _check_angles(reported, table, robot):
     wrong = (np.abs(reported) > farthest) | (beyond & (in_degrees >= low) & (in_degrees <= high))
     if wrong.any():
         index, joint = np.argwhere(wrong)[0]
-        limits = f"{low[joint]:.2f} to {high[joint]:.2f}"
-        raise table.cell_fault(
-            index, table.angles[joint], f"{reported[index, joint]:g}", f"rad, not degrees; the joint goes {limits} rad"
+        allowed = (
+            f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
+            " (counted otherwise: reported_joints of the robot file)"
         )
+        raise table.cell_fault(index, table.angles[joint], f"{reported[index, joint]:g}", allowed)
 
 
 def _check_readings(readings, table, robot, targets, source):

@@ -133,9 +133,8 @@ def _read_parquet(path):
     for name in table.column_names:
         if table.column_names.count(name) > 1:
             raise InputError(path, "header", f"column {name!r} twice", "each column once")
-    return {name: table.column(name).to_pylist() for name in table.column_names}, np.arange(
-        1, table.num_rows + 1, dtype=np.int32
-    )
+    columns = {name: table.column(name).to_pylist() for name in table.column_names}
+    return columns, np.arange(1, table.num_rows + 1, dtype=np.int32)
 
 
 class Measurements:
@@ -222,6 +221,7 @@ def _is_number(cell):
 
 
 def shown(cell):
+    """A cell as an error shows it."""
     text = str(cell).strip() if cell is not None else ""
     return repr(text[:40]) if text else "nothing"
 

@@ -1,0 +1,35 @@
+"""Which rows of a source are repeats of one pose, where the source does not say."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
+
+
+def pose_and_repeat(joint_angles, tolerance_rad=0.0):
+    """Number poses by their joint angles.
+
+    Parameters
+    ----------
+    joint_angles : ndarray (N, n)
+        rad.
+    tolerance_rad : float
+        Rows whose angles all lie this close are one pose.
+
+    Returns
+    -------
+    pose, repeat : ndarray of int32 (N,)
+        Poses from 0 in the order in which they first come, repeats of each from 0.
+    """
+    count = len(joint_angles)
+    pairs = KDTree(joint_angles).query_pairs(tolerance_rad, p=np.inf, output_type="ndarray")
+    graph = coo_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
+    label = connected_components(graph, directed=False)[1]
+    first = np.unique(label, return_index=True)[1]
+    rank = np.argsort(np.argsort(first))
+    pose = rank[label]
+    order = np.argsort(pose, kind="stable")
+    starts = np.r_[0, np.flatnonzero(np.diff(pose[order])) + 1]
+    repeat = np.empty(count, np.int32)
+    repeat[order] = np.arange(count) - np.repeat(starts, np.diff(np.r_[starts, count]))
+    return pose.astype(np.int32), repeat

@@ -1,0 +1,119 @@
+"""Measured data of other people: where they are, what their contents must be, how to get them. Never part of this project."""
+
+import hashlib
+import logging
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import pooch
+
+from elastocal.errors import InputError
+
+# Names a folder that already has the files, for machines without a network.
+FOLDER_VARIABLE = "ELASTOCAL_DATA"
+
+
+@dataclass(frozen=True)
+class PublicFile:
+    """One file of a public repository.
+
+    Attributes
+    ----------
+    repository : str
+        owner/name on GitHub.
+    commit : str
+    path : str
+        In the repository.
+    sha256 : str
+    local : str
+        Where the file stands below a folder that has all of them.
+    licence : str
+    """
+
+    repository: str
+    commit: str
+    path: str
+    sha256: str
+    local: str
+    licence: str
+
+    @property
+    def address(self):
+        """Where the file is downloaded from; the commit fixes its contents."""
+        return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{self.path}"
+
+
+_UR10 = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
+FILES = {
+    "fanuc_static": PublicFile(
+        "Sarrasor/RoboticManipulators",
+        "4e05acfe0052b90da43e3074bbecb4bb89104301",
+        "data/calibration_dataset.mat",
+        "19face499435c165be81c02de841e0d8e0106686daaf63550d0bf02bbea8c8eb",
+        "fanuc_static/calibration_dataset.mat",
+        "MIT",
+    ),
+    "fanuc_cpa": PublicFile(
+        "RABKKK/LaserTrackerPoseData4KinIdent",
+        "e143dda2bf5280359912ed7618f2b63d7e262b58",
+        "N1N2N3Jval.csv",
+        "7d3d2a860cc79ce31162e2756618f32182aad418ebd26d822c1cfac0bb36385e",
+        "fanuc_cpa/N1N2N3Jval.csv",
+        "none stated: for the user's own use, not to be passed on",
+    ),
+    "ur10_ipa_a": PublicFile(
+        *_UR10,
+        "Series_A/measurements_grid.csv",
+        "84d5c81234cab58ebe88b4c73c582c26ad0e407f0de5350571c91f5ce6f28b76",
+        "ur10_ipa/Series_A/measurements_grid.csv",
+        "MIT",
+    ),
+    "ur10_ipa_b": PublicFile(
+        *_UR10,
+        "Series_B/measurements_joint_configurations.csv",
+        "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e",
+        "ur10_ipa/Series_B/measurements_joint_configurations.csv",
+        "MIT",
+    ),
+}
+
+
+def fetch(name, folder):
+    """A file of public data with the contents that this project knows: from `FOLDER_VARIABLE`, else downloaded once.
+
+    Parameters
+    ----------
+    name : str
+        A key of `FILES`.
+    folder : str or Path
+        Keeps what is downloaded.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        An unknown name, a file of other contents, or no way to download it.
+    """
+    if name not in FILES:
+        raise InputError("public data", "", repr(name), ", ".join(FILES))
+    file = FILES[name]
+    given = os.environ.get(FOLDER_VARIABLE)
+    local = Path(given or "") / file.local
+    if given and local.is_file():
+        found = hashlib.sha256(local.read_bytes()).hexdigest()
+        if found != file.sha256:
+            raise InputError(local, "", f"SHA-256 {found}", f"{file.sha256}, as in {file.address}")
+        return local
+    pooch.get_logger().setLevel(logging.ERROR)
+    try:
+        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", f"{name}{Path(file.path).suffix}", folder)
+    except ValueError as error:
+        raise InputError(file.address, "", f"other contents ({error})", f"SHA-256 {file.sha256}") from None
+    except OSError as error:
+        allowed = f"a network, or the folder in {FOLDER_VARIABLE} with {file.local}"
+        raise InputError(file.address, "", f"no download ({error})", allowed) from None
+    return Path(kept)
