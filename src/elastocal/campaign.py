@@ -5,24 +5,19 @@ one target. All that can be told wrong without fitting anything is refused here,
 wrong is left for the diagnosis to trace.
 """
 
-import csv
-import difflib
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import yaml
 
 from elastocal.documents import check_document, read_document
 from elastocal.errors import InputError
+from elastocal.measurements import CSV, PARQUET, closest_first, read_measurements, shown, write_measurements
 from elastocal.robot import Robot, robot_from_document
-from elastocal.storage import Column
-from elastocal.table_schemas import WRENCH
 from elastocal.whole_files import appearing_whole
 
-DOCUMENT, CSV, PARQUET = "campaign.yaml", "measurements.csv", "measurements.parquet"
+DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
@@ -148,35 +143,6 @@ class Campaign:
     readings: Readings
 
 
-def measurement_columns(joints):
-    """Every column that a file of measurements may have.
-
-    Parameters
-    ----------
-    joints : int
-
-    Returns
-    -------
-    dict of str to Column
-    """
-    numbers = range(1, joints + 1)
-    columns = [
-        Column("session", "int32", "", "sessions have each their own tracker frame; 0 throughout where absent"),
-        Column("pose", "int32", "", "number of the pose in its session"),
-        Column("load", "int32", "", "number of the load, 0 where unloaded"),
-        Column("repeat", "int32", "", "number of the fresh approach to this pose and load"),
-        Column("target", "string", "", "name of the target that was read"),
-        *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} as the controller reports it") for j in numbers),
-        *(Column(name, "float64", unit, f"external {meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
-        *(Column(axis, "float64", "m", f"measured position along {axis}") for axis in "xyz"),
-        *(Column(f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}") for axis in "xyz"),
-        *(Column(f"approach{j}", "float64", "", f"sense of approach of joint {j}: -1, 0, +1") for j in numbers),
-        Column("time_s", "float64", "s", "time since any instant"),
-        Column("temperature_c", "float64", "°C", "temperature"),
-    ]
-    return {column.name: column for column in columns}
-
-
 def read_campaign(folder, robots_folder, effects=None):
     """Read a campaign and check it as a whole.
 
@@ -208,9 +174,8 @@ def read_campaign(folder, robots_folder, effects=None):
     declared = tuple(document.get("declared", ()))
     for index, name in enumerate(declared):
         if effects is not None and name not in set(effects):
-            raise InputError(source, f"declared[{index}]", repr(name), _hinted(name, sorted(effects)))
-    measurements, columns, rows = _read_measurements(folder)
-    table = _Table(measurements, columns, rows, document["measured"], robot.joints)
+            raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
+    table = read_measurements(folder, robot.joints, document["measured"])
     readings = _readings(table, robot, targets)
     _check_readings(readings, table, robot, targets, source)
     _held_out(holdout, readings, source)
@@ -330,49 +295,22 @@ def write_campaign(folder, document, table, joints, kind="parquet"):
     """
     folder = Path(folder)
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())
-    known = measurement_columns(joints)
-    path = folder / (PARQUET if kind == "parquet" else CSV)
-    for name in table:
-        if name not in known:
-            raise InputError(path.as_posix(), "columns", repr(name), _hinted(name, list(known)))
-    columns = [known[name] for name in known if name in table]
     folder.mkdir(parents=True, exist_ok=True)
     # The folder is no campaign until its document is there, nor may it hold measurements of both kinds.
     for name in (DOCUMENT, CSV, PARQUET):
         (folder / name).unlink(missing_ok=True)
-    with appearing_whole(path) as partial:
-        _write_table(partial, columns, table, kind)
+    write_measurements(folder, table, joints, kind)
     with appearing_whole(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
         yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
-
-
-def _write_table(path, columns, table, kind):
-    if kind == "csv":
-        with open(path, "w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([column.name for column in columns])
-            # repr of a float is the shortest text that reads back as the same number.
-            writer.writerows(zip(*(np.asarray(table[column.name]).tolist() for column in columns), strict=True))
-        return
-    schema = pa.schema(
-        [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
-    )
-    arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in schema]
-    pq.write_table(pa.Table.from_arrays(arrays, schema=schema), path, compression="zstd")
-
-
-def _hinted(name, known):
-    """What is allowed instead of a name: the closest first."""
-    lower = {other.lower(): other for other in known}
-    close = difflib.get_close_matches(str(name).lower(), lower, n=1)
-    return f"{lower[close[0]]!r}? ({', '.join(known)})" if close else ", ".join(known)
 
 
 def _robot(name, folder, robots_folder, source):
     known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
     path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
     if not path.is_file():
-        allowed = f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {_hinted(name, known)}"
+        allowed = (
+            f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {closest_first(name, known)}"
+        )
         raise InputError(source, "robot", repr(name), allowed)
     return read_robot(path)
 
@@ -386,7 +324,7 @@ def _targets(described, chain, source):
                 source, "targets", f"the name {name!r}, which YAML takes for no text", "a name, in quotes where need be"
             )
         if target["point"] not in points:
-            allowed = f"a measuring point of the chain: {_hinted(target['point'], points)}"
+            allowed = f"a measuring point of the chain: {closest_first(target['point'], points)}"
             raise InputError(source, f"targets.{name}.point", repr(target["point"]), allowed)
         offset = target["offset_m"]
         targets.append(Target(name, target["point"], None if offset == "unknown" else tuple(map(float, offset))))
@@ -396,7 +334,7 @@ def _targets(described, chain, source):
 def _holdout(described, folder, source):
     ways = [way for way in ("fraction", "poses", "campaign") if way in described]
     if len(ways) != 1 or ("seed" in described and ways != ["fraction"]):
-        allowed = "{fraction, seed}, {poses} or {campaign}"
+        allowed = "one of {fraction, seed}, {poses} or {campaign}"
         raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
     if "campaign" in described and not (folder / described["campaign"] / DOCUMENT).is_file():
         raise InputError(
@@ -440,132 +378,6 @@ def _held_out(holdout, readings, source):
     return chosen[index]
 
 
-def _read_measurements(folder):
-    """File, its columns (a list of cells or an array each) and the row number of each entry."""
-    there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
-    if len(there) != 1:
-        found = "both" if there else "neither"
-        raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
-    path = there[0].as_posix()
-    columns, rows = (_read_csv if there[0].name == CSV else _read_parquet)(path)
-    if len(rows) == 0:
-        raise InputError(path, "", "no row of data", "one row for each reading of one target")
-    return path, columns, rows
-
-
-def _read_csv(path):
-    try:
-        # A byte order mark is what spreadsheets write.
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = list(csv.reader(file, skipinitialspace=True, strict=True))
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
-    except csv.Error as error:
-        raise InputError(path, "", str(error), "comma-separated values") from None
-    if not lines:
-        raise InputError(path, "", "an empty file", "a header and one row for each reading of one target")
-    header = [cell.strip() for cell in lines[0]]
-    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-        raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
-    for name in header:
-        if header.count(name) > 1:
-            raise InputError(path, "header", f"column {name!r} twice", "each column once")
-    kept = [(number, cells) for number, cells in enumerate(lines[1:], 1) if any(cell.strip() for cell in cells)]
-    for number, cells in kept:
-        if len(cells) != len(header):
-            raise InputError(path, f"row {number}", f"{len(cells)} cells", f"{len(header)}, one for each column of the header")
-    columns = dict(zip(header, zip(*(cells for _, cells in kept), strict=True), strict=True)) if kept else {}
-    return columns, np.array([number for number, _ in kept], np.int32)
-
-
-def _read_parquet(path):
-    try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowException) as error:
-        raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    for name in table.column_names:
-        if table.column_names.count(name) > 1:
-            raise InputError(path, "header", f"column {name!r} twice", "each column once")
-    return {name: table.column(name).to_pylist() for name in table.column_names}, np.arange(
-        1, table.num_rows + 1, dtype=np.int32
-    )
-
-
-class _Table:
-    """Columns of a file of measurements, checked one by one as they are asked for."""
-
-    def __init__(self, path, columns, rows, measured, joints):
-        self.path, self.columns, self.rows = path, columns, rows
-        known = measurement_columns(joints)
-        self.angles = [f"q{j}" for j in range(1, joints + 1)]
-        self.approach = [f"approach{j}" for j in range(1, joints + 1)]
-        self.wrench = [name for name, _, _ in WRENCH]
-        self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
-        for name in columns:
-            if name not in known:
-                raise self.fault(
-                    "header", f"the unknown column {name!r}", _hinted(name, [k for k in known if k not in columns])
-                )
-        required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
-        for group in (self.wrench, self.approach):
-            required += group if any(name in columns for name in group) else []
-        for name in required:
-            if name not in columns:
-                unit = f" in {known[name].unit}" if known[name].unit else ""
-                raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
-
-    def fault(self, key, found, allowed):
-        return InputError(self.path, key, found, allowed)
-
-    def cell_fault(self, index, name, found, allowed):
-        """Fault of one cell; `index` counts the readings."""
-        return self.fault(f"row {self.rows[index]}, column {name}", found, allowed)
-
-    def has(self, names):
-        return all(name in self.columns for name in names)
-
-    def numbers(self, names):
-        """ndarray (N, len(names)) of finite numbers."""
-        return np.column_stack([self._column(name) for name in names])
-
-    def integers(self, name):
-        """ndarray of int32 (N,)."""
-        values = self._column(name)
-        wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
-        if wrong.any():
-            index = int(np.argmax(wrong))
-            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "an integer")
-        return values.astype(np.int32)
-
-    def texts(self, name):
-        """list of str (N,)."""
-        return [str(cell).strip() for cell in self.columns[name]]
-
-    def _column(self, name):
-        try:
-            values = np.array(self.columns[name], float)
-        except (ValueError, TypeError):
-            index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
-            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "a number with a decimal point") from None
-        if not np.isfinite(values).all():
-            index = int(np.argmin(np.isfinite(values)))
-            raise self.cell_fault(index, name, _shown(self.columns[name][index]), "a finite number")
-        return values
-
-
-def _is_number(cell):
-    try:
-        np.array([cell], float)
-    except (ValueError, TypeError):
-        return False
-    return True
-
-
-def _shown(cell):
-    text = str(cell).strip() if cell is not None else ""
-    return repr(text[:40]) if text else "nothing"
-
-
 def _readings(table, robot, targets):
     reported = table.numbers(table.angles)
     _check_angles(reported, table, robot)
@@ -573,7 +385,9 @@ def _readings(table, robot, targets):
     labels = table.texts("target")
     for index, label in enumerate(labels):
         if label not in names:
-            raise table.cell_fault(index, "target", _shown(label), f"a target of {DOCUMENT}: {_hinted(label, list(names))}")
+            raise table.cell_fault(
+                index, "target", shown(label), f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
+            )
     matrix = robot.reported_matrix
     approach = None
     if table.has(table.approach):

@@ -75,7 +75,7 @@ class Fit:
         return self.whitener.apply(values * weights)
 
 
-def fit(model, observations, noise, start=None):
+def fit(model, observations, noise, start=None, discrepancy_m=None):
     """Fit a model.
 
     Parameters
@@ -85,12 +85,16 @@ def fit(model, observations, noise, start=None):
     noise : Noise
     start : Estimate, optional
         Of this model; by `registered` without.
+    discrepancy_m : float, optional
+        As in `Fit`; found from the residual without.
 
     Returns
     -------
     Fit
     """
     start = registered(model, observations) if start is None else start
+    if discrepancy_m is not None:
+        return _robustly(model, observations, noise, start, discrepancy_m)
     discrepancy = 0.0
     found = _robustly(model, observations, noise, start, discrepancy)
     for _ in range(_DISCREPANCY_ROUNDS):

@@ -15,7 +15,7 @@ from scipy.stats import f as f_distribution
 from elastocal.model import circumstances, effect_columns, linearize
 
 # A candidate whose sensitivities keep less than this share off the model's own cannot be told.
-LEAST_RETAINED = 0.1
+LEAST_RETAINED = 0.01
 # Nor one whose non-centrality at its plausible size stays below this.
 LEAST_NONCENTRALITY = 10.0
 # Directions of a candidate that keep less than this share (squared) are rounding.

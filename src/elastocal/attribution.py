@@ -1,0 +1,144 @@
+"""What else could have made the residual: the effect found against every other candidate, for the poses of this campaign."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.screening import directions
+from elastocal.selection import without
+
+# Candidates within this angle of what was found, or within this difference of the Bayesian criterion, cannot be told from it.
+CONFOUNDED_DEG = 20.0
+CONFOUNDED_BIC = 6.0
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """One mechanism that was found, against all others.
+
+    Attributes
+    ----------
+    effect : str
+        Its name in the catalogue.
+    members : tuple of Candidate
+        Joints and variants of it that were found.
+    p_value : float
+        Family-wise, of its strongest member.
+    rivals : tuple of str
+        Keys of the other candidates.
+    angle_deg : ndarray
+        Angle of each rival's sensitivities to what was found.
+    bic_difference : ndarray
+        By how much the criterion is worse with the rival instead.
+    rival_parameters : ndarray of int
+    found_parameters : int
+    """
+
+    effect: str
+    members: tuple
+    p_value: float
+    rivals: tuple
+    angle_deg: np.ndarray
+    bic_difference: np.ndarray
+    rival_parameters: np.ndarray
+    found_parameters: int
+
+    @property
+    def alternatives(self):
+        """Keys of the rivals that these data cannot tell from what was found, the closest first.
+
+        A rival with more parameters only counts where the criterion cannot tell it: it makes whatever its parts make.
+        """
+        near = (self.angle_deg < CONFOUNDED_DEG) & (self.rival_parameters <= self.found_parameters)
+        confounded = near | (self.bic_difference < CONFOUNDED_BIC)
+        order = np.argsort(self.bic_difference)
+        return tuple(self.rivals[index] for index in order if confounded[index])
+
+
+def attribute(found, observations, candidates):
+    """Weigh each mechanism found against every other candidate.
+
+    Parameters
+    ----------
+    found : Search
+    observations : Observations
+    candidates : sequence of Candidate
+
+    Returns
+    -------
+    tuple of Attribution
+        One for each name of the catalogue among the effects found, in their order.
+    """
+    names = list(dict.fromkeys(candidate.effect for candidate in found.effects))
+    return tuple(_attribution(name, found, observations, candidates) for name in names)
+
+
+def confounding(seen):
+    """Smallest angle between what each two candidates make off the model.
+
+    Parameters
+    ----------
+    seen : Directions
+
+    Returns
+    -------
+    ndarray (K, K)
+        Degrees.
+    """
+    sizes = [columns.shape[1] for columns in seen.columns]
+    ends = np.cumsum(sizes)
+    together = np.concatenate(seen.columns, axis=1)
+    products = together.T @ together
+    cosines = np.ones((len(sizes),) * 2)
+    for one in range(len(sizes)):
+        for other in range(one):
+            block = products[ends[one] - sizes[one] : ends[one], ends[other] - sizes[other] : ends[other]]
+            cosines[one, other] = cosines[other, one] = np.linalg.norm(block, 2)
+    return np.degrees(np.arccos(np.clip(cosines, 0.0, 1.0)))
+
+
+def _attribution(name, found, observations, candidates):
+    members = tuple(candidate for candidate in found.effects if candidate.effect == name)
+    keys = {member.key for member in members}
+    others = without(found.final, keys, observations)
+    taken = {candidate.key for candidate in found.effects} - keys
+    seen = directions(others, observations, [candidate for candidate in candidates if candidate.key not in taken])
+    mine = [index for index, (candidate, _) in enumerate(seen.candidates) if candidate.key in keys]
+    basis = np.linalg.qr(np.concatenate([seen.columns[index] for index in mine], axis=1))[0]
+    explained = basis @ (basis.T @ seen.residual)
+    rows, total = len(seen.residual), seen.residual @ seen.residual
+    rest = total - explained @ explained
+    rivals, angles, differences, sizes = [], [], [], []
+    for index, (candidate, _) in enumerate(seen.candidates):
+        if candidate.key in keys:
+            continue
+        columns = seen.columns[index]
+        share = np.linalg.norm(columns.T @ explained) / np.linalg.norm(explained)
+        rest_with = total - ((columns.T @ seen.residual) ** 2).sum()
+        rivals.append(candidate.key)
+        angles.append(np.degrees(np.arccos(min(share, 1.0))))
+        differences.append(rows * np.log(rest_with / rest) + np.log(rows) * (columns.shape[1] - basis.shape[1]))
+        sizes.append(columns.shape[1])
+    # Variants of one candidate, as by their shape, count once: the one that fits best.
+    order = np.argsort(differences)
+    first = [index for place, index in enumerate(order) if rivals[index] not in {rivals[i] for i in order[:place]}]
+    return Attribution(
+        name,
+        members,
+        _family_wise(found, keys),
+        tuple(rivals[index] for index in first),
+        np.array(angles)[first],
+        np.array(differences)[first],
+        np.array(sizes)[first],
+        basis.shape[1],
+    )
+
+
+def _family_wise(found, keys):
+    values = [
+        look.scores.p_family[index]
+        for look in found.looks
+        for index, (candidate, _) in enumerate(look.directions.candidates)
+        if candidate.key in keys and index == look.chosen
+    ]
+    return float(min(values, default=1.0))

@@ -1,0 +1,209 @@
+"""Forward selection of missing effects: test, take the best, look again, until nothing that is left stands out."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from elastocal.fitting import Fit, fit
+from elastocal.screening import Directions, Scores, absorbed, cross_validated_gain, directions, score
+
+FAMILY_WISE_LEVEL = 0.05
+# An effect that is chosen must predict poses that were left out better, by this many standard errors.
+_GAIN_STD_ERRORS = 1.0
+_FOLDS = 10
+# Exact refits; each finds what the linear look before it could not see.
+_ROUNDS = 4
+# Up to so many chosen effects are weighed against each single one that could stand for all of them.
+_FEW = 4
+# An effect that the exact fit no longer needs is dropped again.
+_DROPPED_LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look at all candidates.
+
+    Attributes
+    ----------
+    directions : Directions
+    scores : Scores
+    chosen : int or None
+        Index of the candidate taken, if any.
+    gain, gain_std_error : float
+        Cross-validated fall of the squared whitened error with it.
+    refused : tuple of str
+        Candidates that stood out and did not predict.
+    """
+
+    directions: Directions
+    scores: Scores
+    chosen: int | None
+    gain: float = 0.0
+    gain_std_error: float = 0.0
+    refused: tuple = ()
+
+
+@dataclass(frozen=True)
+class Search:
+    """What a forward selection found.
+
+    Attributes
+    ----------
+    looks : tuple of Look
+    declared, final : Fit
+        Of the declared model, and with the effects found.
+    effects : tuple of Candidate
+        Effects found, the strongest first.
+    """
+
+    looks: tuple
+    declared: Fit
+    final: Fit
+    effects: tuple = field(default=())
+
+
+def search(declared, observations, candidates, replicates, stream, progress=None):
+    """Find what a fitted model lacks.
+
+    Parameters
+    ----------
+    declared : Fit
+    observations : Observations
+    candidates : sequence of Candidate
+    replicates : int
+        Of the bootstrap behind each look.
+    stream : numpy.random.Generator
+    progress : callable, optional
+        Told a line after each look.
+
+    Returns
+    -------
+    Search
+    """
+    current, found, looks = declared, [], []
+    for _ in range(_ROUNDS):
+        taken = {candidate.key for candidate in found}
+        seen = directions(current, observations, [c for c in candidates if c.key not in taken])
+        new = []
+        while True:
+            look = _look(seen, replicates, stream)
+            looks.append(look)
+            if progress:
+                progress(_told(look))
+            if look.chosen is None:
+                break
+            new.append(seen.candidates[look.chosen])
+            seen = absorbed(seen, look.chosen)
+        if not new:
+            break
+        found += [candidate for candidate, _ in new]
+        current = _refitted(current, observations, new)
+        simpler = _simpler(declared, current, observations, found, candidates)
+        if simpler:
+            found = [candidate for candidate, _ in simpler]
+            current = _refitted(_with_noise_of(declared, current), observations, simpler)
+        needed = [candidate for candidate in found if _wald(current, candidate) < _DROPPED_LEVEL]
+        if len(needed) < len(found):
+            found = needed
+            shapes = dict(zip([e.key for e in current.model.effects], current.estimate.shapes, strict=True))
+            current = _refitted(declared, observations, [(candidate, shapes[candidate.key]) for candidate in found])
+            break
+    strongest = sorted(found, key=lambda candidate: _wald_statistic(current, candidate), reverse=True)
+    return Search(tuple(looks), declared, current, tuple(strongest))
+
+
+def parameter_slice(fitted, key):
+    """Where the parameters of one effect stand among all of a fit, ndarray of int."""
+    return np.flatnonzero([owner == key for owner, _ in fitted.parameters])
+
+
+def without(fitted, keys, observations):
+    """The same fit without some of its effects, at the same noise.
+
+    Parameters
+    ----------
+    fitted : Fit
+    keys : collection of str
+    observations : Observations
+
+    Returns
+    -------
+    Fit
+    """
+    kept = [number for number, effect in enumerate(fitted.model.effects) if effect.key not in keys]
+    model = replace(fitted.model, effects=tuple(fitted.model.effects[number] for number in kept))
+    estimate = replace(
+        fitted.estimate,
+        coefficients=tuple(fitted.estimate.coefficients[number] for number in kept),
+        shapes=tuple(fitted.estimate.shapes[number] for number in kept),
+    )
+    return fit(model, observations, fitted.noise, estimate, fitted.discrepancy_m)
+
+
+def _look(seen, replicates, stream):
+    scores = score(seen, replicates, stream)
+    refused = []
+    for index in np.argsort(-scores.bic_gain):
+        if scores.p_family[index] >= FAMILY_WISE_LEVEL:
+            continue
+        gain, std_error = cross_validated_gain(seen, index, _FOLDS)
+        if gain > _GAIN_STD_ERRORS * std_error:
+            return Look(seen, scores, int(index), gain, std_error, tuple(refused))
+        refused.append(seen.candidates[index][0].key)
+    return Look(seen, scores, None, refused=tuple(refused))
+
+
+def _told(look):
+    if look.chosen is None:
+        return f"{len(look.scores.p_value)} candidates tested, none stands out"
+    key, p_value = look.directions.candidates[look.chosen][0].key, look.scores.p_family[look.chosen]
+    return f"{len(look.scores.p_value)} candidates tested: {key} (family-wise p {p_value:.4f})"
+
+
+def _refitted(fitted, observations, added):
+    effects = [candidate for candidate, _ in added]
+    model, start = fitted.model.with_effects(effects), fitted.estimate.with_effects(effects)
+    shapes = (*fitted.estimate.shapes, *(np.array(values, float) for _, values in added))
+    return fit(model, observations, fitted.noise, replace(start, shapes=shapes))
+
+
+def _with_noise_of(fitted, other):
+    return replace(fitted, discrepancy_m=other.discrepancy_m)
+
+
+def _simpler(declared, current, observations, found, candidates):
+    """A single candidate that explains the readings better than all those found, by the Bayesian criterion, if there is one."""
+    if not 1 < len(found) <= _FEW:
+        return []
+    bare = without(current, {candidate.key for candidate in found}, observations)
+    seen = directions(bare, observations, candidates)
+    rows = len(seen.residual)
+    chosen = [number for number, (candidate, _) in enumerate(seen.candidates) if candidate in found]
+    together = np.linalg.qr(np.concatenate([seen.columns[number] for number in chosen], axis=1))[0] if chosen else None
+    if together is None:
+        return []
+
+    def criterion(columns):
+        rest = seen.residual @ seen.residual - ((columns.T @ seen.residual) ** 2).sum()
+        return rows * np.log(rest) + columns.shape[1] * np.log(rows)
+
+    singles = np.array([criterion(columns) for columns in seen.columns])
+    number = int(np.argmin(singles))
+    extended = 2 * np.log(len(seen.columns)) * (len(found) - 1)
+    return [seen.candidates[number]] if singles[number] < criterion(together) + extended else []
+
+
+def _wald_statistic(fitted, candidate):
+    mine = parameter_slice(fitted, candidate.key)
+    number = [effect.key for effect in fitted.model.effects].index(candidate.key)
+    values = fitted.estimate.coefficients[number]
+    free = ~fitted.held[mine[: len(values)]]
+    if not free.any():
+        return 0.0
+    covariance = fitted.covariance[np.ix_(mine[: len(values)][free], mine[: len(values)][free])]
+    return float(values[free] @ np.linalg.solve(covariance, values[free]))
+
+
+def _wald(fitted, candidate):
+    return chi2.sf(_wald_statistic(fitted, candidate), len(candidate.parameters))
