@@ -13,7 +13,7 @@ import yaml
 
 from elastocal.documents import check_document, read_document
 from elastocal.errors import InputError
-from elastocal.measurements import CSV, PARQUET, closest_first, read_measurements, shown, write_measurements
+from elastocal.measurements import CSV, PARQUET, check_column_names, closest_first, read_measurements, shown, write_measurements
 from elastocal.robot import Robot, robot_from_document
 from elastocal.whole_files import appearing_whole
 
@@ -295,11 +295,14 @@ def write_campaign(folder, document, table, joints, kind="parquet"):
     """
     folder = Path(folder)
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())
+    path = folder / (PARQUET if kind == "parquet" else CSV)
+    check_column_names(table, joints, path.as_posix())
     folder.mkdir(parents=True, exist_ok=True)
-    # The folder is no campaign until its document is there, nor may it hold measurements of both kinds.
-    for name in (DOCUMENT, CSV, PARQUET):
-        (folder / name).unlink(missing_ok=True)
-    write_measurements(folder, table, joints, kind)
+    with appearing_whole(path) as partial:
+        write_measurements(partial, table, joints)
+        # From here to its document the folder is no campaign; nor may it hold measurements of both kinds.
+        for name in (DOCUMENT, CSV, PARQUET):
+            (folder / name).unlink(missing_ok=True)
     with appearing_whole(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
         yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
 

@@ -2,6 +2,7 @@
 
 import csv
 import difflib
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -10,7 +11,6 @@ import pyarrow.parquet as pq
 from elastocal.errors import InputError
 from elastocal.storage import Column
 from elastocal.table_schemas import WRENCH
-from elastocal.whole_files import appearing_whole
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 
@@ -74,30 +74,43 @@ def read_measurements(folder, joints, measured):
     return Measurements(path, columns, rows, joints, measured)
 
 
-def write_measurements(folder, table, joints, kind):
-    """Write the measurements of a campaign; the file appears whole or not at all.
+def check_column_names(names, joints, path):
+    """Refuse a column that the format does not have.
 
     Parameters
     ----------
-    folder : Path
-    table : dict of str to sequence
-        Columns of one length, named as in `measurement_columns`.
+    names : iterable of str
     joints : int
-    kind : {"parquet", "csv"}
+    path : str
+        Named in errors.
 
     Raises
     ------
     InputError
-        A column that the format does not have.
+        The first such column.
     """
     known = measurement_columns(joints)
-    path = folder / (PARQUET if kind == "parquet" else CSV)
-    for name in table:
+    for name in names:
         if name not in known:
-            raise InputError(path.as_posix(), "columns", repr(name), closest_first(name, known))
-    columns = [known[name] for name in known if name in table]
-    with appearing_whole(path) as partial:
-        (_write_parquet if kind == "parquet" else _write_csv)(partial, columns, table)
+            # That q7 is unknown tells little where nobody says of how many joints the robot is.
+            of = f", for {joints} joints" if name.rstrip("0123456789") in ("q", "approach") else ""
+            missing = [other for other in known if other not in names]
+            raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)
+
+
+def write_measurements(path, table, joints):
+    """Write the measurements of a campaign.
+
+    Parameters
+    ----------
+    path : str
+        Holds CSV where the name of the file that it stands for begins with that of `CSV`, else Parquet.
+    table : dict of str to sequence
+        Columns of one length, named as in `measurement_columns`.
+    joints : int
+    """
+    columns = [column for name, column in measurement_columns(joints).items() if name in table]
+    (_write_csv if Path(path).name.startswith(CSV) else _write_parquet)(path, columns, table)
 
 
 def _read_csv(path):
@@ -158,11 +171,7 @@ class Measurements:
         self.approach = [f"approach{j}" for j in range(1, joints + 1)]
         self.wrench = [name for name, _, _ in WRENCH]
         self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
-        for name in columns:
-            if name not in known:
-                raise self.fault(
-                    "header", f"the unknown column {name!r}", closest_first(name, [k for k in known if k not in columns])
-                )
+        check_column_names(columns, joints, path)
         required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
         for group in (self.wrench, self.approach):
             required += group if any(name in columns for name in group) else []
