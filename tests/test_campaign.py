@@ -225,7 +225,7 @@ def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     with refused((folder / f"measurements.{kind}").as_posix(), "header", "'q4'"):
         write_campaign(folder, document, cell.table | {"q4": cell.table["q3"]}, 3, kind)
-    with pytest.raises(ValueError, match="."):
+    with pytest.raises((ValueError, pa.ArrowException), match=r"argument|length"):
         write_campaign(folder, document, cell.table | {"q3": cell.table["q3"][1:]}, 3, kind)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
