@@ -545,6 +545,16 @@ def test_parquet_that_cannot_be_read_is_refused(cell):
         read_campaign(cell.folder, cell.robots)
 
 
+def test_parquet_whose_text_is_no_utf8_is_refused(cell):
+    cell.write("parquet")
+    names = pa.array([b"\xd8"] * len(cell.table["pose"]), pa.binary())
+    broken = pa.Array.from_buffers(pa.string(), len(names), names.buffers())
+    path = cell.folder / "measurements.parquet"
+    pq.write_table(pa.table(cell.table | {"target": broken}), path)
+    with refused(path.as_posix(), "", "no readable Parquet file"):
+        read_campaign(cell.folder, cell.robots)
+
+
 def test_one_file_of_measurements_must_be_there(cell):
     cell.write()
     cell.write("parquet")

@@ -127,9 +127,7 @@ def _read_csv(path):
     header = [cell.strip() for cell in lines[0]]
     if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
         raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
-    for name in header:
-        if header.count(name) > 1:
-            raise InputError(path, "header", f"column {name!r} twice", "each column once")
+    _check_header(path, header)
     kept = [(number, cells) for number, cells in enumerate(lines[1:], 1) if any(cell.strip() for cell in cells)]
     for number, cells in kept:
         if len(cells) != len(header):
@@ -141,13 +139,17 @@ def _read_csv(path):
 def _read_parquet(path):
     try:
         table = pq.read_table(path)
-    except (OSError, pa.ArrowException) as error:
+        columns = [(name, column.to_pylist()) for name, column in zip(table.column_names, table.columns, strict=True)]
+    except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    for name in table.column_names:
-        if table.column_names.count(name) > 1:
+    _check_header(path, table.column_names)
+    return dict(columns), np.arange(1, table.num_rows + 1, dtype=np.int32)
+
+
+def _check_header(path, names):
+    for name in names:
+        if names.count(name) > 1:
             raise InputError(path, "header", f"column {name!r} twice", "each column once")
-    columns = {name: table.column(name).to_pylist() for name in table.column_names}
-    return columns, np.arange(1, table.num_rows + 1, dtype=np.int32)
 
 
 class Measurements:
