@@ -464,6 +464,12 @@ def test_joint_just_beyond_its_limit_is_no_degrees(cell):
     assert len(cell.read().readings) == len(cell.table["pose"])
 
 
+def test_wrong_sign_beyond_a_limit_is_no_degrees(cell):
+    for row in range(1, 9):
+        cell.spoil(row, "q2", 1.7)
+    assert len(cell.read().readings) == len(cell.table["pose"])
+
+
 def test_joint_angles_are_judged_in_the_models_convention(cell):
     cell.arm["reported_joints"] = {"offset_deg": [0, 180, 0]}
     cell.table["q2"] = [angle - np.pi for angle in cell.table["q2"]]

@@ -426,9 +426,12 @@ def _check_angles(reported, table, robot):
     def model(angles):
         return angles @ robot.reported_matrix.T + robot.reported_offset
 
-    in_degrees = model(np.radians(reported))
-    beyond = (model(reported) < low - _BEYOND_LIMITS_RAD) | (model(reported) > high + _BEYOND_LIMITS_RAD)
-    wrong = (np.abs(reported) > farthest) | (beyond & (in_degrees >= low) & (in_degrees <= high))
+    def inside(angles, margin=0.0):
+        return (model(angles) >= low - margin) & (model(angles) <= high + margin)
+
+    # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
+    beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
+    wrong = (np.abs(reported) > farthest) | (beyond & inside(np.radians(reported)))
     if wrong.any():
         index, joint = np.argwhere(wrong)[0]
         allowed = (
