@@ -1,0 +1,1 @@
+"""Faults of the data that are looked for before any physics, one module each."""

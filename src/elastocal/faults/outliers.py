@@ -1,0 +1,67 @@
+"""Single readings far from where the declared model puts them, beside all others of their target.
+
+They stop nothing: every fit gives them little weight. They are named so that somebody can look at them.
+"""
+
+import numpy as np
+
+from elastocal.effects.catalogue import declared_candidates
+from elastocal.faults.placement import robust_sigma, single_observations
+from elastocal.faults.protocol import Fault, Value
+from elastocal.fitting import fit
+from elastocal.model import circumstances, declared_model, residuals
+from elastocal.noise import Noise
+from elastocal.observations import averaged
+
+NAME, FAMILY, AFTER = "outliers", "data", ("wrong_sign", "wrong_unit", "shuffled_rows")
+
+# Robust standard deviations of the readings of one target.
+_FAR = 8.0
+# Fewer readings of a target do not tell its standard deviation.
+_FEWEST = 20
+# No sensor reads closer: smaller deviations are rounding.
+_FINEST = 1e-5
+# All readings count alike, whatever the noise: a discrepancy of the model this far above it says so.
+_NOISE, _DISCREPANCY_M = 1e-4, 1e-3
+
+
+def find(campaign, readings):
+    """Readings far from the declared model.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    list of Fault
+        One for all of them, or none.
+    """
+    sites = declared_model(campaign).sites
+    model = declared_model(campaign, declared_candidates(campaign.declared, sites))
+    noise = Noise("declared", _NOISE, _NOISE, np.zeros(campaign.robot.joints))
+    estimate = fit(model, averaged(readings), noise, discrepancy_m=_DISCREPANCY_M).estimate
+    single = single_observations(readings)
+    residual = residuals(model, estimate, single, circumstances(model, estimate, single.states))
+    far = np.zeros(len(readings), bool)
+    for target in np.unique(readings.target):
+        members = np.flatnonzero(readings.target == target)
+        if len(members) < _FEWEST:
+            continue
+        for first in range(0, model.rows, 3):
+            distance = np.linalg.norm(residual[members, first : first + 3], axis=1)
+            far[members] |= distance > _FAR * max(robust_sigma(distance, 3), _FINEST)
+    if not far.any():
+        return []
+    count, rows = int(far.sum()), np.sort(readings.row[far])
+    several = f"{count} of {len(readings)} readings lie" if count > 1 else f"one of {len(readings)} readings lies"
+    detail = f"{several} more than {_FAR:g} robust standard deviations from the declared model and counts little"
+    detail = detail.replace("counts", "count") if count > 1 else detail
+    share = Value("share of the readings", count / len(readings), "–")
+    evidence = _rms(residual[:, :3]), _rms(residual[~far, :3])
+    return [Fault(NAME, (), detail, (share,), evidence, tuple(rows.tolist()), False)]
+
+
+def _rms(values):
+    return float(np.sqrt((values**2).sum(axis=1).mean()))
