@@ -10,7 +10,7 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import circumstances_of
 from elastocal.kinematics import poses
-from elastocal.model import Estimate, Model, circumstances, predict
+from elastocal.model import Estimate, Model, circumstances, parameters, predict, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.observations import Observations, States
 from elastocal.sites import sites_of
@@ -142,3 +142,18 @@ def displacements(candidate, circumstances, *shapes):
         for coordinate, values in law.items():
             dense[number, :, coordinate] = values
     return dense
+
+
+def slopes(model, estimate, observations, circumstances):
+    """Sensitivities by central differences: minus the slope of the residuals, measured less predicted."""
+    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
+    listed = parameters(model, estimate)
+    columns = []
+    for number, (owner, parameter) in enumerate(listed):
+        size = (1e-5 if (owner, parameter.name) in shapes else 1e-3) * parameter.plausible
+        step = size * np.eye(len(listed))[number]
+        ahead, behind = (
+            residuals(model, stepped(model, estimate, sign * step), observations, circumstances) for sign in (1, -1)
+        )
+        columns.append((behind - ahead) / (2 * size))
+    return np.stack(columns, axis=-1)
