@@ -144,16 +144,19 @@ def displacements(candidate, circumstances, *shapes):
     return dense
 
 
-def slopes(model, estimate, observations, circumstances):
-    """Sensitivities by central differences: minus the slope of the residuals, measured less predicted."""
+def small_steps(model, estimate):
+    """A step of each parameter for which a central difference loses nothing to curvature or rounding."""
     shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
     listed = parameters(model, estimate)
+    return np.array([(1e-4 if (owner, p.name) in shapes else 1e-3) * p.plausible for owner, p in listed])
+
+
+def slopes(model, estimate, observations, circumstances, steps):
+    """Changes of the prediction per step, by central differences of the residuals: ndarray (M, rows, number of steps)."""
     columns = []
-    for number, (owner, parameter) in enumerate(listed):
-        size = (1e-5 if (owner, parameter.name) in shapes else 1e-3) * parameter.plausible
-        step = size * np.eye(len(listed))[number]
+    for step in steps:
         ahead, behind = (
             residuals(model, stepped(model, estimate, sign * step), observations, circumstances) for sign in (1, -1)
         )
-        columns.append((behind - ahead) / (2 * size))
+        columns.append((behind - ahead) / 2)
     return np.stack(columns, axis=-1)

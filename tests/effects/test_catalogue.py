@@ -1,0 +1,265 @@
+"""The catalogue as a whole: what is in it, on any chain, and that a module is all that a new effect takes."""
+
+import re
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import OTHER_CHAINS, chain_of, refused
+from synthetic import circumstances_on, displacements, made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
+
+import elastocal.effects
+from elastocal.campaign import Target
+from elastocal.effects import catalogue
+from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.kinematics import poses
+from elastocal.model import circumstances, linearize
+from elastocal.sites import sites_of
+
+# The table of the design, without the data family: that is no physics.
+TABLE = {
+    "geometry": "joint_offset, link_geometry",
+    "gravity": "link_weight, payload, compensator_torque",
+    "transmission": "transmission_harmonic, transmission_ratio",
+    "elastic": "link_elasticity, joint_tilt, base_compliance, cross_compliance, "
+    "joint_dependent_stiffness, compensator_stiffness",
+    "gearbox": "stiffening, lost_motion, hysteresis",
+    "load": "force_misalignment, force_bias, application_point, force_scale",
+    "drift": "thermal_growth, frame_drift",
+}
+FAMILIES = {name: family for family, names in TABLE.items() for name in names.split(", ")}
+CHAINS = ["fanuc", "ur10", "fixed rotations"]
+UNITS = {
+    *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),
+    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)"),
+}
+# What one parameter of plausible size may do to a robot of this size under some kilonewton: more is no small deviation.
+LEAST_M, LARGEST_M = 1e-7, 2e-2
+
+
+@pytest.fixture(params=CHAINS)
+def chain(request, fanuc):
+    return fanuc.chain if request.param == "fanuc" else chain_of(OTHER_CHAINS[request.param])
+
+
+def test_names_and_families_are_those_of_the_design():
+    assert {name: module.FAMILY for name, module in catalogue.effects().items()} == FAMILIES
+
+
+def test_candidates_bear_the_name_and_family_of_their_module(chain):
+    sites = sites_of(chain)
+    for name, module in catalogue.effects().items():
+        for candidate in module.candidates(sites):
+            assert (candidate.effect, candidate.family) == (name, FAMILIES[name])
+            assert all(1 <= joint <= sites.joints for joint in candidate.joints)
+
+
+def test_every_effect_can_act_on_an_industrial_arm(fanuc):
+    assert {candidate.effect for candidate in candidates_on(sites_of(fanuc.chain)).values()} == set(FAMILIES)
+
+
+def test_keys_are_unique_and_readable(chain):
+    sites = sites_of(chain)
+    listed = [c.key for module in catalogue.effects().values() for c in module.candidates(sites)]
+    assert len(listed) == len(set(listed)) and list(candidates_on(sites)) == listed
+    for key in listed:
+        assert re.fullmatch(r"[a-z_]+(@\d(\+\d)?)?(\[[a-z0-9 -]+\])?", key), key
+
+
+@pytest.mark.parametrize(
+    ("effect", "places"),
+    [
+        ("joint_offset", "1 2 3 4 5 6"),
+        ("link_geometry", "1 2 3 4 5 6"),
+        ("link_weight", "2 3 4 5"),
+        ("compensator_torque", "2"),
+        ("compensator_stiffness", "2"),
+        ("link_elasticity", "1 2 3 6"),
+        ("joint_tilt", "1 2 3 4 5 6"),
+        ("stiffening", "1 2 3 4 5 6"),
+        ("lost_motion", "1 2 3 4 5 6"),
+        ("hysteresis", "1 2 3 4 5 6"),
+    ],
+)
+def test_places_on_the_fanuc(fanuc, effect, places):
+    found = [c.joints for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
+    assert found == [(int(joint),) for joint in places.split()]
+
+
+def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
+    for candidate in candidates_on(sites_of(chain)).values():
+        names = [p.name for p in (*candidate.parameters, *candidate.shapes)]
+        assert candidate.parameters and len(names) == len(set(names)), candidate.key
+        for parameter in candidate.parameters:
+            assert parameter.unit in UNITS, (candidate.key, parameter)
+            assert 0 < parameter.plausible < np.inf
+        for shape in candidate.shapes:
+            assert shape.unit and 0 < shape.lowest < shape.start < shape.highest
+
+
+def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
+    around = circumstances_on(fanuc.chain, made_states(6, 30, seed=1), fanuc.compliance)
+    model, states = made_model(fanuc.chain), made_states(6, 30, seed=1)
+    estimate = made_estimate(model)
+    jacobian = linearize(model, estimate, seen_exactly(model, estimate, states), around).coordinate_jacobian
+    for candidate in candidates_on(around.sites).values():
+        made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
+        size = np.array([parameter.plausible for parameter in candidate.parameters])
+        moved = np.einsum("src,dsc->dsr", jacobian, made) * size[:, None, None]
+        largest = np.linalg.norm(moved, axis=-1).max()
+        assert LEAST_M < largest < LARGEST_M, (candidate.key, largest)
+
+
+def test_sensitivities_of_every_candidate_are_central_differences(chain):
+    targets = Target("A", chain.end_effector.name, None), Target("B", chain.points[0].name, (0.1, -0.2, 0.05))
+    bare = made_model(chain, targets, rows=6)
+    states, rng = made_states(chain.coordinates, 4, seed=2), np.random.default_rng(0)
+    for candidate in candidates_on(bare.sites).values():
+        model = made_model(chain, targets[1:], 6, fitted_frames=False, effects=(candidate,))
+        if candidate.effect in ("joint_offset", "payload", "lost_motion"):
+            model = made_model(chain, targets, 6, effects=(candidate,))
+        estimate = made_estimate(model, seed=3)
+        around = circumstances(model, estimate, states)
+        seen = seen_exactly(model, estimate, states)
+        steps = np.diag(small_steps(model, estimate))
+        # Of a long law, steps of all parameters at once.
+        steps = steps if len(steps) < 6 else rng.standard_normal((3, len(steps))) @ steps
+        expected = slopes(model, estimate, seen, around, steps)
+        found = linearize(model, estimate, seen, around).sensitivities @ steps.T
+        scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
+        np.testing.assert_allclose(found / scale, expected / scale, rtol=0, atol=1e-5, err_msg=candidate.key)
+
+
+def test_positions_have_the_sensitivities_of_the_first_rows_of_poses(chain):
+    effects = tuple(candidates_on(sites_of(chain)).values())
+    states = made_states(chain.coordinates, 3, seed=4)
+    found = []
+    for rows in (3, 6):
+        target = Target("A", chain.end_effector.name, (0.1, 0.2, 0.3))
+        model = made_model(chain, (target,), rows, effects=effects)
+        estimate = made_estimate(model, seed=5)
+        around = circumstances(model, estimate, states)
+        found.append(linearize(model, estimate, seen_exactly(model, estimate, states), around).sensitivities)
+    np.testing.assert_allclose(found[0], found[1][:, :3], rtol=1e-12, atol=1e-12)
+
+
+def test_displacement_is_that_of_each_state_by_itself(chain):
+    """What an effect does in one state must not hang on which other states are looked at."""
+    whole = made_states(chain.coordinates, 12, seed=6)
+    kept = np.arange(12) > 4
+    part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
+    some, every = circumstances_on(chain, part), circumstances_on(chain, whole)
+    for candidate in candidates_on(every.sites).values():
+        if candidate.family == "drift":
+            continue
+        start = [shape.start for shape in candidate.shapes]
+        expected = displacements(candidate, every, *start)[:, kept]
+        np.testing.assert_allclose(displacements(candidate, some, *start), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
+    states = made_states(chain.coordinates, 6, seed=7)
+    states.wrench[:] = 0.0
+    around = circumstances_on(chain, states)
+    for candidate in candidates_on(around.sites).values():
+        made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
+        assert made.any() != ("load" in candidate.needs), candidate.key
+
+
+def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
+    around = circumstances_on(fanuc.chain, made_states(6, 5, seed=8))
+    for candidate in candidates_on(around.sites).values():
+        for name, attribute in (("approach", "approach"), ("time", "time_s"), ("temperature", "temperature_c")):
+            without = replace(around, **{attribute: None})
+            start = [shape.start for shape in candidate.shapes]
+            if name in candidate.needs:
+                with pytest.raises((TypeError, AttributeError)):
+                    candidate.displacement(without, *start)
+            else:
+                candidate.displacement(without, *start)
+
+
+def test_odd_effects_turn_their_sign_with_the_load(fanuc):
+    states = made_states(6, 5, seed=9)
+    other = made_states(6, 5, seed=9)
+    other.wrench[:] *= -1
+    one, opposite = circumstances_on(fanuc.chain, states), circumstances_on(fanuc.chain, other)
+    for candidate in candidates_on(one.sites).values():
+        start = [shape.start for shape in candidate.shapes]
+        # A bias has the same sign wherever there is a load.
+        odd = "load" in candidate.needs and candidate.effect != "force_bias"
+        expected = (-1 if odd else 1) * displacements(candidate, one, *start)
+        np.testing.assert_allclose(displacements(candidate, opposite, *start), expected, rtol=1e-12, err_msg=candidate.key)
+
+
+@pytest.mark.parametrize("family", ["elastic", "gearbox", "load"])
+def test_only_gearboxes_are_not_linear_in_the_load(fanuc, family):
+    states, double = made_states(6, 5, seed=10), made_states(6, 5, seed=10)
+    double.wrench[:] *= 2
+    one, two = circumstances_on(fanuc.chain, states), circumstances_on(fanuc.chain, double)
+    for candidate in candidates_on(one.sites).values():
+        if candidate.family != family or "load" not in candidate.needs or candidate.effect == "force_bias":
+            continue
+        start = [shape.start for shape in candidate.shapes]
+        linear = np.allclose(
+            displacements(candidate, two, *start), 2 * displacements(candidate, one, *start), rtol=1e-9, atol=0
+        )
+        assert linear == (family != "gearbox"), candidate.key
+
+
+NEW = '''
+"""Gravity pulls the foot down, for some reason."""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "sinking_foot", "drift"
+
+
+def candidates(sites):
+    """One candidate, at the foot."""
+    parameters = (Parameter("depth", "m", 1e-3),)
+    return [Candidate(NAME, FAMILY, (), "", parameters, lambda around: [{sites.base[2]: -np.ones(len(around.wrench))}])]
+'''
+
+
+@pytest.fixture
+def one_more_module(tmp_path, monkeypatch):
+    (tmp_path / "sinking_foot.py").write_text(NEW)
+    monkeypatch.setattr(elastocal.effects, "__path__", [*elastocal.effects.__path__, str(tmp_path)])
+    catalogue.effects.cache_clear()
+    yield
+    catalogue.effects.cache_clear()
+    sys.modules.pop("elastocal.effects.sinking_foot", None)
+    vars(elastocal.effects).pop("sinking_foot", None)
+
+
+def test_adding_an_effect_is_adding_one_module(fanuc, one_more_module):
+    assert set(catalogue.effects()) == {*FAMILIES, "sinking_foot"}
+    model = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),), fitted_frames=False)
+    candidate = candidates_on(model.sites)["sinking_foot"]
+    assert declared_candidates(["sinking_foot"], model.sites)[0].key == "sinking_foot"
+    sunk, states = model.with_effects((candidate,)), made_states(6, 3)
+    states.wrench[:] = 0
+    estimate = made_estimate(model).with_effects((candidate,))
+    estimate.coefficients[0][:] = 0.02
+    expected = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0] - [0, 0, 0.02]
+    np.testing.assert_allclose(seen_exactly(sunk, estimate, states).position, expected, atol=1e-14)
+
+
+def test_module_that_was_added_is_gone_with_its_file():
+    assert "sinking_foot" not in catalogue.effects()
+
+
+def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
+    sites = sites_of(fanuc.chain)
+    found = [candidate.key for candidate in declared_candidates(["payload", "link_weight"], sites)]
+    assert found == ["payload", *(f"link_weight@{joint}" for joint in (2, 3, 4, 5))]
+    assert declared_candidates([], sites) == []
+
+
+def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):
+    with refused("campaign.yaml", "declared", "link_weight"):
+        declared_candidates(["link_wait"], sites_of(fanuc.chain), "campaign.yaml")
