@@ -6,7 +6,7 @@ They stop nothing: every fit gives them little weight. They are named so that so
 import numpy as np
 
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.faults.placement import robust_sigma, single_observations
+from elastocal.faults.placement import IMPLAUSIBLE_M, robust_sigma, robustly_placed, single_observations, spread, trimmed_rms
 from elastocal.faults.protocol import Fault, Value
 from elastocal.fitting import fit
 from elastocal.model import circumstances, declared_model, residuals
@@ -17,6 +17,8 @@ NAME, FAMILY, AFTER = "outliers", "data", ("wrong_sign", "wrong_unit", "shuffled
 
 # Robust standard deviations of the readings of one target.
 _FAR = 8.0
+# Where the model lacks something large residuals are many, and no outliers: nine readings in ten are less than half as far.
+_BULK, _BEYOND_BULK = 0.9, 2.0
 # Fewer readings of a target do not tell its standard deviation.
 _FEWEST = 20
 # No sensor reads closer: smaller deviations are rounding.
@@ -38,6 +40,9 @@ def find(campaign, readings):
     list of Fault
         One for all of them, or none.
     """
+    if trimmed_rms(robustly_placed(campaign, spread(readings)).distance) > IMPLAUSIBLE_M:
+        # Where nothing fits, nothing stands apart.
+        return []
     sites = declared_model(campaign).sites
     model = declared_model(campaign, declared_candidates(campaign.declared, sites))
     noise = Noise("declared", _NOISE, _NOISE, np.zeros(campaign.robot.joints))
@@ -51,7 +56,8 @@ def find(campaign, readings):
             continue
         for first in range(0, model.rows, 3):
             distance = np.linalg.norm(residual[members, first : first + 3], axis=1)
-            far[members] |= distance > _FAR * max(robust_sigma(distance, 3), _FINEST)
+            limit = max(_FAR * max(robust_sigma(distance, 3), _FINEST), _BEYOND_BULK * np.quantile(distance, _BULK))
+            far[members] |= distance > limit
     if not far.any():
         return []
     count, rows = int(far.sum()), np.sort(readings.row[far])

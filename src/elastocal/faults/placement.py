@@ -38,19 +38,27 @@ class Placement:
         Frames and targets.
     predicted, measured : ndarray (N, 3)
         m.
-    turn : ndarray (N,) or None
-        Angle between predicted and measured orientation, rad.
+    predicted_rotation, measured_rotation : ndarray (N, 3, 3) or None
     """
 
     estimate: object
     predicted: np.ndarray
     measured: np.ndarray
-    turn: np.ndarray | None
+    predicted_rotation: np.ndarray | None
+    measured_rotation: np.ndarray | None
 
     @property
     def distance(self):
         """From the predicted to the measured position, ndarray (N,), m."""
         return np.linalg.norm(self.measured - self.predicted, axis=1)
+
+    @property
+    def turn(self):
+        """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
+        if self.measured_rotation is None:
+            return None
+        relative = self.measured_rotation @ self.predicted_rotation.transpose(0, 2, 1)
+        return np.linalg.norm(rotation_vectors(relative), axis=1)
 
 
 def placed(campaign, readings):
@@ -113,11 +121,8 @@ def placed_by(campaign, readings, estimate):
         point = replace(campaign.robot.chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
         predicted[mask], rotation[mask] = poses(campaign.robot.chain, readings.joint_angles[mask], point)
     measured, seen = measured_in_base(estimate, single_observations(readings))
-    turn = None
-    if seen is not None:
-        expected = rotation @ estimate.target_rotation[readings.target]
-        turn = np.linalg.norm(rotation_vectors(seen @ expected.transpose(0, 2, 1)), axis=1)
-    return Placement(estimate, predicted, measured, turn)
+    expected = None if seen is None else rotation @ estimate.target_rotation[readings.target]
+    return Placement(estimate, predicted, measured, expected, seen)
 
 
 def spread(readings, poses=MANY_POSES):

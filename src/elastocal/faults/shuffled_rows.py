@@ -34,9 +34,14 @@ _FEWEST_ROWS = 2
 _SAME_PLACE_M = 1e-3
 # Rows in place tell how well rows in place fit, if they are so many.
 _FEWEST_IN_PLACE = 10
-_MATCHING_ROUNDS = 15
-# A load is out of place where it misses the deflection by this share of it.
-_MISSED = 0.5
+_MATCHING_ROUNDS = 10
+# Orientations tell places apart as points at this distance from the target would, m.
+_ARM_M = 0.5
+# A shift concerns all rows: more than this share is absurdly far, and all but a few come right.
+_MANY, _CURED = 0.01, 0.9
+# A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
+# place within so many.
+_MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
 _MOST_STATES = 1500
 _ROUNDS_OF_COMPLIANCE = 4
 # A matching of loads is no chance if it leaves so much less than one of the deflections of other poses.
@@ -70,26 +75,30 @@ def _of_positions(campaign, readings):
     some = robustly_placed(campaign, spread(readings))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
     as_written = placed_by(campaign, readings, some.estimate)
-    if (as_written.distance > IMPLAUSIBLE_M).sum() < _FEWEST_ROWS:
+    far = (as_written.distance > IMPLAUSIBLE_M).mean()
+    if far * len(readings) < _FEWEST_ROWS:
         return []
-    if trimmed_rms(some.distance) > IMPLAUSIBLE_M:
-        return _shifted(campaign, readings) or _all_matched(campaign, readings, as_written)
-    return _matched(readings, as_written, as_written, as_written)
+    found = _shifted(campaign, readings, as_written) if far > _MANY else []
+    if not found and trimmed_rms(some.distance) > IMPLAUSIBLE_M:
+        return _all_matched(campaign, readings, as_written)
+    return found or _matched(readings, as_written, as_written, as_written)
 
 
-def _shifted(campaign, readings):
+def _shifted(campaign, readings, as_written):
     """All rows fit once the measured columns are moved by one row."""
-    before = trimmed_rms(robustly_placed(campaign, spread(readings)).distance)
     shifts = [_Shift(steps, kind) for kind in ("row", "row of its target", "pose") for steps in (1, -1)]
     moved = [_moved(readings, shift) for shift in shifts]
-    after = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
-    best = int(np.argmin(after))
-    found = trimmed_rms(robustly_placed(campaign, spread(moved[best])).distance)
-    if found > min(before / FAR_BETTER, IMPLAUSIBLE_M):
+    plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
+    best = int(np.argmin(plain))
+    estimate = robustly_placed(campaign, spread(moved[best])).estimate
+    before, after = as_written.distance, placed_by(campaign, moved[best], estimate).distance
+    # Neighbouring rows may be near each other: those that are not tell.
+    cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
+    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or _rms(after) > _rms(before) / FAR_BETTER:
         return []
     shift = shifts[best]
     detail = f"the measured columns fit one {shift.kind} further {'down' if shift.steps > 0 else 'up'}"
-    return [Fault(NAME, (), detail, (Value("shift", float(shift.steps), "–"),), (before, found), (), True)]
+    return [Fault(NAME, (), detail, (Value("shift", float(shift.steps), "–"),), (_rms(before), _rms(after)), (), True)]
 
 
 def _moved(readings, shift):
@@ -122,16 +131,16 @@ def _all_matched(campaign, readings, as_written):
     """Frames, targets and rows found together, from the main axes of all points: most rows are out of place."""
     starts = [as_written.estimate]
     if campaign.frame == "tracker":
-        starts += _by_main_axes(readings, as_written)
+        starts += _by_main_axes(campaign, readings, as_written)
     nearest = []
     for start in starts:
         beside = placed_by(campaign, readings, start)
-        nearest.append((_gaps(readings, beside, np.arange(len(readings)))[0], start))
+        nearest.append((_gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))[0], start))
     _, estimate = min(nearest, key=lambda entry: trimmed_rms(entry[0]))
     before = None
     for _ in range(_MATCHING_ROUNDS):
         beside = placed_by(campaign, readings, estimate)
-        _, source = _gaps(readings, beside, np.arange(len(readings)))
+        _, source = _gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))
         if before is not None and (source == before).all():
             break
         before = source
@@ -139,14 +148,18 @@ def _all_matched(campaign, readings, as_written):
     return _matched(readings, as_written, beside, None)
 
 
-def _by_main_axes(readings, as_written):
+def _by_main_axes(campaign, readings, as_written):
     """Estimates whose frames turn the main axes of the predicted points into those of the measured ones."""
     found, estimate = [], as_written.estimate
+    unknown = [target.offset_m is None for target in campaign.targets]
+    offset = np.where(np.array(unknown)[:, None], 0.0, estimate.target_offset)
+    estimate = replace(estimate, target_offset=offset)
+    predicted = placed_by(campaign, readings, estimate).predicted
     for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         rotation, position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
         for number, session in enumerate(estimate.sessions):
             mask = readings.session == session
-            ours, theirs = as_written.predicted[mask], readings.position[mask]
+            ours, theirs = predicted[mask], readings.position[mask]
             from_axes, to_axes = _main_axes(ours), _main_axes(theirs) * [first, second, first * second]
             rotation[number] = to_axes @ from_axes.T
             position[number] = theirs.mean(axis=0) - rotation[number] @ ours.mean(axis=0)
@@ -167,12 +180,14 @@ def _matched(readings, as_written, beside, rest):
     if rest is not None and (~out).sum() >= _FEWEST_IN_PLACE:
         sigma = robust_sigma(distance[~out], 3)
         out &= distance > _OUT_OF_PLACE * sigma
-        level = max(_IN_PLACE * sigma, _SAME_PLACE_M)
+        # Loads move some targets much more than others.
+        level = max(_IN_PLACE * sigma, 2.0 * np.quantile(distance[~out], 0.95), _SAME_PLACE_M)
     rows = np.flatnonzero(out)
     if len(rows) < _FEWEST_ROWS:
         return []
-    left, source = _gaps(readings, beside, rows)
-    back = (left < level) & (left < _NO_CHANCE * _spacing(readings, beside, rows)) & (source != rows)
+    predicted = _places(beside.predicted, beside.predicted_rotation)
+    left, source = _gaps(readings, predicted, _places(beside.measured, beside.measured_rotation), rows)
+    back = (left < level) & (left < _NO_CHANCE * _spacing(readings, predicted, rows)) & (source != rows)
     # Each reading has one place: one that stands for many is no permutation.
     taken = len(np.unique(_poses(readings)[source[back]])), len(np.unique(_poses(readings)[rows[back]]))
     if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
@@ -186,23 +201,31 @@ def _matched(readings, as_written, beside, rest):
     return [Fault(NAME, (), detail, (share,), (before, after), concerned, True)]
 
 
-def _gaps(readings, beside, rows):
-    """For each of some rows the distance to the nearest measured point among them, and the row of that point."""
+def _places(position, rotation):
+    """Positions and, where they are measured, orientations as points whose distances are in m, ndarray (N, 3 or 12)."""
+    if rotation is None:
+        return position
+    # A small angle changes the nine entries, taken together, by the square root of two times itself.
+    return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
+
+
+def _gaps(readings, predicted, measured, rows):
+    """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
     left, source = np.empty(len(rows)), np.empty(len(rows), int)
     for session in np.unique(readings.session[rows]):
         members = np.flatnonzero(readings.session[rows] == session)
-        tree = cKDTree(beside.measured[rows[members]])
-        left[members], number = tree.query(beside.predicted[rows[members]])
+        tree = cKDTree(measured[rows[members]])
+        left[members], number = tree.query(predicted[rows[members]])
         source[members] = rows[members[number]]
     return left, source
 
 
-def _spacing(readings, beside, rows):
+def _spacing(readings, predicted, rows):
     """For each of some rows how far the next place is among those predicted for them."""
     spacing = np.zeros(len(rows))
     for session in np.unique(readings.session[rows]):
         members = np.flatnonzero(readings.session[rows] == session)
-        points = beside.predicted[rows[members]]
+        points = predicted[rows[members]]
         # One of each place.
         places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
         near = cKDTree(places).query(points, k=min(4, len(places)))[0].reshape(len(points), -1)
@@ -237,15 +260,17 @@ def _of_loads(campaign, readings):
 def _some_loads_matched(states, compliance, missed, out):
     """Most loads are in place and tell how well the others must fit where they belong."""
     sigma = np.median(missed[~out])
-    rows = np.flatnonzero(out & (missed > _OUT_OF_PLACE * sigma))
-    if len(rows) < _FEWEST_ROWS:
+    if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_ROWS:
         return []
+    # By chance the load of another state may miss by little.
+    rows = np.flatnonzero(missed > _MISSED_LIKE_OTHERS * sigma)
     cost = states.misfits(compliance)[np.ix_(rows, rows)]
     there = linear_sum_assignment(cost**2)[1]
     left = cost[np.arange(len(rows)), there]
-    if (left < _IN_PLACE * sigma).mean() < _MOST:
+    back = left < _MISSED_LIKE_OTHERS * sigma
+    if back.mean() < _MOST:
         return []
-    return _loads_fault(states, rows, rows[there], missed[rows], left)
+    return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
 
 
 def _all_loads_matched(states, nominal):
