@@ -55,12 +55,17 @@ class Attribution:
         return tuple(self.rivals[index] for index in order if confounded[index])
 
 
-def attribute(found, observations, candidates):
+def attribute(final, found, p_values, observations, candidates):
     """Weigh each mechanism found against every other candidate.
 
     Parameters
     ----------
-    found : Search
+    final : Fit
+        With all effects found.
+    found : sequence of Candidate
+        Effects found, the strongest first.
+    p_values : dict of str to float
+        Family-wise p-value of each, by its key.
     observations : Observations
     candidates : sequence of Candidate
 
@@ -69,8 +74,25 @@ def attribute(found, observations, candidates):
     tuple of Attribution
         One for each name of the catalogue among the effects found, in their order.
     """
-    names = list(dict.fromkeys(candidate.effect for candidate in found.effects))
-    return tuple(_attribution(name, found, observations, candidates) for name in names)
+    return tuple(
+        _attribution(name, members, final, [c for c in found if c not in members], p_values, observations, candidates)
+        for name, members in by_effect(found).items()
+    )
+
+
+def by_effect(found):
+    """Candidates found, gathered by the name of their effect in the order in which the names come.
+
+    Parameters
+    ----------
+    found : sequence of Candidate
+
+    Returns
+    -------
+    dict of str to tuple of Candidate
+    """
+    names = dict.fromkeys(candidate.effect for candidate in found)
+    return {name: tuple(candidate for candidate in found if candidate.effect == name) for name in names}
 
 
 def confounding(seen):
@@ -97,11 +119,10 @@ def confounding(seen):
     return np.degrees(np.arccos(np.clip(cosines, 0.0, 1.0)))
 
 
-def _attribution(name, found, observations, candidates):
-    members = tuple(candidate for candidate in found.effects if candidate.effect == name)
+def _attribution(name, members, final, others_found, p_values, observations, candidates):
     keys = {member.key for member in members}
-    others = without(found.final, keys, observations)
-    taken = {candidate.key for candidate in found.effects} - keys
+    others = without(final, keys, observations)
+    taken = {candidate.key for candidate in others_found}
     seen = directions(others, observations, [candidate for candidate in candidates if candidate.key not in taken])
     mine = [index for index, (candidate, _) in enumerate(seen.candidates) if candidate.key in keys]
     basis = np.linalg.qr(np.concatenate([seen.columns[index] for index in mine], axis=1))[0]
@@ -125,20 +146,10 @@ def _attribution(name, found, observations, candidates):
     return Attribution(
         name,
         members,
-        _family_wise(found, keys),
+        min(p_values[key] for key in keys),
         tuple(rivals[index] for index in first),
         np.array(angles)[first],
         np.array(differences)[first],
         np.array(sizes)[first],
         basis.shape[1],
     )
-
-
-def _family_wise(found, keys):
-    values = [
-        look.scores.p_family[index]
-        for look in found.looks
-        for index, (candidate, _) in enumerate(look.directions.candidates)
-        if candidate.key in keys and index == look.chosen
-    ]
-    return float(min(values, default=1.0))

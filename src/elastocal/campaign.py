@@ -166,29 +166,71 @@ def read_campaign(folder, robots_folder, effects=None):
     """
     folder = Path(folder)
     source = (folder / DOCUMENT).as_posix()
-    document = read_document(source)
-    check_document(document, "campaign", source)
-    robot = _robot(document["robot"], folder, robots_folder, source)
+    document, robot_path = read_descriptions(folder, robots_folder)
+    robot = read_robot(robot_path)
     targets = _targets(document["targets"], robot.chain, source)
     holdout = _holdout(document.get("holdout", DEFAULT_HOLDOUT), folder, source)
-    declared = tuple(document.get("declared", ()))
-    for index, name in enumerate(declared):
+    for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
     table = read_measurements(folder, robot.joints, document["measured"])
     readings = _readings(table, robot, targets)
     _check_readings(readings, table, robot, targets, source)
     _held_out(holdout, readings, source)
+    return described_campaign(document | {"holdout": holdout}, robot, readings, source)
+
+
+def read_descriptions(folder, robots_folder):
+    """What a campaign says of itself, and where its robot is described.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+
+    Returns
+    -------
+    document : dict
+        Contents of ``campaign.yaml``, which follow their schema.
+    robot_path : Path
+
+    Raises
+    ------
+    InputError
+        A document that its schema refuses, or a robot that is not there.
+    """
+    source = (Path(folder) / DOCUMENT).as_posix()
+    document = read_document(source)
+    check_document(document, "campaign", source)
+    return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
+
+
+def described_campaign(document, robot, readings, source):
+    """A campaign from its parts, which have been checked before.
+
+    Parameters
+    ----------
+    document : dict
+        Contents of ``campaign.yaml``.
+    robot : Robot
+    readings : Readings
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Campaign
+    """
     return Campaign(
         name=document["campaign"],
         robot=robot,
         measured=document["measured"],
         frame=document["frame"],
-        targets=targets,
+        targets=_targets(document["targets"], robot.chain, source),
         compliance=document.get("compliance", "nominal"),
-        declared=declared,
+        declared=tuple(document.get("declared", ())),
         noise=document.get("noise"),
-        holdout=holdout,
+        holdout=document.get("holdout", DEFAULT_HOLDOUT),
         readings=readings,
     )
 
@@ -307,7 +349,7 @@ def write_campaign(folder, document, table, joints, kind="parquet"):
         yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
 
 
-def _robot(name, folder, robots_folder, source):
+def _robot_path(name, folder, robots_folder, source):
     known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
     path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
     if not path.is_file():
@@ -315,7 +357,7 @@ def _robot(name, folder, robots_folder, source):
             f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {closest_first(name, known)}"
         )
         raise InputError(source, "robot", repr(name), allowed)
-    return read_robot(path)
+    return path
 
 
 def _targets(described, chain, source):

@@ -1,7 +1,8 @@
 """Robust generalized least squares on the composite model, by Gauss-Newton steps on exact predictions.
 
 What the data cannot tell is named and held: going through the parameters in their order, one that its predecessors explain so
-well that its standard error would exceed its plausible size keeps its value and is listed. Nothing is regularised.
+well that its standard error would exceed its plausible size keeps its value and is listed. Nothing is regularised but series
+whose parameters carry a prior, which is reported with them.
 """
 
 from dataclasses import dataclass, replace
@@ -12,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.model import circumstances, linearize, parameters, residuals, stepped
+from elastocal.model import circumstances, linearize, parameter_values, parameters, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.registration import registered
 from elastocal.whitening import Whitening, whitening
@@ -130,6 +131,8 @@ def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
+    priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
+    penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
     for step_number in range(_STEPS):
@@ -142,7 +145,7 @@ def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
         root = np.sqrt(weights)
         right = whitener.apply(line.residual * root[:, None]).reshape(-1)
         left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
-        step, covariance, held = solve_identifiable(left, right, plausible, frozen)
+        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, parameter_values(model, estimate))
         estimate = stepped(model, estimate, step)
         deviation = np.sqrt(np.diag(covariance))
         if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
@@ -151,7 +154,7 @@ def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
     return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual)
 
 
-def solve_identifiable(left, right, plausible, frozen=False):
+def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0):
     """Least squares over the parameters that the data can tell.
 
     Parameters
@@ -164,6 +167,10 @@ def solve_identifiable(left, right, plausible, frozen=False):
         Plausible size of each parameter.
     frozen : bool or ndarray of bool (P,)
         Parameters not to move.
+    penalty : float or ndarray (P,)
+        One over the variance of the prior about zero; 0 for none.
+    present : float or ndarray (P,)
+        Values from which the step is taken.
 
     Returns
     -------
@@ -173,13 +180,14 @@ def solve_identifiable(left, right, plausible, frozen=False):
     held : ndarray of bool (P,)
     """
     scaled = left * plausible
-    gram = scaled.T @ scaled
+    gram = scaled.T @ scaled + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
+    along = scaled.T @ right - plausible * np.broadcast_to(penalty * present, len(plausible))
     held = ~identifiable(gram, np.broadcast_to(frozen, len(plausible)))
     free = np.flatnonzero(~held)
     step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
     if len(free):
         inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
-        step[free] = plausible[free] * (inverse.T @ (inverse @ (scaled[:, free].T @ right)))
+        step[free] = plausible[free] * (inverse.T @ (inverse @ along[free]))
         covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
     return step, covariance, held
 

@@ -189,6 +189,25 @@ def parameters(model, estimate):
     return found
 
 
+def parameter_values(model, estimate):
+    """Present values of all that is fitted, in the order of `parameters`.
+
+    Frames and targets are fitted by steps from where they are and count as zero.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+
+    Returns
+    -------
+    ndarray (P,)
+    """
+    owned = [owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, estimate)]
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([np.zeros(sum(owned)), *effects])
+
+
 def predict(model, estimate, observations, circumstances):
     """Exact poses of the targets, in base axes.
 

@@ -42,12 +42,13 @@ class Proposal:
     present: float
 
 
-def propose(found, attribution, observations, candidates, joint_limits, count, stream):
+def propose(final, attribution, observations, candidates, joint_limits, count, stream):
     """Choose states one by one, each the one that most raises the smallest separation from the alternatives.
 
     Parameters
     ----------
-    found : Search
+    final : Fit
+        With all effects found.
     attribution : Attribution
         With at least one alternative.
     observations : Observations
@@ -62,7 +63,7 @@ def propose(found, attribution, observations, candidates, joint_limits, count, s
     -------
     Proposal
     """
-    bare = without(found.final, {member.key for member in attribution.members}, observations)
+    bare = without(final, {member.key for member in attribution.members}, observations)
     targets, offsets, turns = _targets_everywhere(bare)
     model = replace(bare.model, targets=targets)
     estimate = replace(bare.estimate, target_offset=offsets, target_rotation=turns)
@@ -70,8 +71,8 @@ def propose(found, attribution, observations, candidates, joint_limits, count, s
     present, gains = [], []
     for key in attribution.alternatives[:_RIVALS]:
         rival = (candidates[key], [shape.start for shape in candidates[key].shapes])
-        here = _rows(bare.model, bare.estimate, bare, found.final, attribution.members, rival, observations)
-        there = _rows(model, estimate, bare, found.final, attribution.members, rival, pool)
+        here = _rows(bare.model, bare.estimate, bare, final, attribution.members, rival, observations)
+        there = _rows(model, estimate, bare, final, attribution.members, rival, pool)
         rows = here.reshape(-1, here.shape[-1])
         present.append(rows.T @ rows)
         gains.append(there.transpose(0, 2, 1) @ there)

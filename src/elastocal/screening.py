@@ -9,6 +9,7 @@ the smallest p-value of all candidates in each replicate gives the probability o
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import cho_solve
 from scipy.sparse import csr_matrix
 from scipy.stats import f as f_distribution
 
@@ -248,17 +249,23 @@ def cross_validated_gain(found, winner, folds):
         Fall of the squared whitened error, summed over all poses, and its standard error over poses.
     """
     basis = np.concatenate([found.model, found.columns[winner]], axis=1)
-    fitted_before = found.model.shape[1]
+    before = found.model.shape[1]
+    whole, along = np.eye(basis.shape[1]), basis.T @ found.residual
     # Neighbouring numbers often mean neighbouring poses: deal them out in turn.
     fold = found.cluster % folds
     gain = np.zeros(len(found.residual))
     for number in range(folds):
-        out = fold == number
-        rest, right = basis[~out], found.residual[~out]
-        for count, sign in ((fitted_before, 1.0), (basis.shape[1], -1.0)):
-            gram = rest[:, :count].T @ rest[:, :count]
-            solved = np.linalg.lstsq(gram, rest[:, :count].T @ right, rcond=1e-9)[0]
-            gain[out] += sign * (found.residual[out] - basis[out, :count] @ solved) ** 2
+        out = np.flatnonzero(fold == number)
+        left = basis[out]
+        # The columns are orthonormal over all poses: what is left of them without a fold is the identity less its share.
+        rest = whole - left.T @ left
+        rest[np.diag_indices_from(rest)] += _ROUNDING
+        right = along - left.T @ found.residual[out]
+        factor = np.linalg.cholesky(rest)
+        # The factor of the model alone is the leading block of the factor of both.
+        for count, sign in ((before, 1.0), (len(whole), -1.0)):
+            solved = cho_solve((factor[:count, :count], True), right[:count])
+            gain[out] += sign * (found.residual[out] - left[:, :count] @ solved) ** 2
     per_pose = np.bincount(found.cluster, gain)
     return float(per_pose.sum()), float(np.sqrt(len(per_pose)) * per_pose.std(ddof=1))
 

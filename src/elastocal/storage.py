@@ -27,8 +27,8 @@ class Column:
     Attributes
     ----------
     name : str
-    type : {"float64", "float32", "int32", "bool", "string"}
-        A string column has one value for each row group.
+    type : {"float64", "float32", "int32", "bool", "string", "text"}
+        A string column has one value for each row group, a text column one for each row.
     unit : str
         Empty for counts, names and shares.
     meaning : str
@@ -90,7 +90,7 @@ def write_table(path, schema, blocks, provenance):
     ):
         for block in blocks:
             values = _checked(path, schema, block)
-            digests.append({name: _digest(array) for name, array in values.items()})
+            digests.append({c.name: _digest(c, values[c.name]) for c in schema.columns})
             arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
             writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
         metadata = {_TABLE: schema.name, _PROVENANCE: provenance, _DIGESTS: digests}
@@ -140,9 +140,10 @@ def read_blocks(path, schema, columns=None, **where):
             except (OSError, pa.ArrowException) as error:
                 raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
             block = {c.name: _to_numpy(c, table.column(c.name)) for c in wanted}
-            for name, array in block.items():
-                if _digest(array) != digests[group][name]:
-                    raise InputError(path, f"column {name}, row group {group}", "values that were edited", _AS_WRITTEN)
+            for column in wanted:
+                if _digest(column, block[column.name]) != digests[group][column.name]:
+                    where = f"column {column.name}, row group {group}"
+                    raise InputError(path, where, "values that were edited", _AS_WRITTEN)
             yield block
 
 
@@ -196,6 +197,8 @@ def _constant(file, group, column):
 
 
 def _arrow_type(column):
+    if column.type == "text":
+        return pa.string()
     return pa.dictionary(pa.int32(), pa.string()) if column.type == "string" else pa.type_for_alias(column.type)
 
 
@@ -206,7 +209,9 @@ def _checked(path, schema, block):
     values = {}
     for column in schema.columns:
         value = block[column.name]
-        if column.type != "string":
+        if column.type == "text":
+            value = np.array(value, dtype=object)
+        elif column.type != "string":
             value = np.ascontiguousarray(value, dtype=column.type)
             if column.type.startswith("float") and not column.missing and not np.isfinite(value).all():
                 row = int(np.argmin(np.isfinite(value)))
@@ -222,8 +227,11 @@ def _checked(path, schema, block):
     return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
 
 
-def _digest(array):
-    data = "\n".join(dict.fromkeys(array)).encode() if array.dtype == object else np.ascontiguousarray(array)
+def _digest(column, array):
+    if column.type in ("string", "text"):
+        data = "\n".join(dict.fromkeys(array) if column.type == "string" else array).encode()
+    else:
+        data = np.ascontiguousarray(array)
     return hashlib.sha256(data).hexdigest()[:32]
 
 
@@ -233,6 +241,8 @@ def _to_arrow(column, array, rows):
         text = array[0].encode()
         name = pa.Array.from_buffers(pa.string(), 1, [None, _buffer(np.array([0, len(text)], np.int32)), pa.py_buffer(text)])
         return pa.DictionaryArray.from_arrays(_plain(pa.int32(), np.zeros(rows, np.int32)), name)
+    if column.type == "text":
+        return pa.array(array.tolist(), pa.string())
     return _plain(_arrow_type(column), np.packbits(array, bitorder="little") if column.type == "bool" else array, rows)
 
 
@@ -249,6 +259,8 @@ def _to_numpy(column, chunked):
     if column.type == "string":
         names = np.array(array.dictionary.to_pylist(), dtype=object)
         return names[_values(array.indices, np.int32)]
+    if column.type == "text":
+        return np.array(array.to_pylist(), dtype=object)
     if column.type == "bool":
         bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
         return bits[array.offset : array.offset + len(array)].astype(bool)

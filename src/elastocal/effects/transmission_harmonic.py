@@ -11,6 +11,9 @@ from elastocal.effects.protocol import Candidate, Parameter
 NAME, FAMILY = "transmission_harmonic", "transmission"
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 _SAMPLES_PER_PERIOD = 4
+# Gears of robots err by up to about an arc minute. Over the part of a turn that a joint uses, neighbouring orders are nearly the
+# same function: without a prior they would cancel each other at a hundred times that.
+_AMPLITUDE_RAD = 2e-4
 
 
 def candidates(sites):
@@ -20,7 +23,9 @@ def candidates(sites):
 
 def _candidate(joint, low, high):
     orders = range(low, high + 1)
-    parameters = tuple(Parameter(f"{wave}_{order}q", "rad", 2e-4) for order in orders for wave in ("cos", "sin"))
+    parameters = tuple(
+        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD) for order in orders for wave in ("cos", "sin")
+    )
 
     def displacement(circumstances):
         angle = circumstances.joint_angles[:, joint]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.elastostatics import generalized_forces, regressor
-from elastocal.faults.placement import robust_sigma, robustly_placed, spread
+from elastocal.faults.placement import rms, robust_sigma, robustly_placed, spread
 from elastocal.fitting import solve_identifiable
 from elastocal.kinematics import poses_and_jacobians
 
@@ -21,6 +21,7 @@ _WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
 # As written the deflections must fit so much worse, and corrected loads must explain that share of them.
 _FAR_WORSE, _UNEXPLAINED = 2.0, 0.5
 _FEWEST_POSES = 4
+_ROUNDING_M = 1e-9
 # Compliances are sought only within these multiples of the nominal ones.
 _RATIOS_OF_ROBOTS = 0.3, 3.0
 _APART, _REJECTIONS = 6.0, 4
@@ -164,9 +165,9 @@ def unit_of_loads(bent):
         scaled = np.abs(np.log(ratios / sign / mean)) if (ratios * sign > 0).all() else np.array([np.inf])
         if scaled.max() > np.log(_RATIO) or abs(np.log(mean)) > np.log(_MEAN_RATIO):
             continue
-        before = _rms((bent.seen - as_written.sum(axis=1))[kept])
-        after = _rms((bent.seen - sign * corrected.sum(axis=1))[kept])
-        if rms_free > _UNEXPLAINED * _rms(bent.seen[kept]) or before < _FAR_WORSE * after:
+        before = rms((bent.seen - as_written.sum(axis=1))[kept])
+        after = rms((bent.seen - sign * corrected.sum(axis=1))[kept])
+        if rms_free > _UNEXPLAINED * rms(bent.seen[kept]) or before < _FAR_WORSE * after:
             continue
         if best is None or after < 0.9 * best.rms_corrected:
             along = as_written[kept].sum(axis=1)
@@ -303,19 +304,17 @@ def _ratios(bent, expected):
         left, right = expected[kept], bent.seen[kept]
         solution = np.linalg.lstsq(left, right, rcond=1e-10)[0]
         residual = bent.seen - expected @ solution
-        kept = np.abs(residual) <= _APART * max(robust_sigma(np.abs(residual), 1), 1e-9)
+        kept = np.abs(residual) <= _APART * max(robust_sigma(np.abs(residual), 1), _ROUNDING_M)
         if kept.sum() < 4 * joints:
             return None
-    rms = _rms(residual[kept])
-    if rms == 0.0:
-        rms = 1e-12
-    step, covariance, held = solve_identifiable(expected[kept] / rms, bent.seen[kept] / rms, np.ones(joints))
+    level = max(rms(residual[kept]), _ROUNDING_M)
+    step, covariance, held = solve_identifiable(expected[kept] / level, bent.seen[kept] / level, np.ones(joints))
     # Readings of one pose have their errors in common: poses count, not readings.
     deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * bent.poses), 1.0))
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
     if well.sum() < min(_FEWEST_JOINTS, joints):
         return None
-    return step[well], kept, rms
+    return step[well], kept, level
 
 
 def _some_poses(readings):
@@ -363,7 +362,3 @@ def _off_geometry(campaign, readings, residual, parts, jacobian, rotation, posit
     basis = left[:, sizes > 1e-9 * sizes[0]]
     values = [part.reshape(residual.size, -1) for part in (residual, *parts)]
     return [value - basis @ (basis.T @ value) for value in values]
-
-
-def _rms(values):
-    return float(np.sqrt((values**2).mean()))

@@ -173,9 +173,14 @@ def single_observations(readings):
     return Observations(states, np.arange(len(readings)), readings.target, readings.position, rotation)
 
 
+def rms(values):
+    """Root of the mean square."""
+    return float(np.sqrt((values**2).mean()))
+
+
 def trimmed_rms(distance):
     """RMS without the largest tenth."""
-    return float(np.sqrt((np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)] ** 2).mean()))
+    return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
 
 
 def robust_sigma(distance, components):

@@ -16,6 +16,7 @@ from elastocal.faults.placement import (
     IMPLAUSIBLE_M,
     placed,
     placed_by,
+    rms,
     robust_sigma,
     robustly_placed,
     spread,
@@ -94,11 +95,11 @@ def _shifted(campaign, readings, as_written):
     before, after = as_written.distance, placed_by(campaign, moved[best], estimate).distance
     # Neighbouring rows may be near each other: those that are not tell.
     cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
-    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or _rms(after) > _rms(before) / FAR_BETTER:
+    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or rms(after) > rms(before) / FAR_BETTER:
         return []
     shift = shifts[best]
     detail = f"the measured columns fit one {shift.kind} further {'down' if shift.steps > 0 else 'up'}"
-    return [Fault(NAME, (), detail, (Value("shift", float(shift.steps), "–"),), (_rms(before), _rms(after)), (), True)]
+    return [Fault(NAME, (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
 
 
 def _moved(readings, shift):
@@ -192,7 +193,7 @@ def _matched(readings, as_written, beside, rest):
     taken = len(np.unique(_poses(readings)[source[back]])), len(np.unique(_poses(readings)[rows[back]]))
     if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
         return []
-    before, after = _rms(as_written.distance[rows]), _rms(left[back])
+    before, after = rms(as_written.distance[rows]), rms(left[back])
     if after > before / FAR_BETTER:
         return []
     detail = f"{back.sum()} of {len(readings)} rows fit with the measured columns of another one of them"
@@ -291,13 +292,9 @@ def _all_loads_matched(states, nominal):
 
 def _loads_fault(states, here, there, before, left):
     moved = here != there
-    if moved.sum() < _FEWEST_ROWS or _rms(left[moved]) > _rms(before[moved]) / FAR_BETTER:
+    if moved.sum() < _FEWEST_ROWS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
         return []
     count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
     detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
     share = Value("share of the loaded states", count / len(states.wrench), "–")
-    return [Fault(NAME, (), detail, (share,), (_rms(before[moved]), _rms(left[moved])), tuple(rows), True)]
-
-
-def _rms(values):
-    return float(np.sqrt((values**2).mean()))
+    return [Fault(NAME, (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]

@@ -10,7 +10,16 @@ from itertools import combinations
 import numpy as np
 
 from elastocal.faults.deflections import deflections, unit_of_loads
-from elastocal.faults.placement import FAR_BETTER, IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, robustly_placed, spread, trimmed_rms
+from elastocal.faults.placement import (
+    FAR_BETTER,
+    IMPLAUSIBLE_M,
+    IMPLAUSIBLE_RAD,
+    placed,
+    rms,
+    robustly_placed,
+    spread,
+    trimmed_rms,
+)
 from elastocal.faults.protocol import Fault, Value
 
 NAME, FAMILY, AFTER = "wrong_sign", "data", ()
@@ -51,21 +60,23 @@ def find(campaign, readings):
 
 def _of_joints_and_orientations(campaign, readings):
     some, joints = spread(readings), campaign.robot.joints
-    written = _misfit(robustly_placed(campaign, some))
-    if written.position_m < IMPLAUSIBLE_M and written.orientation_rad < IMPLAUSIBLE_RAD:
+    written = robustly_placed(campaign, some)
+    # All readings but a few, or all: a joint may move in a few poses only.
+    measures = [measure for measure in (trimmed_rms, rms) if _implausible(_misfit(written, measure))]
+    if not measures:
         return []
     # The simplest explanation that holds: two signs are looked at only where one is not enough.
     for ways in (_single(joints, campaign.measured == "pose"), _double(joints)):
         read = [_read(campaign, some, way) for way in ways]
-        plain = [_misfit(placed(campaign, part)) for part in read]
-        for misfits in ([m.position_m for m in plain], [m.orientation_rad for m in plain]):
-            best = int(np.argmin(misfits))
-            corrected = _misfit(robustly_placed(campaign, read[best]))
-            evidence = _evidence(written, corrected)
-            if evidence:
-                way = ways[best]
-                signs = Value("readings tried, poses", float(len(np.unique(some.pose))), "–")
-                return [Fault(NAME, way.joints, way.detail, (signs,), evidence, (), True)]
+        plain = [placed(campaign, part) for part in read]
+        for measure in measures:
+            misfits = [_misfit(placement, measure) for placement in plain]
+            for best in {int(np.argmin([m.position_m for m in misfits])), int(np.argmin([m.orientation_rad for m in misfits]))}:
+                corrected = robustly_placed(campaign, read[best])
+                evidence = _evidence(_misfit(written, measure), _misfit(corrected, measure))
+                if evidence:
+                    way, poses = ways[best], float(len(np.unique(some.pose)))
+                    return [Fault(NAME, way.joints, way.detail, (Value("poses tried", poses, "–"),), evidence, (), True)]
     return []
 
 
@@ -119,8 +130,12 @@ def _read(campaign, readings, way):
     )
 
 
-def _misfit(placement):
-    return _Misfit(trimmed_rms(placement.distance), 0.0 if placement.turn is None else trimmed_rms(placement.turn))
+def _misfit(placement, measure):
+    return _Misfit(measure(placement.distance), 0.0 if placement.turn is None else measure(placement.turn))
+
+
+def _implausible(misfit):
+    return misfit.position_m > IMPLAUSIBLE_M or misfit.orientation_rad > IMPLAUSIBLE_RAD
 
 
 def _evidence(written, corrected):

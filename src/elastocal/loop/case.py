@@ -1,0 +1,81 @@
+"""What every step needs of a campaign, put together again from its tables."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from elastocal.campaign import Campaign, described_campaign
+from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.fitting import fit
+from elastocal.loop.columns import estimate_from, readings_from
+from elastocal.model import Model, declared_model
+from elastocal.noise import Noise
+from elastocal.observations import Observations, averaged
+from elastocal.robot import robot_from_document
+from elastocal.sites import sites_of
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign ready to be fitted.
+
+    Attributes
+    ----------
+    campaign : Campaign
+        Its readings are those to fit.
+    observations : Observations
+        Their repeats averaged.
+    model : Model
+        As declared.
+    candidates : dict of str to Candidate
+        Everything that the model might lack.
+    """
+
+    campaign: Campaign
+    observations: Observations
+    model: Model
+    candidates: dict
+
+    def fitted(self, model, columns, noise):
+        """A fit found before, from the columns of its parameters table."""
+        sessions = np.unique(self.observations.states.session)
+        estimate, discrepancy = estimate_from(columns, model, sessions)
+        return fit(model, self.observations, noise, estimate, discrepancy)
+
+    def with_found(self, keys):
+        """The declared model with some candidates, and these candidates."""
+        added = [self.candidates[key] for key in keys]
+        return self.model.with_effects(added), added
+
+
+def case_from(descriptions, columns):
+    """Put a campaign together.
+
+    Parameters
+    ----------
+    descriptions : dict
+        With ``campaign`` and ``robot``, as step 1 writes them.
+    columns : dict of str to ndarray
+        Of the readings table.
+
+    Returns
+    -------
+    Case
+    """
+    source = descriptions["source"]
+    robot = robot_from_document(descriptions["robot"], source)
+    campaign = described_campaign(descriptions["campaign"], robot, readings_from(columns), source)
+    sites = sites_of(robot.chain)
+    model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
+    candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
+    return Case(campaign, averaged(campaign.readings), model, candidates)
+
+
+def noise_facts(noise):
+    """Noise as a JSON document."""
+    return asdict(noise) | {"joint_rad": noise.joint_rad.tolist()}
+
+
+def noise_from(facts):
+    """Noise from its JSON document."""
+    return Noise(**facts["noise"] | {"joint_rad": np.array(facts["noise"]["joint_rad"])})

@@ -1,0 +1,153 @@
+"""Step 8: the verdict, with the figures behind it."""
+
+import numpy as np
+
+from elastocal.lack_of_fit import lack_of_fit
+from elastocal.model import joint_compliances
+from elastocal.selection import parameter_slice
+from elastocal.verdict import UNEXPLAINED, Evidence, word
+
+
+def concluded(case, noise_facts, declared, final, attributions, looks, rows, heldout, faults, warnings):
+    """The contents of verdict.json.
+
+    Parameters
+    ----------
+    case : Case
+    noise_facts : dict
+        Of step 2.
+    declared, final : Fit
+    attributions : sequence of Attribution
+    looks : dict of str to ndarray
+        Columns of the looks table.
+    rows : sequence of dict
+        Of before_after.csv.
+    heldout : dict
+    faults : sequence of dict
+        Faults of the data.
+    warnings : list of str
+
+    Returns
+    -------
+    dict
+    """
+    before, after = lack_of_fit(declared, case.observations), lack_of_fit(final, case.observations)
+    tested = int(np.isfinite(looks["p_value"][looks["look"] == 0]).sum())
+    decisive = [fault for fault in faults if fault["decisive"]]
+    evidence = Evidence(tested, before, after, tuple(attributions), tuple(decisive))
+    said = word(evidence)
+    gains = _gains(rows)
+    return {
+        "campaign": case.campaign.name,
+        "verdict": said,
+        "effects": [_fault_entry(fault) for fault in decisive]
+        + [_effect_entry(attribution, final, gains) for attribution in attributions],
+        "noise": {
+            "source": noise_facts["noise"]["source"],
+            "position_m": noise_facts["noise"]["position_m"],
+            "orientation_rad": noise_facts["noise"]["orientation_rad"],
+            "joint_rad": noise_facts["noise"]["joint_rad"],
+            "degrees_of_freedom": noise_facts["noise"]["degrees_of_freedom"],
+        },
+        "lack_of_fit": {
+            "before": _fit_entry(before),
+            "after": _fit_entry(after),
+            "explained_share": _number(evidence.explained),
+        },
+        "heldout": heldout,
+        "compliance_urad_per_Nm": _compliances(declared, final),
+        "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
+        "candidates_tested": tested,
+        "warnings": [*noise_facts["warnings"], *_fault_warnings(faults), *warnings, *_remainder(said, after, evidence)],
+    }
+
+
+def _effect_entry(attribution, final, gains):
+    joints = sorted({joint for member in attribution.members for joint in member.joints})
+    return {
+        "name": attribution.effect,
+        "family": attribution.members[0].family,
+        "joints": joints,
+        "members": [member.key for member in attribution.members],
+        "parameters": [entry for member in attribution.members for entry in _parameters(member, final)],
+        "p_value": attribution.p_value,
+        "heldout_gain": gains.get(attribution.effect),
+        "alternatives": list(attribution.alternatives),
+        "angle_to_nearest_deg": _number(attribution.angle_deg.min()) if len(attribution.angle_deg) else None,
+    }
+
+
+def _parameters(member, final):
+    number = [effect.key for effect in final.model.effects].index(member.key)
+    values = np.concatenate([final.estimate.coefficients[number], final.estimate.shapes[number]])
+    mine = parameter_slice(final, member.key)
+    named = (*member.parameters, *member.shapes)
+    return [
+        {
+            "name": f"{member.key} {parameter.name}",
+            "value": float(value),
+            "std_error": float(np.sqrt(final.covariance[index, index])),
+            "unit": parameter.unit,
+            "held": bool(final.held[index]),
+        }
+        for parameter, value, index in zip(named, values, mine, strict=True)
+    ]
+
+
+def _fault_entry(fault):
+    return {
+        "name": fault["name"],
+        "family": "data",
+        "joints": fault["joints"],
+        "detail": fault["detail"],
+        "parameters": [value | {"std_error": None} for value in fault["parameters"]],
+        "p_value": None,
+        "heldout_gain": None,
+        "alternatives": [],
+        "angle_to_nearest_deg": None,
+    }
+
+
+def _fault_warnings(faults):
+    return [f"{fault['name']}: {fault['detail']}" for fault in faults if not fault["decisive"]]
+
+
+def _remainder(said, after, evidence):
+    if not after.rejected:
+        return []
+    ratio = f"{np.sqrt(after.ratio):.1f} times the noise"
+    if said == UNEXPLAINED and not evidence.attributions:
+        return [f"the residual is {ratio} and no effect of the catalogue stands out"]
+    share = f"{100 * evidence.explained:.0f} % of the mean square above it"
+    return [f"what remains is {ratio}; the effects found explain {share}, so something else is still missing"]
+
+
+def _gains(rows):
+    """Share by which each step lowers the held-out RMS."""
+    gains, last = {}, None
+    for row in rows:
+        if row["kind"] == "effect":
+            gains[row["step"].removeprefix("+ ")] = float(1 - row["heldout_rms_m"] / last)
+        if row["kind"] in ("declared", "effect"):
+            last = row["heldout_rms_m"]
+    return gains
+
+
+def _compliances(declared, final):
+    deviations = np.zeros(final.model.sites.joints)
+    if final.model.identifies_compliance:
+        deviations = np.sqrt(np.diag(final.covariance))[parameter_slice(final, "joint_compliance")]
+    found = {
+        "before": joint_compliances(declared.model, declared.estimate),
+        "after": joint_compliances(final.model, final.estimate),
+        "std_error": deviations,
+    }
+    return {name: (1e6 * values).tolist() for name, values in found.items()}
+
+
+def _fit_entry(fit):
+    return {"mean_square_over_noise": _number(fit.ratio), "p_value": _number(fit.p_value), "rejected": fit.rejected}
+
+
+def _number(value):
+    return float(value) if np.isfinite(value) else None

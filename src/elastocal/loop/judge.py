@@ -1,0 +1,228 @@
+"""Step 6: every model on poses that no step has seen."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.fitting import fit, fit_frames
+from elastocal.held_out import METRICS, grown, intervals, noise_floor, position_errors, summary
+from elastocal.loop.columns import residual_columns
+from elastocal.model import Model, circumstances, measured_in_base, residuals
+from elastocal.observations import each_approach
+from elastocal.random_streams import stream
+
+_REPLICATES = 1000
+# A control of more parameters than this would take longer to fit than it tells.
+_LARGEST_CONTROL = 24
+_CONTROLS = 2
+
+
+@dataclass(frozen=True)
+class Step:
+    """One model on the way from the nominal robot to all effects found.
+
+    Attributes
+    ----------
+    name : str
+    kind : {"frames", "declared", "effect", "control"}
+    fitted : Fit
+    """
+
+    name: str
+    kind: str
+    fitted: object
+
+
+def model_steps(case, noise, declared, final, found, controls):
+    """Fit every model of the way on the training poses.
+
+    Parameters
+    ----------
+    case : Case
+    noise : Noise
+    declared, final : Fit
+    found : dict of str to list of Candidate
+        Members of each effect found, in the order in which they were found.
+    controls : list of list of Candidate
+
+    Returns
+    -------
+    list of Step
+    """
+    bare = replace(case.model, effects=())
+    steps = [
+        Step("frames and targets", "frames", fit(bare, case.observations, noise)),
+        Step("declared model", "declared", declared),
+    ]
+    added = []
+    for number, (name, members) in enumerate(found.items(), 1):
+        added += members
+        fitted = final if number == len(found) else _with(case, noise, declared, added)
+        steps.append(Step(f"+ {name}", "effect", fitted))
+    for members in controls:
+        keys = ", ".join(member.key for member in members)
+        steps.append(Step(f"control: {keys}", "control", _with(case, noise, declared, members)))
+    return steps
+
+
+def controls(looks, rivals, found, candidates):
+    """Effects that should not help, with at least as many parameters as those found where there are so many.
+
+    Parameters
+    ----------
+    looks, rivals : dict of str to ndarray
+        Columns of their tables.
+    found : dict of str to list of Candidate
+    candidates : dict of str to Candidate
+
+    Returns
+    -------
+    list of list of Candidate
+        Each from one family that none of the effects found belongs to, at the largest angles from them.
+    """
+    if not found:
+        return []
+    members = [member for group in found.values() for member in group]
+    wanted = min(sum(len(member.parameters) for member in members), _LARGEST_CONTROL)
+    first = looks["look"] == 0
+    innocent = set(looks["candidate"][first & (looks["p_family"] >= 0.05)])
+    angles = dict(zip(rivals["candidate"], rivals["angle_deg"], strict=True))
+    families = {member.family for member in members}
+    far = sorted(
+        (key for key in innocent if key in angles and candidates[key].family not in families), key=lambda k: -angles[k]
+    )
+    groups = []
+    for family in dict.fromkeys(candidates[key].family for key in far):
+        group, size = [], 0
+        for key in far:
+            if candidates[key].family == family and size < wanted:
+                group.append(candidates[key])
+                size += len(candidates[key].parameters)
+        groups.append((size < wanted, -angles[group[0].key], group))
+    # Families that have enough parameters come first.
+    return [group for _, _, group in sorted(groups, key=lambda entry: entry[:2])[:_CONTROLS]]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Held-out errors of every step.
+
+    Attributes
+    ----------
+    rows : list of dict
+        Of before_after.csv.
+    heldout : dict
+        As in verdict.json.
+    warnings : list of str
+    """
+
+    rows: list
+    heldout: dict
+    warnings: list
+
+
+def judged(steps, case, held_out, seed):
+    """Errors of every step on training and held-out poses.
+
+    Parameters
+    ----------
+    steps : list of Step
+    case : Case
+    held_out : Case
+        The held-out readings; of another campaign, whose frames and targets are then fitted to them.
+    seed : int
+        Of the bootstrap over poses.
+
+    Returns
+    -------
+    Judged
+    """
+    placed = [_placed(step.fitted, case, held_out) for step in steps]
+    errors = [position_errors(model, estimate, held_out.observations) for model, estimate in placed]
+    before = next(number for number, step in enumerate(steps) if step.kind == "declared")
+    after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
+    draws = stream(seed, case.campaign.name, "held-out poses", 0)
+    limits, _ = intervals(errors, _REPLICATES, draws)
+    draws = stream(seed, case.campaign.name, "held-out poses", 0)
+    _, reductions = intervals([errors[before], errors[after]], _REPLICATES, draws)
+    floor = noise_floor(steps[after].fitted, held_out.observations, *placed[after])
+    rows = []
+    for step, error, limit in zip(steps, errors, limits, strict=True):
+        training = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
+        tested = summary(error.distance)
+        row = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
+        row |= {f"train_{name}": training[name] for name in METRICS}
+        for name in METRICS:
+            row |= {f"heldout_{name}": tested[name]}
+            row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
+        row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
+        rows.append(row)
+    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    heldout = {
+        "before": ends[0],
+        "after": ends[1],
+        "noise_floor_rms_m": None if np.isnan(floor) else floor,
+        "reduction_ci95": [float(value) for value in reductions[1]],
+        "poses": errors[0].poses,
+    }
+    return Judged(rows, heldout, _warnings(steps, rows, errors, before, after))
+
+
+def residual_blocks(steps, case, held_out):
+    """Blocks of the residuals table: training readings, then held-out ones; every reading before and after."""
+    before = next(step.fitted for step in steps if step.kind == "declared")
+    after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    for part, unseen in ((case, False), (held_out, True)):
+        observations, order = _in_order(part.campaign.readings)
+        off, position = [], None
+        for fitted in (before, after):
+            model, estimate = _placed(fitted, case, part)
+            off.append(residuals(model, estimate, observations, circumstances(model, estimate, observations.states)))
+            position = measured_in_base(estimate, observations)[0]
+        yield residual_columns(part.campaign.readings.select(order), unseen, position, *off)
+
+
+def _with(case, noise, declared, added):
+    model = case.model.with_effects(added)
+    return fit(model, case.observations, noise, declared.estimate.with_effects(added))
+
+
+def _placed(fitted, case, part):
+    """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
+    if part is case or part.campaign.name == case.campaign.name:
+        return fitted.model, fitted.estimate
+    model = Model(
+        part.model.sites,
+        part.model.targets,
+        part.model.fitted_frames,
+        part.model.rows,
+        fitted.model.nominal_compliance,
+        fitted.model.effects,
+    )
+    return model, fit_frames(fitted, model, part.observations, fitted.noise)
+
+
+def _in_order(readings):
+    """Every reading as an observation of its own, and the order of the readings in which they come."""
+    observations, _ = each_approach(readings)
+    approach = () if readings.approach is None else tuple(readings.approach.T[::-1])
+    return observations, np.lexsort(
+        (readings.target, readings.repeat, *approach, readings.load, readings.pose, readings.session)
+    )
+
+
+def _warnings(steps, rows, errors, before, after):
+    if before == after:
+        return []
+    found = []
+    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+        low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
+        found.append(f"the held-out {name.removesuffix('_m')} grew from {low:.3f} to {high:.3f} mm")
+    best = min((row["heldout_rms_m"] for row in rows if row["kind"] == "control"), default=np.inf)
+    if best <= rows[after]["heldout_rms_m"]:
+        found.append(f"a control does as well: {1e3 * best:.3f} mm held-out RMS")
+    pairs = [(steps[n], rows[n - 1], rows[n]) for n in range(before + 1, after + 1)]
+    for step, last, row in pairs:
+        if row["heldout_rms_m"] > last["heldout_rms_m"]:
+            found.append(f"the step '{step.name}' raised the held-out RMS")
+    return found
