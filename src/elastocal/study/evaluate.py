@@ -11,7 +11,7 @@ from elastocal.evaluation import (
     replicates_table,
 )
 from elastocal.metrics import make_judge
-from elastocal.study.columns import to_deflections, to_experiments
+from elastocal.study.columns import data_sets, to_deflections, to_experiments
 
 
 def judge_from(robot, test_experiments, test_deflections, wrench_at):
@@ -45,7 +45,7 @@ def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, d
 
     def compliances():
         for block in identified_blocks():
-            sets = np.unique(block["data_set"])
+            sets = data_sets(block)
             shape = (len(sets), -1)
             yield sets, np.stack([block[f"c{j + 1}"].reshape(shape) for j in range(joints)], axis=-1)
 

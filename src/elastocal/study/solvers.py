@@ -1,8 +1,8 @@
 """Equation 11 against Gauss-Newton on the exact kinematics: what "used as initial condition" changes."""
 
-import numpy as np
 
 from elastocal.identification import estimate_compliance
+from elastocal.study.columns import data_sets
 from elastocal.study.identify import Situation
 
 
@@ -29,7 +29,7 @@ def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
     """
     for experiments, deflections in blocks:
         experiments, deflections = _first(experiments, length), {n: _first(d, length) for n, d in deflections.items()}
-        sets = np.unique(experiments["data_set"])
+        sets = data_sets(experiments)
         for strategy in strategies:
             situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
             exact = situation.solved_exactly(start, [length])[0]
