@@ -1,6 +1,5 @@
 """Step 2: noise on the ideal deflections."""
 
-
 from elastocal.simulation import measurement_noise
 from elastocal.study.columns import COMPONENT_NAMES, block_shape, data_sets
 

@@ -1,6 +1,5 @@
 """Step 1: random configurations and wrenches, and the deflections that they cause, without noise."""
 
-
 from elastocal.simulation import random_experiments, true_deflections
 from elastocal.study import SETS_PER_BLOCK
 from elastocal.study.columns import data_sets, deflection_columns, experiment_columns, to_experiments
