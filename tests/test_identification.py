@@ -276,7 +276,7 @@ systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.
 def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
     pivots, more, configurations, rows, seed = shape
     system = np.random.default_rng(seed).standard_normal((rows, pivots + more, configurations, 2))
-    triangles = prefix_triangles(np.moveaxis(system, 2, 0).copy(), pivots)
+    triangles = prefix_triangles(np.moveaxis(system, 2, 0).copy(), configurations, pivots)
     for k in range(configurations):
         for s in range(2):
             stacked = np.moveaxis(system[:, :, : k + 1, s], 2, 0).reshape(-1, pivots + more)

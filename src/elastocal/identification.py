@@ -135,7 +135,7 @@ def estimate_compliance(strategy, readings, joints):
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        triangle = prefix_triangles(_systems(stage, readings), pivots)
+        triangle = prefix_triangles(_systems(stage, readings), configurations, pivots)
         right = triangle[:, :, -1]
         for column, joint in enumerate(stage.held, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
@@ -214,13 +214,16 @@ def condition_numbers(strategy, triangles):
     return largest
 
 
-def prefix_triangles(systems, pivots):
+def prefix_triangles(systems, configurations, pivots):
     """Triangular factor of the first k configurations, for every k, by Householder reflections.
 
     Parameters
     ----------
     systems : iterable of ndarray (rows, columns, sets)
-        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten.
+        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten, and each
+        may lie in the memory of the one before.
+    configurations : int
+        How many systems there are.
     pivots : int
         How many leading columns are unknowns to eliminate.
 
@@ -234,9 +237,13 @@ def prefix_triangles(systems, pivots):
     The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
     row of the triangle and the new rows only.
     """
-    prefixes, triangle = [], None
-    for new in systems:
-        triangle = np.zeros((pivots, *new.shape[1:])) if triangle is None else triangle.copy()
+    triangles = None
+    for index, new in enumerate(systems):
+        if triangles is None:
+            triangles = np.zeros((configurations, pivots, *new.shape[1:]))
+        else:
+            triangles[index] = triangles[index - 1]
+        triangle = triangles[index]
         for k in range(pivots):
             head, tail = triangle[k, k], new[:, k]
             norm = np.sqrt(head * head + np.einsum("rs,rs->s", tail, tail))
@@ -249,8 +256,7 @@ def prefix_triangles(systems, pivots):
             for row, factor in zip(new[:, k + 1 :], tail, strict=True):
                 row -= factor * weight
             triangle[k, k] = reflected
-        prefixes.append(triangle)
-    return np.stack(prefixes)
+    return triangles
 
 
 def inverse_triangles(triangle):
@@ -323,11 +329,16 @@ def prefix_information(regressor):
 
 def _systems(stage, readings):
     """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
-    order = list(stage.identified + stage.held)
+    order = stage.identified + stage.held
     points = [readings[name] for name in stage.points]
-    for configuration in range(points[0].regressor.shape[2]):
-        sides = [(point.regressor[:, order, configuration], point.deflection[:, None, configuration]) for point in points]
-        yield np.concatenate([np.concatenate(pair, axis=1) for pair in sides])
+    rows, _, configurations, sets = points[0].regressor.shape
+    system = np.empty((len(points), rows, len(order) + 1, sets))
+    for configuration in range(configurations):
+        for part, point in zip(system, points, strict=True):
+            for column, joint in enumerate(order):
+                part[:, column] = point.regressor[:, joint, configuration]
+            part[:, -1] = point.deflection[:, configuration]
+        yield system.reshape(-1, *system.shape[2:])
 
 
 def _row_major(matrices):
