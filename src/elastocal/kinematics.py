@@ -33,7 +33,7 @@ def poses(chain, coordinates, point):
     components, batch = _component_first(coordinates)
     position, rotation = np.empty((3, components.shape[1])), np.empty((3, 3, components.shape[1]))
     for part in _blocks(components.shape[1]):
-        axes, origin, _ = _sweep(chain, np.ascontiguousarray(components[:, part]), point)
+        axes, origin, _ = _sweep(chain, components[:, part], point)
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch)
 
@@ -72,7 +72,7 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
         results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
     position, rotation, jacobian = results
     for part in _blocks(size):
-        axes, origin, screws = _sweep(chain, np.ascontiguousarray(components[:, part]), point)
+        axes, origin, screws = _sweep(chain, components[:, part], point)
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
         _store_twists(screws, origin, jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
