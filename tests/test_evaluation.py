@@ -8,6 +8,7 @@ from support import random_loads
 
 from elastocal.evaluation import (
     LARGEST_TRUSTED_SPREAD,
+    accuracy_sums,
     accuracy_table,
     average,
     bootstrap_test_weights,
@@ -204,7 +205,7 @@ def test_standard_errors_are_the_spread_of_the_replicates(judge, estimates, weig
 
 def test_accuracy_is_that_of_single_data_sets_averaged(judge, estimates):
     lengths = [1, 3]
-    table = accuracy_table([estimates], judge, lengths)
+    table = accuracy_table(accuracy_sums(estimates[:, [0, 2]], judge), lengths)
     np.testing.assert_array_equal(table["length"], lengths)
     for row, length in enumerate(lengths):
         compliance = estimates[:, length - 1]
@@ -226,8 +227,9 @@ def test_accuracy_is_that_of_single_data_sets_averaged(judge, estimates):
 
 
 def test_accuracy_does_not_depend_on_blocks(judge, estimates):
-    whole = accuracy_table([estimates], judge, [1, 2])
-    parts = accuracy_table(iter([estimates[:1], estimates[1:33], estimates[33:]]), judge, [1, 2])
+    whole = accuracy_table(accuracy_sums(estimates, judge), range(1, LENGTHS + 1))
+    parts = [accuracy_sums(part, judge) for part in (estimates[:1], estimates[1:33], estimates[33:])]
+    parts = accuracy_table(sum(parts), range(1, LENGTHS + 1))
     for name in whole:
         np.testing.assert_allclose(parts[name], whole[name], rtol=1e-9, err_msg=name)
 
@@ -237,11 +239,11 @@ def test_percentile_is_the_smallest_error_that_ninety_five_of_a_hundred_do_not_e
     hundred = make_judge(kuka, loads, true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"))
     model = 1.1 * kuka.compliance[None, None]
     errors = np.sort(position_errors(hundred, model[0])[0])
-    assert accuracy_table([model], hundred, [1])["p95"][0] == pytest.approx(errors[94], rel=1e-12)
+    assert accuracy_table(accuracy_sums(model, hundred), [1])["p95"][0] == pytest.approx(errors[94], rel=1e-12)
 
 
 def test_exact_estimates_have_no_error_and_no_standard_error(judge):
-    table = accuracy_table([np.tile(judge.reference, (5, 1, 1))], judge, [1])
+    table = accuracy_table(accuracy_sums(np.tile(judge.reference, (5, 1, 1)), judge), [1])
     for name, values in table.items():
         if name != "length":
             # Roots of rounding.

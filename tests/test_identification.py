@@ -11,6 +11,7 @@ from support import random_loads, without_tool
 from elastocal.elastostatics import joint_torques, regressor
 from elastocal.identification import (
     Readings,
+    cholesky_triangles,
     estimate_compliance,
     first_solvable_length,
     identify,
@@ -21,7 +22,7 @@ from elastocal.identification import (
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.robot import with_target_offset
 from elastocal.simulation import true_deflections
-from elastocal.strategies import Stage, Strategy
+from elastocal.strategies import Stage, Strategy, without_forgotten_stages
 
 SETS, CONFIGURATIONS = 3, 5
 NAMES = [
@@ -275,7 +276,7 @@ systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.
 def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
     pivots, more, configurations, rows, seed = shape
     system = np.random.default_rng(seed).standard_normal((rows, pivots + more, configurations, 2))
-    triangles = prefix_triangles(np.moveaxis(system, 2, 0).copy(), pivots)
+    triangles = prefix_triangles(np.moveaxis(system, 2, 0).copy(), configurations, pivots)
     for k in range(configurations):
         for s in range(2):
             stacked = np.moveaxis(system[:, :, : k + 1, s], 2, 0).reshape(-1, pivots + more)
@@ -294,10 +295,27 @@ def test_inverse_triangles_invert():
     np.testing.assert_allclose(np.moveaxis(found, -1, 1), np.linalg.inv(triangles), rtol=0, atol=1e-11)
 
 
+def test_cholesky_triangles_are_those_of_lapack_and_not_a_number_where_there_are_none():
+    half = np.random.default_rng(4).standard_normal((4, 3, 7, 5))
+    matrices = np.swapaxes(half, -1, -2) @ half
+    found = np.moveaxis(cholesky_triangles(np.moveaxis(matrices, 1, -1)), -1, 1)
+    np.testing.assert_allclose(found, np.swapaxes(np.linalg.cholesky(matrices), -1, -2), rtol=0, atol=1e-12)
+    singular = half[..., :4, :].swapaxes(-1, -2) @ half[..., :4, :]
+    assert np.isnan(cholesky_triangles(np.moveaxis(singular, 1, -1))[:, 4, 4]).all()
+
+
 def test_prefix_information_is_the_sum_over_the_first_configurations():
     matrix = np.random.default_rng(3).standard_normal((6, 4, 5, 2))
     found = prefix_information(matrix)
     for k in range(5):
         for s in range(2):
             expected = sum(matrix[:, :, i, s].T @ matrix[:, :, i, s] for i in range(k + 1))
-            np.testing.assert_allclose(found[k, s], expected, rtol=0, atol=1e-13)
+            np.testing.assert_allclose(found[k, ..., s], expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["6DoF-after-3DoF", "6DoF-after-3+3DoF"])
+def test_stages_before_one_that_identifies_every_joint_leave_no_trace(name, kuka, strategies):
+    readings = Data(kuka).readings()
+    lasting = without_forgotten_stages(strategies[name], kuka.joints)
+    whole, short = (estimate_compliance(s, readings, kuka.joints)[0] for s in (strategies[name], lasting))
+    np.testing.assert_array_equal(short, whole)

@@ -3,7 +3,7 @@
 import pytest
 from support import chain_of, refused
 
-from elastocal.strategies import check_strategy, strategy_from_document
+from elastocal.strategies import check_strategy, strategy_from_document, without_forgotten_stages
 
 FIRST_STAGE_JOINTS = {
     "6DoF": (0, 1, 2, 3, 4, 5),
@@ -42,6 +42,12 @@ def test_first_stage_joints_are_those_that_the_last_stage_takes_over(strategies,
 def test_points_are_those_that_the_paper_measures_each_once(strategies, name):
     points = strategies[name].points
     assert set(points) == POINTS[name] and len(points) == len(set(points))
+
+
+def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
+    left = {name: without_forgotten_stages(strategy, 6).stages for name, strategy in strategies.items()}
+    assert left.pop("6DoF-after-3DoF") == left.pop("6DoF-after-3+3DoF") == strategies["6DoF"].stages
+    assert left == {name: strategies[name].stages for name in left}
 
 
 def test_both_robots_can_carry_out_every_strategy(strategies, robot):

@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from elastocal.identification import cholesky_triangles, inverse_triangles
+
 
 def squared_error_bounds(information, moment):
     """Bound of the mean squared end-effector position error, for readings of unit variance.
 
     Parameters
     ----------
-    information : ndarray (configurations, sets, n, n)
+    information : ndarray (configurations, n, n, sets)
         Sum of A^T A over the readings of the first k configurations, for every k (`identification.prefix_information`).
     moment : ndarray (n, n)
         Mean over test configurations of A^T A of the end-effector position (`metrics.error_moment`).
@@ -17,8 +19,13 @@ def squared_error_bounds(information, moment):
     -------
     ndarray (configurations, sets)
         trace(M N^-1), m^2 per m^2 of reading variance; infinite where N is singular.
+
+    Notes
+    -----
+    With N = R^T R the trace is that of X^T M X, where X = R^-1.
     """
-    eigenvalues = np.linalg.eigvalsh(information)
-    solvable = eigenvalues[..., 0] > eigenvalues[..., -1] * np.finfo(float).eps
-    safe = np.where(solvable[..., None, None], information, np.eye(information.shape[-1]))
-    return np.where(solvable, np.trace(moment @ np.linalg.inv(safe), axis1=-2, axis2=-1), np.inf)
+    inverse = inverse_triangles(cholesky_triangles(information))
+    rows = inverse.reshape(*inverse.shape[:2], -1)
+    weighted = (moment @ rows).reshape(inverse.shape)
+    bounds = (weighted * inverse).sum(axis=(1, 2))
+    return np.where(np.isnan(bounds), np.inf, bounds)

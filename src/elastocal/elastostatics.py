@@ -62,7 +62,7 @@ def generalized_forces(jacobian, wrench):
     -------
     ndarray (..., n)
     """
-    return (jacobian * wrench[..., :, None]).sum(axis=-2)
+    return sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6))
 
 
 def loaded_point(chain, point, wrench_at):

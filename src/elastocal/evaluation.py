@@ -177,37 +177,47 @@ def replicates_table(averages, true_compliance, first_stage_joints):
     return table | {name: values[1:].ravel() for name, values in scores.items()}
 
 
-def accuracy_table(blocks, judge, lengths):
+def accuracy_sums(compliance, judge):
+    """What one data set gives, summed over the data sets of a block: add the sums of blocks for `accuracy_table`.
+
+    Parameters
+    ----------
+    compliance : ndarray (sets, lengths, n)
+        rad/(N m), of the lengths to evaluate.
+    judge : Judge
+
+    Returns
+    -------
+    ndarray (3, lengths, 4 + n)
+        Number of data sets, sum and sum of squares of: mean (m), mean square (m^2), 95th percentile and largest (m) of the
+        position error over the test configurations, squared relative error of each compliance.
+    """
+    sets, lengths, n = compliance.shape
+    errors = position_errors(judge, compliance.reshape(-1, n))
+    rank = int(np.ceil(0.95 * errors.shape[1])) - 1
+    mean, square = errors.mean(axis=1), np.einsum("mt,mt->m", errors, errors) / errors.shape[1]
+    errors.partition(rank, axis=1)
+    single = np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
+    values = np.concatenate([single, ((compliance - judge.reference) / judge.reference) ** 2], axis=-1)
+    return np.stack([np.full(values.shape[1:], float(sets)), values.sum(axis=0), (values**2).sum(axis=0)])
+
+
+def accuracy_table(sums, lengths):
     """Columns of the accuracy table: what one data set gives, averaged over data sets.
 
     Parameters
     ----------
-    blocks : iterable of ndarray (sets, lengths, n)
-        Compliances.
-    judge : Judge
+    sums : ndarray (3, lengths, 4 + n)
+        From `accuracy_sums`, of all data sets.
     lengths : sequence of int
-        Which data set lengths to evaluate.
+        Data set lengths that they stand for.
 
     Returns
     -------
     dict of str to ndarray
     """
-    rows = np.asarray(lengths) - 1
-    sets, first, second = 0, 0.0, 0.0
-    for block in blocks:
-        compliance = block[:, rows]
-        n = compliance.shape[-1]
-        errors = position_errors(judge, compliance.reshape(-1, n))
-        rank = int(np.ceil(0.95 * errors.shape[1])) - 1
-        single = np.stack(
-            [errors.mean(axis=1), (errors**2).mean(axis=1), np.partition(errors, rank)[:, rank], errors.max(axis=1)], 1
-        )
-        relative = ((compliance - judge.reference) / judge.reference) ** 2
-        values = np.concatenate([single.reshape(*compliance.shape[:2], 4), relative], axis=-1)
-        sets += len(block)
-        first, second = first + values.sum(axis=0), second + (values**2).sum(axis=0)
-    mean = first / sets
-    error = np.sqrt(np.maximum(second / sets - mean**2, 0.0) / max(sets - 1, 1))
+    sets, (mean, second) = sums[0, 0, 0], sums[1:] / sums[0]
+    error = np.sqrt(np.maximum(second - mean**2, 0.0) / max(sets - 1, 1))
     squared = np.zeros(mean.shape[1], bool)
     squared[[1, *range(4, mean.shape[1])]] = True
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -5,8 +5,8 @@ Only an iterative solver gives a meaning to a strategy that "uses the estimate a
 
 import numpy as np
 
-from elastocal.elastostatics import exact_deflections, regressor
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.elastostatics import regressor
+from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
 
 STEPS = 30
 # Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
@@ -53,12 +53,13 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
 
 def _solve_stage(chain, data, identified, compliance):
     compliance = compliance.copy()
+    data = [(*readings, poses(chain, readings[1], readings[0])) for readings in data]
     settled = np.zeros(len(compliance), bool)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
             normal = right = 0.0
-            for point, joint_angles, torques, measured in data:
-                sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, compliance)
+            for point, joint_angles, torques, measured, unloaded in data:
+                sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance)
                 sensitivity = sensitivity[..., identified]
                 normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
                 right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
@@ -80,12 +81,12 @@ def _solved(normal, right):
     return solution
 
 
-def _linearised(chain, point, joint_angles, torques, measured, compliance):
+def _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance):
     """Derivative of the predicted deflection with respect to the compliances, and what it leaves of the measured one."""
     rows = measured.shape[-1]
-    springs = compliance * torques
-    predicted = exact_deflections(chain, joint_angles, springs, point)
-    sensitivity = regressor(poses_and_jacobians(chain, joint_angles + springs, point)[2], torques)
+    *loaded, jacobian = poses_and_jacobians(chain, joint_angles + compliance * torques, point)
+    predicted = pose_differences(*loaded, *unloaded)
+    sensitivity = regressor(jacobian, torques)
     # A rotation vector r turns with angular velocity w at the rate w - r x w / 2 (first order in r).
     turn, angular = predicted[..., 3:, None], sensitivity[..., 3:, :]
     sensitivity[..., 3:, :] = angular - 0.5 * np.cross(turn, angular, axis=-2)

@@ -12,6 +12,8 @@ from itertools import combinations
 
 import numpy as np
 
+from elastocal.strategies import without_forgotten_stages
+
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the readings do not determine the compliances.
 LARGEST_CONDITION = 1e7
@@ -133,7 +135,7 @@ def estimate_compliance(strategy, readings, joints):
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        triangle = prefix_triangles(_systems(stage, readings), pivots)
+        triangle = prefix_triangles(_systems(stage, readings), configurations, pivots)
         right = triangle[:, :, -1]
         for column, joint in enumerate(stage.held, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
@@ -165,13 +167,11 @@ def covariance(strategy, readings, triangles):
     -----
     A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced readings
     z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the covariance of
-    the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared readings) R_t^-1. A stage that identifies
-    every joint forgets the stages before it.
+    the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared readings) R_t^-1.
     """
     joints = next(iter(readings.values())).regressor.shape[1]
-    first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
-    stages, gains, inverses = strategy.stages[first:], [], []
-    for stage, triangle in zip(stages, triangles[first:], strict=True):
+    stages, gains, inverses = without_forgotten_stages(strategy, joints).stages, [], []
+    for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
         pivots, size = list(stage.identified), len(stage.identified)
         inverse = _row_major(inverse_triangles(triangle[:, :, :size]))
         back = inverse @ _row_major(triangle[:, :, size:-1])
@@ -183,7 +183,7 @@ def covariance(strategy, readings, triangles):
     total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
     for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
         if shared := set(earlier.points) & set(later.points):
-            information = sum(prefix_information(readings[name].regressor) for name in sorted(shared))
+            information = _row_major(sum(prefix_information(readings[name].regressor) for name in sorted(shared)))
             products = information[..., list(earlier.identified), :][..., list(later.identified)]
             between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
             cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
@@ -214,13 +214,16 @@ def condition_numbers(strategy, triangles):
     return largest
 
 
-def prefix_triangles(systems, pivots):
+def prefix_triangles(systems, configurations, pivots):
     """Triangular factor of the first k configurations, for every k, by Householder reflections.
 
     Parameters
     ----------
     systems : iterable of ndarray (rows, columns, sets)
-        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten.
+        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten, and each
+        may lie in the memory of the one before.
+    configurations : int
+        How many systems there are.
     pivots : int
         How many leading columns are unknowns to eliminate.
 
@@ -234,9 +237,13 @@ def prefix_triangles(systems, pivots):
     The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
     row of the triangle and the new rows only.
     """
-    prefixes, triangle = [], None
-    for new in systems:
-        triangle = np.zeros((pivots, *new.shape[1:])) if triangle is None else triangle.copy()
+    triangles = None
+    for index, new in enumerate(systems):
+        if triangles is None:
+            triangles = np.zeros((configurations, pivots, *new.shape[1:]))
+        else:
+            triangles[index] = triangles[index - 1]
+        triangle = triangles[index]
         for k in range(pivots):
             head, tail = triangle[k, k], new[:, k]
             norm = np.sqrt(head * head + np.einsum("rs,rs->s", tail, tail))
@@ -249,8 +256,7 @@ def prefix_triangles(systems, pivots):
             for row, factor in zip(new[:, k + 1 :], tail, strict=True):
                 row -= factor * weight
             triangle[k, k] = reflected
-        prefixes.append(triangle)
-    return np.stack(prefixes)
+    return triangles
 
 
 def inverse_triangles(triangle):
@@ -276,6 +282,31 @@ def inverse_triangles(triangle):
     return inverse
 
 
+def cholesky_triangles(information):
+    """Upper triangular factors R of symmetric matrices R^T R.
+
+    Parameters
+    ----------
+    information : ndarray (configurations, m, m, sets)
+        Only the upper triangles are read.
+
+    Returns
+    -------
+    ndarray (configurations, m, m, sets)
+        Not a number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
+    """
+    size = information.shape[1]
+    triangle = np.zeros_like(information)
+    for row in range(size):
+        rest = information[:, row, row:].copy()
+        for above in range(row):
+            rest -= triangle[:, above, row, None] * triangle[:, above, row:]
+        pivot, diagonal = rest[:, 0], information[:, row, row]
+        pivot[~(pivot > diagonal / LARGEST_CONDITION**2)] = np.nan
+        triangle[:, row, row:] = rest / np.sqrt(pivot)[:, None]
+    return triangle
+
+
 def prefix_information(regressor):
     """Sum of A^T A over the first k configurations, for every k.
 
@@ -285,19 +316,29 @@ def prefix_information(regressor):
 
     Returns
     -------
-    ndarray (configurations, sets, n, n)
+    ndarray (configurations, n, n, sets)
     """
-    matrices = np.ascontiguousarray(np.moveaxis(regressor, (0, 1), (-2, -1)))
-    return np.cumsum(np.swapaxes(matrices, -1, -2) @ matrices, axis=0)
+    _, joints, configurations, sets = regressor.shape
+    information = np.empty((configurations, joints, joints, sets))
+    for i in range(joints):
+        for j in range(i + 1):
+            product = sum(row[i] * row[j] for row in regressor)
+            information[:, i, j] = information[:, j, i] = np.cumsum(product, axis=0)
+    return information
 
 
 def _systems(stage, readings):
     """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
-    order = list(stage.identified + stage.held)
+    order = stage.identified + stage.held
     points = [readings[name] for name in stage.points]
-    for configuration in range(points[0].regressor.shape[2]):
-        sides = [(point.regressor[:, order, configuration], point.deflection[:, None, configuration]) for point in points]
-        yield np.concatenate([np.concatenate(pair, axis=1) for pair in sides])
+    rows, _, configurations, sets = points[0].regressor.shape
+    system = np.empty((len(points), rows, len(order) + 1, sets))
+    for configuration in range(configurations):
+        for part, point in zip(system, points, strict=True):
+            for column, joint in enumerate(order):
+                part[:, column] = point.regressor[:, joint, configuration]
+            part[:, -1] = point.deflection[:, configuration]
+        yield system.reshape(-1, *system.shape[2:])
 
 
 def _row_major(matrices):

@@ -33,7 +33,7 @@ def poses(chain, coordinates, point):
     components, batch = _component_first(coordinates)
     position, rotation = np.empty((3, components.shape[1])), np.empty((3, 3, components.shape[1]))
     for part in _blocks(components.shape[1]):
-        axes, origin, _ = _sweep(chain, np.ascontiguousarray(components[:, part]), point)
+        axes, origin, _ = _sweep(chain, components[:, part], point)
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch)
 
@@ -72,7 +72,7 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
         results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
     position, rotation, jacobian = results
     for part in _blocks(size):
-        axes, origin, screws = _sweep(chain, np.ascontiguousarray(components[:, part]), point)
+        axes, origin, screws = _sweep(chain, components[:, part], point)
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
         _store_twists(screws, origin, jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
@@ -151,42 +151,70 @@ def _blocks(size):
 
 
 def _sweep(chain, coordinates, point):
-    """Walk the chain up to `point`: axes of the frame, target, and (kind, sign, axis, origin) of each coordinate on the way."""
+    """Walk the chain up to `point`: axes of the frame, target, and (kind, sign, axis, origin) of each coordinate on the way.
+
+    The origin is none where the point lies on the axis and only turns.
+    """
     transforms = chain.transforms[: point.after]
-    turns = _cosines_and_sines(coordinates, [t.coordinate for t in transforms if t.kind == "R" and t.coordinate is not None])
-    axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    origin = [0.0, 0.0, 0.0]
+    turns = iter(_cosines_and_sines(coordinates, [transform for transform in transforms if transform.kind == "R"]))
+    axes = before_turns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    origin, turned_about = [0.0, 0.0, 0.0], None
     screws = [None] * chain.coordinates
-    for transform in transforms:
+    for number, transform in enumerate(transforms):
         axis, coordinate, sign = transform.axis, transform.coordinate, transform.sign
         if coordinate is not None:
-            screws[coordinate] = (transform.kind, sign, axes[axis], origin)
+            moves = transform.kind == "T" or not _lies_on(axis, transforms[number:], point)
+            screws[coordinate] = (transform.kind, sign, axes[axis], origin if moves else None)
         if transform.kind == "T":
             amount = transform.constant if coordinate is None else _product(sign, coordinates[coordinate])
             origin = _moved(origin, amount, axes[axis])
             continue
-        if coordinate is None:
-            cosine, sine = math.cos(transform.constant), math.sin(transform.constant)
-        else:
-            cosine, sine = turns[coordinate][0], _product(sign, turns[coordinate][1])
-        second, third = axes[axis - 2], axes[axis - 1]
-        axes = list(axes)
-        axes[axis - 2] = [_product_sum(cosine, a, sine, b) for a, b in zip(second, third, strict=True)]
-        axes[axis - 1] = [_product_difference(cosine, b, sine, a) for a, b in zip(second, third, strict=True)]
+        if axis != turned_about:
+            before_turns, turned_about = axes, axis
+        axes = _turned(before_turns, axis, *next(turns))
     for axis, length in zip(axes, point.offset_m, strict=True):
         origin = _moved(origin, length, axis)
     return axes, origin, screws
 
 
-def _cosines_and_sines(coordinates, turning):
-    """Cosine and sine of each turning coordinate by the tangent of its half, which is faster in numpy than either of them."""
-    tangent = np.tan(0.5 * coordinates[turning])
+def _lies_on(axis, transforms, point):
+    """Whether transforms along and about one axis are all that lies between this axis and the point."""
+    offset = [length for direction, length in enumerate(point.offset_m) if direction != axis]
+    return not any(offset) and all(transform.axis == axis for transform in transforms)
+
+
+def _cosines_and_sines(coordinates, rotations):
+    """Cosine and sine of each rotation, counted from the first of those before it that turn about the same axis."""
+    angles, turned_about = [], None
+    for rotation in rotations:
+        angle = rotation.constant if rotation.coordinate is None else _product(rotation.sign, coordinates[rotation.coordinate])
+        angles.append(angles[-1] + angle if rotation.axis == turned_about else angle)
+        turned_about = rotation.axis
+    moving = iter(_cosines_and_sines_of_arrays([angle for angle in angles if type(angle) is not float], coordinates.shape[1]))
+    return [(math.cos(angle), math.sin(angle)) if type(angle) is float else next(moving) for angle in angles]
+
+
+def _cosines_and_sines_of_arrays(angles, size):
+    """By the tangent of half the angle, which is faster in numpy than either of them."""
+    tangent = np.empty((len(angles), size))
+    for half, angle in zip(tangent, angles, strict=True):
+        np.multiply(0.5, angle, out=half)
+    np.tan(tangent, out=tangent)
     scale = tangent * tangent
     scale += 1.0
     np.divide(2.0, scale, out=scale)
     tangent *= scale
     scale -= 1.0
-    return dict(zip(turning, zip(scale, tangent, strict=True), strict=True))
+    return zip(scale, tangent, strict=True)
+
+
+def _turned(axes, about, cosine, sine):
+    """Axes of a frame after it has turned about one of them."""
+    second, third = axes[about - 2], axes[about - 1]
+    axes = list(axes)
+    axes[about - 2] = [_product_sum(cosine, a, sine, b) for a, b in zip(second, third, strict=True)]
+    axes[about - 1] = [_product_difference(cosine, b, sine, a) for a, b in zip(second, third, strict=True)]
+    return axes
 
 
 def _moved(origin, amount, axis):
@@ -207,22 +235,31 @@ def _store_twists(screws, target, jacobian):
             jacobian[:, column] = 0.0
             continue
         kind, sign, axis, origin = screw
+        linear, angular = jacobian[:3, column], jacobian[3:, column]
         if kind == "T":
-            linear, angular = axis, [0.0, 0.0, 0.0]
+            _store(axis, linear)
+            angular[:] = 0.0
+        elif origin is None:
+            linear[:] = 0.0
+            _store(axis, angular)
         else:
             # Joints that meet in one point, as in a spherical wrist, share their lever.
             if id(origin) not in levers:
                 levers[id(origin)] = [_product_difference(1.0, p, 1.0, o) for p, o in zip(target, origin, strict=True)]
-            linear, angular = _cross(axis, levers[id(origin)]), axis
-        for row in range(3):
-            jacobian[row, column] = linear[row]
-            jacobian[3 + row, column] = angular[row]
+            _store_cross(axis, levers[id(origin)], linear)
+            _store(axis, angular)
         if sign < 0:
             jacobian[:, column] *= -1.0
 
 
-def _cross(a, b):
-    return [_product_difference(a[i - 2], b[i - 1], a[i - 1], b[i - 2]) for i in range(3)]
+def _store(vector, out):
+    for component, place in zip(vector, out, strict=True):
+        place[:] = component
+
+
+def _store_cross(a, b, out):
+    for i, place in enumerate(out):
+        np.subtract(_product(a[i - 2], b[i - 1]), _product(a[i - 1], b[i - 2]), out=place)
 
 
 def _product(a, b):

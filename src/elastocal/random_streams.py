@@ -5,6 +5,7 @@ its position. How many sets are drawn, in which order, by how many cores or in w
 """
 
 import hashlib
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,8 +26,7 @@ def stream(seed, robot, purpose, data_set):
     -------
     numpy.random.Generator
     """
-    key = np.frombuffer(hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64)
-    use = int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")
+    key, use = _names(seed, robot, purpose)
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
 
 
@@ -46,3 +46,10 @@ def draw(seed, robot, purpose, data_sets, sampler):
     ndarray (sets, ...)
     """
     return np.stack([sampler(stream(seed, robot, purpose, data_set)) for data_set in data_sets])
+
+
+@lru_cache
+def _names(seed, robot, purpose):
+    """Key and position of the streams of one purpose."""
+    key = np.frombuffer(hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64)
+    return key, int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")

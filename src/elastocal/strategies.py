@@ -1,6 +1,6 @@
 """Identification strategies as data: stages of (points measured, joints identified, joints held from an earlier stage)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from elastocal.errors import InputError
 
@@ -71,6 +71,24 @@ def strategy_from_document(document):
         for stage in document["stages"]
     ]
     return Strategy(document["name"], tuple(stages))
+
+
+def without_forgotten_stages(strategy, joints):
+    """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    joints : int
+        Number of joints, n.
+
+    Returns
+    -------
+    Strategy
+        Its points are those of the stages that are left. An iterative solver needs all stages, to start from.
+    """
+    first = max([0, *(index for index, stage in enumerate(strategy.stages) if len(stage.identified) == joints)])
+    return replace(strategy, stages=strategy.stages[first:])
 
 
 def check_strategy(strategy, chain, source):

@@ -5,6 +5,7 @@ from support import OTHER_CHAINS, random_loads, robot_of
 
 from elastocal.study.columns import (
     block_shape,
+    data_sets,
     deflection_columns,
     experiment_columns,
     index_columns,
@@ -19,6 +20,7 @@ def test_rows_are_numbered_by_data_set_and_configuration():
     assert columns["data_set"].tolist() == [4, 4, 4, 7, 7, 7]
     assert columns["configuration"].tolist() == [0, 1, 2, 0, 1, 2]
     assert block_shape(columns) == (2, 3)
+    assert data_sets(columns).tolist() == [4, 7] and data_sets(index_columns([0, 1], 1)).tolist() == [0, 1]
 
 
 def test_experiments_come_back_as_they_were():

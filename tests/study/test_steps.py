@@ -175,11 +175,7 @@ def test_bounds_are_below_what_the_strategies_reach(kuka, strategies):
     assert (bounds["3DoF+6DoF"] < bounds["6DoF"]).all()
     for name, points in (("6DoF", "6DoF"), ("3+6DoF-comb", "3DoF+6DoF"), ("4-6DoF-after-3DoF", "3DoF+6DoF")):
         table = identified(kuka, strategies[name], experiments, deflections)
-
-        def blocks(table=table):
-            return [table]
-
-        tables = evaluated(blocks, scores, "kuka", 1, (0, 1, 2), "stiffness", "averaged_model", 10, [4])
+        tables = evaluated([table], scores, "kuka", 1, (0, 1, 2), "stiffness", "averaged_model", 10, [4])
         ratio = tables[2]["rms"][0] / (noise * bounds[points][3])
         # 200 data sets with heavy tails at four configurations: 15 %.
         assert ratio > 0.85
@@ -206,7 +202,7 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
 
     scores = judge(kuka)
     whole, parts = (
-        evaluated(lambda c=c: cut(*c), scores, "kuka", 1, (0,), "stiffness", "averaged_model", 12, [2, 4])
+        evaluated(iter(cut(*c)), scores, "kuka", 1, (0,), "stiffness", "averaged_model", 12, [2, 4])
         for c in ((0, 12), (0, 1, 7, 12))
     )
     for one, other in zip(whole, parts, strict=True):
@@ -219,7 +215,7 @@ def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
     moved = with_target_offset(kuka, OFFSET)
     table = {"data_set": np.arange(12), "length": np.ones(12)}
     table |= {f"c{j + 1}": np.full(12, c) for j, c in enumerate(kuka.compliance)}
-    found = evaluated(lambda: [table], judge(moved), "kuka", 1, (0,), "compliance", "averaged_model", 10, [1])
+    found = evaluated([table], judge(moved), "kuka", 1, (0,), "compliance", "averaged_model", 10, [1])
     # Roots of rounding.
     np.testing.assert_allclose(found[0]["deviation"], 0, atol=1e-9)
 

@@ -22,7 +22,7 @@ def evaluate(job):
     )
     needed = ["data_set", *(f"c{j + 1}" for j in range(n))]
     tables = evaluated(
-        lambda: read_blocks(job.input.identified, identified(n), needed),
+        read_blocks(job.input.identified, identified(n), needed),
         judge,
         job.wildcards.robot,
         settings.seed,

@@ -3,7 +3,7 @@
 from elastocal.provenance import provenance
 from elastocal.robot import parse_chain, with_target_offset
 from elastocal.storage import read_blocks, write_table
-from elastocal.strategies import strategy_from_document
+from elastocal.strategies import strategy_from_document, without_forgotten_stages
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.table_schemas import DEFLECTIONS, design, experiments, identified
 
@@ -14,6 +14,8 @@ def identify(job):
     settings = job.params
     chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
     strategy = strategy_from_document(settings.strategy)
+    if settings.start is None:
+        strategy = without_forgotten_stages(strategy, chain.coordinates)
     blocks = paired_blocks(
         read_blocks(job.input.experiments, experiments(chain.coordinates)),
         {name: read_blocks(job.input.measured, DEFLECTIONS, point=name) for name in strategy.points},

@@ -22,6 +22,12 @@ def prefix_index_columns(sets, lengths):
     return {"data_set": np.repeat(np.asarray(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), len(sets))}
 
 
+def data_sets(columns):
+    """Numbers of the data sets of a block, whose rows stand together."""
+    numbers = columns["data_set"]
+    return numbers[np.flatnonzero(np.diff(numbers, prepend=-1))]
+
+
 def experiment_columns(sets, experiments):
     """Block of the experiments table."""
     columns = index_columns(sets, experiments.joint_angles.shape[1])

@@ -8,7 +8,7 @@ import numpy as np
 from elastocal.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.identification import Readings, condition_numbers, covariance, estimate_compliance, undetermined_prefixes
 from elastocal.kinematics import poses_and_jacobians
-from elastocal.study.columns import prefix_index_columns, to_experiments
+from elastocal.study.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.table_schemas import covariance_columns
 
 
@@ -66,7 +66,7 @@ def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
         Columns of one block of the design table.
     """
     for block in experiment_blocks:
-        sets = np.unique(block["data_set"])
+        sets = data_sets(block)
         regressors = Design(block, chain, strategy.points, rows, wrench_at).regressors
         silent = np.zeros((rows, *next(iter(regressors.values())).shape[2:]))
         readings = {name: Readings(matrix, silent) for name, matrix in regressors.items()}

@@ -3,6 +3,7 @@
 import numpy as np
 
 from elastocal.evaluation import (
+    accuracy_sums,
     accuracy_table,
     average,
     bootstrap_test_weights,
@@ -11,7 +12,7 @@ from elastocal.evaluation import (
     replicates_table,
 )
 from elastocal.metrics import make_judge
-from elastocal.study.columns import to_deflections, to_experiments
+from elastocal.study.columns import data_sets, to_deflections, to_experiments
 
 
 def judge_from(robot, test_experiments, test_deflections, wrench_at):
@@ -24,8 +25,8 @@ def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, d
 
     Parameters
     ----------
-    identified_blocks : callable
-        Each call starts the blocks of the identified table anew: one pass for each view of them, in bounded memory.
+    identified_blocks : iterable of dict
+        Blocks of the identified table.
     judge : Judge
     key : str
         Name of the robot's file.
@@ -41,19 +42,20 @@ def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, d
     -------
     metrics, replicates, accuracy : dict of str to ndarray
     """
-    joints = len(judge.reference)
+    joints, evaluated_rows, sums = len(judge.reference), np.asarray(lengths) - 1, []
 
-    def compliances():
-        for block in identified_blocks():
-            sets = np.unique(block["data_set"])
-            shape = (len(sets), -1)
-            yield sets, np.stack([block[f"c{j + 1}"].reshape(shape) for j in range(joints)], axis=-1)
+    def weighted():
+        """Estimates with their weights, one pass for both views of them."""
+        for block in identified_blocks:
+            sets = data_sets(block)
+            compliance = np.stack([block[f"c{j + 1}"].reshape(len(sets), -1) for j in range(joints)], axis=-1)
+            sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
+            yield compliance, bootstrap_weights(seed, key, sets, replicates)
 
-    weighted = ((c, bootstrap_weights(seed, key, sets, replicates)) for sets, c in compliances())
     tests = bootstrap_test_weights(seed, key, len(judge.initial_errors), replicates)
-    averages = average(weighted, judge, method, deviation_of, tests)
+    averages = average(weighted(), judge, method, deviation_of, tests)
     return (
         metrics_table(averages, judge.reference, first_stage_joints),
         replicates_table(averages, judge.reference, first_stage_joints),
-        accuracy_table((c for _, c in compliances()), judge, lengths),
+        accuracy_table(sum(sums), lengths),
     )

@@ -4,7 +4,7 @@ import numpy as np
 
 from elastocal.gauss_newton import identify_exactly
 from elastocal.identification import Readings, estimate_compliance
-from elastocal.study.columns import prefix_index_columns, to_deflections
+from elastocal.study.columns import data_sets, prefix_index_columns, to_deflections
 from elastocal.study.design import Design, configuration_first
 
 
@@ -50,7 +50,7 @@ def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=N
         Columns of one block of the identified table.
     """
     for (experiments, deflections), design in zip(blocks, designs, strict=True):
-        sets = np.unique(experiments["data_set"])
+        sets = data_sets(experiments)
         situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
         condition = design["condition"].reshape(len(sets), -1).T
         if start is None:

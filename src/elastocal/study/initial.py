@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.study.columns import to_deflections
+from elastocal.study.columns import data_sets, to_deflections
 
 
 def initial_blocks(ideal_blocks):
@@ -21,7 +21,7 @@ def initial_blocks(ideal_blocks):
     for block in ideal_blocks:
         displacement = np.linalg.norm(to_deflections(block)[..., :3], axis=-1)
         yield {
-            "data_set": np.unique(block["data_set"]),
+            "data_set": data_sets(block),
             "configurations": np.full(len(displacement), displacement.shape[1]),
             "mean": displacement.mean(axis=1),
             "mean_square": (displacement**2).mean(axis=1),

@@ -1,9 +1,7 @@
 """Step 2: noise on the ideal deflections."""
 
-import numpy as np
-
 from elastocal.simulation import measurement_noise
-from elastocal.study.columns import COMPONENT_NAMES, block_shape
+from elastocal.study.columns import COMPONENT_NAMES, block_shape, data_sets
 
 
 def measured_blocks(ideal_blocks, key, seed, noise):
@@ -27,6 +25,6 @@ def measured_blocks(ideal_blocks, key, seed, noise):
     for block in ideal_blocks:
         _, configurations = block_shape(block)
         point = block["point"][0]
-        normal = measurement_noise(seed, key, point, np.unique(block["data_set"]), configurations)
+        normal = measurement_noise(seed, key, point, data_sets(block), configurations)
         measured = {name: block[name] + noise * normal[..., k].ravel() for k, name in enumerate(COMPONENT_NAMES)}
         yield block | measured | {"point": point}

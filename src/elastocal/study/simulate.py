@@ -1,10 +1,8 @@
 """Step 1: random configurations and wrenches, and the deflections that they cause, without noise."""
 
-import numpy as np
-
 from elastocal.simulation import random_experiments, true_deflections
 from elastocal.study import SETS_PER_BLOCK
-from elastocal.study.columns import deflection_columns, experiment_columns, to_experiments
+from elastocal.study.columns import data_sets, deflection_columns, experiment_columns, to_experiments
 
 
 def experiment_blocks(chain, limits, key, seed, loading, purpose, data_sets, configurations):
@@ -50,6 +48,6 @@ def ideal_blocks(experiments, robot, wrench_at):
         Columns of one block of the deflections table: one point in one block of data sets.
     """
     for block in experiments:
-        loaded, sets = to_experiments(block), np.unique(block["data_set"])
+        loaded, sets = to_experiments(block), data_sets(block)
         for point in robot.chain.points:
             yield deflection_columns(point.name, sets, true_deflections(robot, loaded, point, wrench_at))

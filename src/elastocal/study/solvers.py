@@ -1,8 +1,8 @@
 """Equation 11 against Gauss-Newton on the exact kinematics: what "used as initial condition" changes."""
 
-import numpy as np
-
 from elastocal.identification import estimate_compliance
+from elastocal.strategies import without_forgotten_stages
+from elastocal.study.columns import data_sets
 from elastocal.study.identify import Situation
 
 
@@ -29,11 +29,12 @@ def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
     """
     for experiments, deflections in blocks:
         experiments, deflections = _first(experiments, length), {n: _first(d, length) for n, d in deflections.items()}
-        sets = np.unique(experiments["data_set"])
+        sets = data_sets(experiments)
         for strategy in strategies:
             situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
             exact = situation.solved_exactly(start, [length])[0]
-            linear = estimate_compliance(strategy, situation.readings, chain.coordinates)[0][length - 1]
+            lasting = without_forgotten_stages(strategy, chain.coordinates)
+            linear = estimate_compliance(lasting, situation.readings, chain.coordinates)[0][length - 1]
             columns = {"strategy": strategy.name, "data_set": sets}
             for j in range(chain.coordinates):
                 columns[f"equation_11_c{j + 1}"], columns[f"gauss_newton_c{j + 1}"] = linear[j], exact[j]
