@@ -17,8 +17,8 @@ NAME, FAMILY, AFTER = "outliers", "data", ("wrong_sign", "wrong_unit", "shuffled
 
 # Robust standard deviations of the readings of one target.
 _FAR = 8.0
-# Where the model lacks something large residuals are many, and no outliers: nine readings in ten are less than half as far.
-_BULK, _BEYOND_BULK = 0.9, 2.0
+# Where the model lacks something large residuals are many, and no outliers: nine readings in ten are less than a third as far.
+_BULK, _BEYOND_BULK = 0.9, 3.0
 # Fewer readings of a target do not tell its standard deviation.
 _FEWEST = 20
 # No sensor reads closer: smaller deviations are rounding.
