@@ -11,6 +11,7 @@ include: "workflow/rules/evaluate.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
+include: "workflow/rules/loop.smk"
 
 
 rule all:
@@ -20,3 +21,4 @@ rule all:
         expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
         expand("reports/tables/{table}.csv", table=["comparison", "extended", "per_dataset", "solvers"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
+        loop_reports(config["loop"]["campaigns"]),

@@ -7,9 +7,11 @@ import numpy as np
 from elastocal.screening import directions
 from elastocal.selection import without
 
-# Candidates within this angle of what was found, or within this difference of the Bayesian criterion, cannot be told from it.
-CONFOUNDED_DEG = 20.0
+# Within this difference of the Bayesian criterion a candidate cannot be told from what was found. Within this angle it needs a
+# larger one: no law of the catalogue is so exact that the small part in which near relatives differ is to be trusted.
 CONFOUNDED_BIC = 6.0
+CONFOUNDED_DEG = 20.0
+CONFOUNDED_BIC_NEAR = 20.0
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Attribution:
         A rival with more parameters only counts where the criterion cannot tell it: it makes whatever its parts make.
         """
         near = (self.angle_deg < CONFOUNDED_DEG) & (self.rival_parameters <= self.found_parameters)
-        confounded = near | (self.bic_difference < CONFOUNDED_BIC)
+        confounded = self.bic_difference < np.where(near, CONFOUNDED_BIC_NEAR, CONFOUNDED_BIC)
         order = np.argsort(self.bic_difference)
         return tuple(self.rivals[index] for index in order if confounded[index])
 

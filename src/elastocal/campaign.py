@@ -205,6 +205,30 @@ def read_descriptions(folder, robots_folder):
     return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
 
 
+def campaign_files(folder, robots_folder):
+    """Files that a campaign is read from, those of the campaign that holds its test included.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    InputError
+        As in `read_descriptions`.
+    """
+    document, robot_path = read_descriptions(folder, robots_folder)
+    files = [Path(folder) / DOCUMENT, *(path for kind in (CSV, PARQUET) if (path := Path(folder) / kind).is_file()), robot_path]
+    other = document.get("holdout", {}).get("campaign")
+    beyond = campaign_files(Path(folder) / other, robots_folder) if other else []
+    return [path.as_posix() for path in files] + beyond
+
+
 def described_campaign(document, robot, readings, source):
     """A campaign from its parts, which have been checked before.
 
@@ -277,6 +301,26 @@ def split(campaign):
     """
     held_out = _held_out(campaign.holdout, campaign.readings, campaign.name)
     return campaign.readings.select(~held_out), campaign.readings.select(held_out)
+
+
+def folds_of(folder, robots_folder, number, of):
+    """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+    number : int
+        Fold, from 1.
+    of : int
+        How many folds; poses are dealt out in turn.
+
+    Returns
+    -------
+    dict
+    """
+    pairs = _poses(read_campaign(folder, robots_folder).readings)[0]
+    return {"poses": pairs[number - 1 :: of].tolist()}
 
 
 def held_out_campaign(campaign, folder, robots_folder, effects=None):

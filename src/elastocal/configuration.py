@@ -1,9 +1,11 @@
 """The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
 
 import difflib
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from elastocal.campaign import DOCUMENT, read_descriptions
 from elastocal.documents import check_document, read_document
 from elastocal.errors import InputError
 from elastocal.identification import first_solvable_length
@@ -72,6 +74,69 @@ def check_study(config, folder, source="config.yaml"):
         )
     _check_cells(config, source)
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
+
+
+def campaign_sources(config, folder, source="config.yaml"):
+    """Where the campaigns that a configuration names come from.
+
+    Parameters
+    ----------
+    config : dict
+        Checked.
+    folder : str or Path
+        Holds ``campaigns/`` and ``robots/``.
+    source : str
+        File of the configuration, named in errors.
+
+    Returns
+    -------
+    dict of str to dict
+        Documents by the names of their files; a simulated one has the document of its robot under ``robot_document``.
+
+    Raises
+    ------
+    InputError
+        The first fault found.
+    """
+    found = {}
+    for name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+        document = _named_document(folder, "campaigns", "campaign_source", name, source)
+        if document["source"] == "simulated":
+            path = _path(folder, "campaigns", name)
+            document["robot_document"] = _named_document(folder, "robots", "robot", document["robot"], path)
+        found[name] = document
+    return found
+
+
+def user_campaign(config, robots_folder):
+    """A user's own campaign, checked as a whole before any job starts.
+
+    Parameters
+    ----------
+    config : dict
+        ``campaign`` is its folder.
+    robots_folder : str or Path
+
+    Returns
+    -------
+    dict of str to str
+        Its folder by its name; empty where there is none.
+
+    Raises
+    ------
+    InputError
+        A name that no file can have or that a campaign of this project has.
+    """
+    folder = config.get("campaign")
+    if not folder:
+        return {}
+    document, _ = read_descriptions(folder, robots_folder)
+    name, source = document["campaign"], f"{folder}/{DOCUMENT}"
+    if not re.fullmatch(r"[\w.-]+", name):
+        raise InputError(source, "campaign", repr(name), "letters, digits, _, - and . for the name of its folder of results")
+    if name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+        raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
+    return {name: str(folder).rstrip("/")}
 
 
 def rows_read(measured):

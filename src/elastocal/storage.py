@@ -90,6 +90,8 @@ def write_table(path, schema, blocks, provenance):
     ):
         for block in blocks:
             values = _checked(path, schema, block)
+            if not len(next(iter(values.values()))):
+                continue
             digests.append({c.name: _digest(c, values[c.name]) for c in schema.columns})
             arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
             writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
@@ -155,10 +157,11 @@ def read_table(path, schema, columns=None, **where):
     dict of str to ndarray
     """
     blocks = list(read_blocks(path, schema, columns, **where))
+    if not blocks and not where:
+        wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
+        return {c.name: np.zeros(0, object if c.type in ("string", "text") else c.type) for c in wanted}
     if not blocks:
-        raise InputError(
-            path, ", ".join(where) or "row groups", ", ".join(map(repr, where.values())) or "none", "values in the file"
-        )
+        raise InputError(path, ", ".join(where), ", ".join(map(repr, where.values())), "values in the file")
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 

@@ -3,7 +3,8 @@
 import sys
 from pathlib import Path
 
-from elastocal.configuration import check_study, rows_read
+from elastocal.campaign import campaign_files
+from elastocal.configuration import campaign_sources, check_study, rows_read, user_campaign
 from elastocal.errors import InputError
 
 ROOT = Path(workflow.basedir)
@@ -13,6 +14,9 @@ from import_closure import closure
 
 try:
     STUDY = check_study(config, "config")
+    SOURCES = campaign_sources(config, "config")
+    # Name and folder of the user's own campaign, if there is one.
+    OWN = user_campaign(config, "config/robots")
 except InputError as error:
     sys.exit(str(error))
 
@@ -29,6 +33,7 @@ wildcard_constraints:
     robot="[^/]+",
     strategy="[^/]+",
     noise=r"[\d.e-]+",
+    campaign="[^/]+",
     test="(/test)?",
 
 

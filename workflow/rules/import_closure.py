@@ -35,7 +35,9 @@ def _imported(file, roots):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    return frozenset(path for name in names for root in roots for path in _files(name, root))
+    found = {path for name in names for root in roots for path in _files(name, root)}
+    # A catalogue looks up the modules beside it by itself.
+    return frozenset(found | set(file.parent.glob("*.py")) if "pkgutil" in names else found)
 
 
 def _files(name, root):

@@ -16,26 +16,38 @@ _SHORTEST_M = 0.05
 
 
 def candidates(sites):
-    """One candidate a link with a length, named by the joint before it; the column before joint 1 is `base_compliance`."""
-    long = [k for k in range(1, sites.joints + 1) if np.linalg.norm(sites.link_vectors_m[k]) > _SHORTEST_M]
-    return [_candidate(sites, link) for link in long]
+    """One candidate a link with a length, named by the joint before it; the column; and all links with one section.
+
+    One section is what a robot of like tubes has: two parameters for the whole arm, where a candidate a link has two each.
+    """
+    long = [k for k in range(sites.joints + 1) if np.linalg.norm(sites.link_vectors_m[k]) > _SHORTEST_M]
+    each = [_candidate(sites, (link,), "" if link else "column") for link in long]
+    return [*each, _candidate(sites, tuple(long), "one section")] if len(long) > 1 else each
 
 
-def _candidate(sites, link):
-    vector = sites.link_vectors_m[link]
-    length = np.linalg.norm(vector)
-    along = vector / length
-    coordinates = sites.link_end[link]
-
+def _candidate(sites, links, detail):
     def displacement(circumstances):
-        force, moment = np.split(circumstances.load[:, coordinates], 2, axis=1)
-        across, twist = force - np.outer(force @ along, along), np.outer(moment @ along, along)
-        bending = moment - twist
-        shift = length**3 / 3 * across + length**2 / 2 * np.cross(bending, along)
-        turn = length**2 / 2 * np.cross(along, across) + length * bending
-        return [
-            dict(zip(coordinates, np.concatenate([shift, turn], axis=1).T, strict=True)),
-            dict(zip(coordinates[3:], (length * twist).T, strict=True)),
-        ]
+        bent, twisted = {}, {}
+        for link in links:
+            bending, torsion = _deflection(sites, link, circumstances.load)
+            bent |= bending
+            twisted |= torsion
+        return [bent, twisted]
 
-    return Candidate(NAME, FAMILY, (link,), "", _PARAMETERS, displacement, frozenset({"load"}))
+    return Candidate(NAME, FAMILY, tuple(k for k in links if k), detail, _PARAMETERS, displacement, frozenset({"load"}))
+
+
+def _deflection(sites, link, load):
+    """Displacement of the far end of a link for a unit of 1/EI and of 1/GJ."""
+    coordinates = sites.link_end[link]
+    length = np.linalg.norm(sites.link_vectors_m[link])
+    along = sites.link_vectors_m[link] / length
+    force, moment = np.split(load[:, coordinates], 2, axis=1)
+    across, twist = force - np.outer(force @ along, along), np.outer(moment @ along, along)
+    bending = moment - twist
+    shift = length**3 / 3 * across + length**2 / 2 * np.cross(bending, along)
+    turn = length**2 / 2 * np.cross(along, across) + length * bending
+    return (
+        dict(zip(coordinates, np.concatenate([shift, turn], axis=1).T, strict=True)),
+        dict(zip(coordinates[3:], (length * twist).T, strict=True)),
+    )

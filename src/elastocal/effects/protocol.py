@@ -32,8 +32,8 @@ class Parameter:
         Magnitude that such an effect can reach on a real robot; a parameter that the data cannot tell from zero even at this
         size is not estimated.
     prior_std : float or None
-        Standard deviation of a normal prior about zero, for series whose terms the data tell from each other only in part. None,
-        as nearly everywhere, for no prior. Reported with the estimate.
+        Standard deviation of a normal prior about zero, for series whose terms the data tell from each other only in part.
+        None, as nearly everywhere, for no prior. Reported with the estimate.
     """
 
     name: str

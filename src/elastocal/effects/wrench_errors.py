@@ -1,4 +1,4 @@
-"""What errors of the load have in common: a changed wrench at the end-effector, which the joint compliances turn into angles."""
+"""What errors of the load have in common: a changed wrench, which the joint compliances turn into angles."""
 
 from dataclasses import dataclass
 

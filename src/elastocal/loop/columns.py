@@ -142,6 +142,44 @@ def look_blocks(looks, candidates):
         yield block
 
 
+def found_columns(search):
+    """Columns of the found table."""
+    chosen = {}
+    for look in search.looks:
+        if look.chosen is not None:
+            key = look.directions.candidates[look.chosen][0].key
+            chosen[key] = look.scores.p_family[look.chosen], look.gain, look.gain_std_error
+    # What stands for several effects at once was not itself chosen in a look: the least of theirs is its p-value.
+    least = min(chosen.values(), default=None)
+    rows = np.array([chosen.get(candidate.key, least) for candidate in search.effects]).reshape(-1, 3)
+    return candidate_columns(search.effects) | dict(zip(("p_family", "gain", "gain_std_error"), rows.T, strict=True))
+
+
+def rival_blocks(attributions):
+    """Blocks of the rivals table, one for each effect found."""
+    for attribution in attributions:
+        yield {
+            "found": [attribution.effect] * len(attribution.rivals),
+            "candidate": list(attribution.rivals),
+            "angle_deg": attribution.angle_deg,
+            "bic_difference": attribution.bic_difference,
+            "parameters": attribution.rival_parameters,
+            "found_parameters": np.full(len(attribution.rivals), attribution.found_parameters),
+            "alternative": np.isin(attribution.rivals, attribution.alternatives),
+        }
+
+
+def confounding_columns(seen, angles):
+    """Columns of the confounding table: every pair of tested candidates once."""
+    keys = [candidate.key + (f" {values[0]:.3g}" if len(values) else "") for candidate, values in seen.candidates]
+    rows, columns = np.tril_indices(len(keys), -1)
+    return {
+        "one": [keys[row] for row in rows],
+        "other": [keys[column] for column in columns],
+        "angle_deg": angles[rows, columns],
+    }
+
+
 def residual_columns(readings, held_out, position, before, after):
     """Columns of the residuals table."""
     count, joints = readings.joint_angles.shape

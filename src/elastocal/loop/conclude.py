@@ -2,10 +2,56 @@
 
 import numpy as np
 
+from elastocal.attribution import Attribution, by_effect
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
 from elastocal.selection import parameter_slice
 from elastocal.verdict import UNEXPLAINED, Evidence, word
+
+
+def attributions_from(rivals, found, p_values):
+    """Attributions from the columns of the rivals table.
+
+    Parameters
+    ----------
+    rivals : dict of str to ndarray
+    found : sequence of Candidate
+    p_values : dict of str to float
+        By the keys of the candidates found.
+
+    Returns
+    -------
+    list of Attribution
+    """
+    attributions = []
+    for name, members in by_effect(found).items():
+        mine = rivals["found"] == name
+        attributions.append(
+            Attribution(
+                name,
+                members,
+                min(p_values[member.key] for member in members),
+                tuple(rivals["candidate"][mine]),
+                rivals["angle_deg"][mine],
+                rivals["bic_difference"][mine],
+                rivals["parameters"][mine],
+                int(rivals["found_parameters"][mine].max(initial=0)),
+            )
+        )
+    return attributions
+
+
+def candidate_columns(looks, rivals):
+    """Columns of the candidates table: the first look at each candidate, and its angle to what was found."""
+    first = looks["look"] == 0
+    nearest = {}
+    for key, angle in zip(rivals["candidate"], rivals["angle_deg"], strict=True):
+        nearest[key] = min(angle, nearest.get(key, np.inf))
+    taken = set(looks["candidate"][looks["chosen"]])
+    columns = {name: values[first] for name, values in looks.items() if name not in ("look", "chosen")}
+    columns["chosen"] = np.array([key in taken for key in columns["candidate"]])
+    columns["angle_deg"] = np.array([nearest.get(key, np.nan) for key in columns["candidate"]])
+    return columns
 
 
 def concluded(case, noise_facts, declared, final, attributions, looks, rows, heldout, faults, warnings):

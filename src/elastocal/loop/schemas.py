@@ -79,6 +79,15 @@ LOOKS = TableSchema(
     ),
 )
 
+CANDIDATES = TableSchema(
+    "candidates",
+    (
+        *(column for column in LOOKS.columns if column.name not in ("look", "chosen")),
+        Column("chosen", "bool", "", "whether any look took the candidate"),
+        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
+    ),
+)
+
 FOUND = TableSchema(
     "found",
     (
@@ -97,6 +106,7 @@ RIVALS = TableSchema(
         Column("angle_deg", "float64", "deg", "angle of its sensitivities to what was found"),
         Column("bic_difference", "float64", "", "by how much the Bayesian criterion is worse with it"),
         Column("parameters", "int32", "", "directions in which it can be told"),
+        Column("found_parameters", "int32", "", "directions in which what was found can be told"),
         Column("alternative", "bool", "", "whether these data cannot tell it from what was found"),
     ),
 )
@@ -129,11 +139,3 @@ def residuals(joints):
             ),
         ),
     )
-
-
-BEFORE_AFTER = (
-    ("step", "name of the model"),
-    ("kind", "step: frames, declared model, each effect added; control: an effect that should not help"),
-    ("added", "what this step adds"),
-    ("parameters", "fitted parameters of the whole model"),
-)

@@ -1,0 +1,23 @@
+"""A campaign's folder, checked, as tables: readings to fit and readings to test."""
+
+import json
+
+from elastocal.frames import write_text
+from elastocal.loop.columns import reading_columns
+from elastocal.loop.intake import taken_in
+from elastocal.loop.schemas import readings
+from elastocal.provenance import provenance
+from elastocal.storage import write_table
+
+from job import run
+
+
+def read_campaign(job):
+    descriptions, training, held_out = taken_in(job.params.folder, job.params.robots)
+    for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
+        schema = readings(part.joint_angles.shape[1])
+        write_table(path, schema, [reading_columns(part)], provenance(descriptions, **job.wildcards))
+    write_text(job.output.descriptions, json.dumps(descriptions, indent=1) + "\n")
+
+
+run(read_campaign, snakemake)

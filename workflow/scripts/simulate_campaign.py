@@ -1,0 +1,28 @@
+"""A campaign of a simulated robot, with what its declared robot lacks."""
+
+from elastocal.campaign import write_campaign
+from elastocal.campaign_simulation import Plan, simulated_measurements
+from elastocal.robot import robot_from_document
+
+from job import run
+
+
+def simulate_campaign(job):
+    settings, name = job.params.source, job.wildcards.campaign
+    robot = robot_from_document(settings["robot_document"], settings["robot"])
+    plan = Plan(**{key: tuple(v) if isinstance(v, list) else v for key, v in settings.items() if key in Plan.__annotations__})
+    document = {
+        "campaign": name,
+        "robot": settings["declared_robot"],
+        "measured": "pose",
+        "frame": "base",
+        "targets": {point: {"point": point, "offset_m": [0, 0, 0]} for point in settings["points"]},
+        "compliance": "identify",
+        "declared": [],
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+    table = simulated_measurements(robot, plan, job.params.seed, name)
+    write_campaign(job.params.folder, document, table, robot.joints)
+
+
+run(simulate_campaign, snakemake)

@@ -1,0 +1,41 @@
+"""The verdict, and the table of all candidates."""
+
+import json
+
+import pandas as pd
+
+from elastocal.frames import write_text
+from elastocal.loop.conclude import attributions_from, candidate_columns, concluded
+from elastocal.loop.opened import opened_case, opened_fit, opened_json
+from elastocal.loop.schemas import CANDIDATES, FOUND, LOOKS, RIVALS
+from elastocal.provenance import provenance
+from elastocal.storage import read_table, write_table
+
+from job import run
+
+
+def state_verdict(job):
+    case = opened_case(job.input.descriptions, job.input.training)
+    declared, _ = opened_fit(case, job.input.declared, job.input.noise)
+    final, found = opened_fit(case, job.input.parameters, job.input.noise, job.input.found)
+    looks, rivals = read_table(job.input.looks, LOOKS), read_table(job.input.rivals, RIVALS)
+    table = read_table(job.input.found, FOUND)
+    p_values = dict(zip(table["candidate"], table["p_family"], strict=True))
+    errors = opened_json(job.input.errors)
+    verdict = concluded(
+        case,
+        opened_json(job.input.noise),
+        declared,
+        final,
+        attributions_from(rivals, found, p_values),
+        looks,
+        pd.read_csv(job.input.before_after).to_dict("records"),
+        errors["heldout"],
+        opened_json(job.input.faults),
+        errors["warnings"],
+    )
+    write_table(job.output.candidates, CANDIDATES, [candidate_columns(looks, rivals)], provenance({}, **job.wildcards))
+    write_text(job.output.verdict, json.dumps(verdict, indent=1, allow_nan=False) + "\n")
+
+
+run(state_verdict, snakemake)
