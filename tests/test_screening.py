@@ -190,6 +190,13 @@ def test_directions_are_orthonormal_and_off_the_model(base):
     assert (found.retained <= 1 + 1e-12).all() and (found.retained >= 0.1).all()
 
 
+def test_frame_that_is_not_quite_settled_does_not_matter(base):
+    fitted, seen = drawn(base, 408)
+    moved = replace(fitted, estimate=replace(fitted.estimate, frame_position=fitted.estimate.frame_position + 1e-5))
+    one, other = (directions(f, seen, named(base, "joint_offset@2")) for f in (fitted, moved))
+    np.testing.assert_allclose(other.residual, one.residual, rtol=0, atol=1e-8)
+
+
 def test_what_the_model_fits_already_is_not_tested_and_said_so(base):
     fitted, seen = drawn(base, 401)
     found = directions(fitted, seen, named(base, "joint_offset@1", "joint_offset@6", "joint_offset@2"))

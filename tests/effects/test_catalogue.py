@@ -64,7 +64,7 @@ def test_keys_are_unique_and_readable(chain):
     listed = [c.key for module in catalogue.effects().values() for c in module.candidates(sites)]
     assert len(listed) == len(set(listed)) and list(candidates_on(sites)) == listed
     for key in listed:
-        assert re.fullmatch(r"[a-z_]+(@\d(\+\d)?)?(\[[a-z0-9 -]+\])?", key), key
+        assert re.fullmatch(r"[a-z_]+(@\d(\+\d)*)?(\[[a-z0-9 -]+\])?", key), key
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_keys_are_unique_and_readable(chain):
         ("link_weight", "2 3 4 5"),
         ("compensator_torque", "2"),
         ("compensator_stiffness", "2"),
-        ("link_elasticity", "1 2 3 6"),
+        ("link_elasticity", "1 2 3 6 column section"),
         ("joint_tilt", "1 2 3 4 5 6"),
         ("stiffening", "1 2 3 4 5 6"),
         ("lost_motion", "1 2 3 4 5 6"),
@@ -83,8 +83,9 @@ def test_keys_are_unique_and_readable(chain):
     ],
 )
 def test_places_on_the_fanuc(fanuc, effect, places):
-    found = [c.joints for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
-    assert found == [(int(joint),) for joint in places.split()]
+    found = [c for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
+    assert {c.detail.split()[-1] if c.detail else str(*c.joints) for c in found} == set(places.split())
+    assert len(found) == len(places.split())
 
 
 def test_parameters_have_units_names_and_positive_plausible_sizes(chain):

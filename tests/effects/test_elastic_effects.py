@@ -49,8 +49,7 @@ def test_link_elasticity_is_the_extended_model_without_its_stretching(kuka_exten
     chain = extended_chain(kuka_extended)
     coordinates = np.concatenate([states.joint_angles, np.zeros((5, 30))], axis=1)
     load = generalized_forces(poses_and_jacobians(chain, coordinates, chain.end_effector)[2], states.wrench)
-    # The column, link 0, is left to the base.
-    for number, link in {1: 1, 2: 2, 3: 3, 4: 6}.items():
+    for number, link in {0: 0, 1: 1, 2: 2, 3: 3, 4: 6}.items():
         tube = kuka_extended.links[number].tube
         outer, inner = tube.outer_diameter_m, tube.outer_diameter_m - 2 * tube.wall_m
         second = np.pi * (outer**4 - inner**4) / 64
@@ -63,7 +62,9 @@ def test_link_elasticity_is_the_extended_model_without_its_stretching(kuka_exten
         beam[0, 0] = 0.0
         spring = axes @ beam @ axes.T
         expected = load[:, 6 + 6 * number : 12 + 6 * number] @ spring.T
-        made = displacements(candidate_on(kuka_extended.chain, f"link_elasticity@{link}"), around)
+        made = displacements(
+            candidate_on(kuka_extended.chain, f"link_elasticity@{link}" if link else "link_elasticity[column]"), around
+        )
         total = made[0] / (tube.youngs_modulus_Pa * second) + made[1] / (tube.shear_modulus_Pa * 2 * second)
         found = total[:, list(around.sites.link_end[link])]
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
@@ -91,11 +92,22 @@ def test_links_bend_by_the_formulas_of_the_cantilever():
 
 
 @pytest.mark.parametrize("name", ["fanuc", *OTHER_CHAINS])
-def test_links_that_bend_are_those_with_a_length_behind_a_joint(name, fanuc):
+def test_links_that_bend_are_those_with_a_length(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     lengths = np.linalg.norm(sites_of(chain).link_vectors_m, axis=1)
-    found = [c.joints[0] for c in candidates_on(sites_of(chain)).values() if c.effect == "link_elasticity"]
-    assert found == [link for link in range(1, len(lengths)) if lengths[link] > 0.05]
+    found = {c.key for c in candidates_on(sites_of(chain)).values() if c.effect == "link_elasticity"}
+    long = [link for link in range(1, len(lengths)) if lengths[link] > 0.05]
+    column = {"link_elasticity[column]"} if lengths[0] > 0.05 else set()
+    together = f"link_elasticity@{'+'.join(map(str, long))}[one section]"
+    assert found == {*(f"link_elasticity@{link}" for link in long), *column, together}
+
+
+def test_links_of_one_section_bend_all_as_each_by_itself(fanuc):
+    around = circumstances_on(fanuc.chain, made_states(6, 5, seed=10))
+    known = candidates_on(around.sites)
+    each = [known[key] for key in ("link_elasticity[column]", *(f"link_elasticity@{link}" for link in (1, 2, 3, 6)))]
+    found = displacements(known["link_elasticity@1+2+3+6[one section]"], around)
+    np.testing.assert_allclose(found, sum(displacements(candidate, around) for candidate in each), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["fanuc", *OTHER_CHAINS])
