@@ -22,3 +22,4 @@ rule all:
         expand("reports/tables/{table}.csv", table=["comparison", "extended", "per_dataset", "solvers"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
         loop_reports(config["loop"]["campaigns"]),
+        "reports/loop/campaigns.csv",

@@ -125,16 +125,14 @@ def _attribution(name, members, final, others_found, p_values, observations, can
     keys = {member.key for member in members}
     others = without(final, keys, observations)
     taken = {candidate.key for candidate in others_found}
-    seen = directions(others, observations, [candidate for candidate in candidates if candidate.key not in taken])
-    mine = [index for index, (candidate, _) in enumerate(seen.candidates) if candidate.key in keys]
-    basis = np.linalg.qr(np.concatenate([seen.columns[index] for index in mine], axis=1))[0]
+    mine = directions(others, observations, members, 0.0, 0.0)
+    seen = directions(others, observations, [c for c in candidates if c.key not in taken | keys])
+    basis = np.linalg.qr(np.concatenate(mine.columns, axis=1))[0]
     explained = basis @ (basis.T @ seen.residual)
     rows, total = len(seen.residual), seen.residual @ seen.residual
     rest = total - explained @ explained
     rivals, angles, differences, sizes = [], [], [], []
     for index, (candidate, _) in enumerate(seen.candidates):
-        if candidate.key in keys:
-            continue
         columns = seen.columns[index]
         share = np.linalg.norm(columns.T @ explained) / np.linalg.norm(explained)
         rest_with = total - ((columns.T @ seen.residual) ** 2).sum()

@@ -85,7 +85,7 @@ class Scores:
     bic_gain: np.ndarray
 
 
-def directions(fitted, observations, candidates):
+def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, least_noncentrality=LEAST_NONCENTRALITY):
     """What each candidate would make of the residual of a fit.
 
     Parameters
@@ -94,6 +94,8 @@ def directions(fitted, observations, candidates):
     observations : Observations
         Those fitted.
     candidates : iterable of Candidate
+    least_retained, least_noncentrality : float
+        Candidates with less are not tested.
 
     Returns
     -------
@@ -123,8 +125,8 @@ def directions(fitted, observations, candidates):
             values, vectors = np.linalg.eigh(off.T @ off)
             whole = (made**2).sum()
             share, largest = np.sqrt(values.sum() / whole) if whole else 0.0, values[-1]
-            if share < LEAST_RETAINED or largest < LEAST_NONCENTRALITY:
-                reason = "what it makes is fitted by the model already" if share < LEAST_RETAINED else "too small to be seen"
+            if share < least_retained or largest < least_noncentrality:
+                reason = "what it makes is fitted by the model already" if share < least_retained else "too small to be seen"
                 untestable[candidate.key] = reason
                 continue
             good = values > max(_ROUNDING * whole, 1e-6 * largest)

@@ -18,6 +18,8 @@ class Evidence:
         Candidates that these data could test.
     before, after : LackOfFit
         Of the declared model and of the model with the effects found.
+    discrepancy_before_m, discrepancy_after_m : float
+        What both models lack beside the noise, see `Fit`.
     attributions : tuple of Attribution
     data_faults : tuple of Fault
         Decisive ones.
@@ -26,13 +28,16 @@ class Evidence:
     tested: int
     before: object
     after: object
+    discrepancy_before_m: float
+    discrepancy_after_m: float
     attributions: tuple
     data_faults: tuple = ()
 
     @property
     def explained(self):
-        """Share of the mean square above the noise that the effects found have removed; 1 where there was none."""
-        return 1.0 - self.after.excess / self.before.excess if self.before.excess > 0 else 1.0
+        """Share of the mean square beside the noise that the effects found have removed; 1 where there was none."""
+        before = self.discrepancy_before_m**2
+        return 1.0 - self.discrepancy_after_m**2 / before if before else 1.0
 
 
 def word(evidence):

@@ -26,6 +26,15 @@ def loop_reports(campaigns):
     return expand("reports/loop/{campaign}/{file}", campaign=campaigns, file=LOOP_REPORTS)
 
 
+def folds_of_one(campaigns):
+    """Campaigns that hold out the folds of the same readings, by the importer of these."""
+    folds = {}
+    for name in campaigns:
+        if "fold" in SOURCES[name]:
+            folds.setdefault(SOURCES[name]["importer"], []).append(name)
+    return folds
+
+
 rule simulate_campaign:
     input:
         sources=sources("simulate_campaign.py"),
@@ -232,6 +241,27 @@ rule state_verdict:
         "../scripts/state_verdict.py"
 
 
+rule summarize_campaigns:
+    input:
+        verdicts=lambda wildcards: expand("reports/loop/{name}/verdict.json", name=config["loop"][wildcards.kind]),
+        residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
+        sources=sources("summarize_campaigns.py"),
+    output:
+        table="reports/loop/{kind}.csv",
+    log:
+        "results/logs/summarize_campaigns/{kind}.log",
+    benchmark:
+        "results/timings/summarize_campaigns/{kind}.tsv"
+    wildcard_constraints:
+        kind="campaigns|measured",
+    params:
+        campaigns=lambda wildcards: config["loop"][wildcards.kind],
+        folds=lambda wildcards: folds_of_one(config["loop"][wildcards.kind]),
+        seed=config["seed"],
+    script:
+        "../scripts/summarize_campaigns.py"
+
+
 rule diagnose:
     input:
         loop_reports(OWN),
@@ -240,3 +270,4 @@ rule diagnose:
 rule measured:
     input:
         loop_reports(config["loop"]["measured"]),
+        "reports/loop/measured.csv",

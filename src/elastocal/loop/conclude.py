@@ -3,6 +3,7 @@
 import numpy as np
 
 from elastocal.attribution import Attribution, by_effect
+from elastocal.explainable import explainable_share
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
 from elastocal.selection import parameter_slice
@@ -80,8 +81,10 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
     before, after = lack_of_fit(declared, case.observations), lack_of_fit(final, case.observations)
     tested = int(np.isfinite(looks["p_value"][looks["look"] == 0]).sum())
     decisive = [fault for fault in faults if fault["decisive"]]
-    evidence = Evidence(tested, before, after, tuple(attributions), tuple(decisive))
+    missing = declared.discrepancy_m, final.discrepancy_m
+    evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive))
     said = word(evidence)
+    foreseen = [explainable_share(fitted, case.observations) for fitted in (declared, final)]
     gains = _gains(rows)
     return {
         "campaign": case.campaign.name,
@@ -100,6 +103,7 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
             "after": _fit_entry(after),
             "explained_share": _number(evidence.explained),
         },
+        "predictable_share": {"before": foreseen[0], "after": foreseen[1]},
         "heldout": heldout,
         "compliance_urad_per_Nm": _compliances(declared, final),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
@@ -164,7 +168,7 @@ def _remainder(said, after, evidence):
     ratio = f"{np.sqrt(after.ratio):.1f} times the noise"
     if said == UNEXPLAINED and not evidence.attributions:
         return [f"the residual is {ratio} and no effect of the catalogue stands out"]
-    share = f"{100 * evidence.explained:.0f} % of the mean square above it"
+    share = f"{100 * evidence.explained:.0f} % of the mean square beside it"
     return [f"what remains is {ratio}; the effects found explain {share}, so something else is still missing"]
 
 

@@ -1,0 +1,72 @@
+"""All campaigns on one page: verdicts, and held-out errors before and after; folds of one campaign are pooled."""
+
+import numpy as np
+import pandas as pd
+
+from elastocal.held_out import Errors, intervals, summary
+from elastocal.random_streams import stream
+
+_REPLICATES = 1000
+_STAGES = ("before", "after")
+
+
+def campaign_rows(verdicts, residuals, folds, seed):
+    """One row for each campaign and session, and one for all folds of a campaign together.
+
+    Parameters
+    ----------
+    verdicts : dict of str to dict
+        Contents of verdict.json by campaign.
+    residuals : dict of str to pandas.DataFrame
+        Held-out rows of residuals.parquet.
+    folds : dict of str to list of str
+        Campaigns that hold out the folds of one set of readings, by a name for all.
+    seed : int
+        Of the bootstrap over poses.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    pooled = {name for names in folds.values() for name in names}
+    groups = {name: [name] for name in verdicts if name not in pooled} | folds
+    rows = []
+    for name, members in groups.items():
+        held_out = pd.concat([residuals[member] for member in members])
+        said = pd.Series([verdicts[member]["verdict"] for member in members]).value_counts()
+        named = pd.Series([_effects(verdicts[member]) for member in members]).value_counts()
+        head = {"campaign": name, "verdict": _counted(said, len(members)), "effects": _counted(named, len(members))}
+        for session, part in held_out.groupby("session"):
+            rows.append(head | {"session": session} | _errors(part, stream(seed, name, "summary", session)))
+    return pd.DataFrame(rows)
+
+
+def _effects(verdict):
+    names = []
+    for effect in verdict["effects"]:
+        joints = ", ".join(map(str, effect["joints"]))
+        names.append(f"{effect['name']} (joint {joints})" if joints else effect["name"])
+    return " + ".join(names) or "none"
+
+
+def _counted(counts, total):
+    if total == 1:
+        return counts.index[0]
+    return "; ".join(f"{count} of {total}: {value}" for value, count in counts.items())
+
+
+def _errors(part, draws):
+    """Errors of averaged readings: repeats of a state count once."""
+    state = ["pose", "load", "target"]
+    columns = [f"{stage}_{axis}" for stage in _STAGES for axis in ("dx", "dy", "dz")]
+    mean = part.groupby(state, sort=True)[columns].mean()
+    cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
+    errors = [Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster) for k in range(len(_STAGES))]
+    limits, reductions = intervals(errors, _REPLICATES, draws)
+    row = {"poses": errors[0].poses}
+    for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
+        for name, value in summary(error.distance).items():
+            row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
+        row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
+    row["rms_reduction_low"], row["rms_reduction_high"] = reductions[1]
+    return row

@@ -1,0 +1,21 @@
+"""All campaigns of one kind on one page."""
+
+from elastocal.frames import read_frame, write_csv
+from elastocal.loop.opened import opened_json
+from elastocal.loop.schemas import residuals
+from elastocal.loop.summary import campaign_rows
+
+from job import run
+
+
+def summarize_campaigns(job):
+    settings = job.params
+    verdicts = {name: opened_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
+    held_out = {
+        name: read_frame(path, residuals(len(verdicts[name]["noise"]["joint_rad"]))).query("held_out")
+        for name, path in zip(settings.campaigns, job.input.residuals, strict=True)
+    }
+    write_csv(job.output.table, campaign_rows(verdicts, held_out, settings.folds, settings.seed))
+
+
+run(summarize_campaigns, snakemake)
