@@ -10,7 +10,7 @@ from elastocal.whitening import whitening
 
 # A declared noise is trusted to about ten percent: so many degrees of freedom it stands for.
 _DECLARED_FREEDOM = 50
-LEVEL = 0.01
+LEVEL = 0.005
 
 
 @dataclass(frozen=True)

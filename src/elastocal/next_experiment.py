@@ -68,23 +68,21 @@ def propose(final, attribution, observations, candidates, joint_limits, count, s
     model = replace(bare.model, targets=targets)
     estimate = replace(bare.estimate, target_offset=offsets, target_rotation=turns)
     pool = _pool(model, estimate, observations, joint_limits, stream)
-    present, gains = [], []
+    contests = []
     for key in attribution.alternatives[:_RIVALS]:
         rival = (candidates[key], [shape.start for shape in candidates[key].shapes])
         here = _rows(bare.model, bare.estimate, bare, final, attribution.members, rival, observations)
         there = _rows(model, estimate, bare, final, attribution.members, rival, pool)
-        rows = here.reshape(-1, here.shape[-1])
-        present.append(rows.T @ rows)
-        gains.append(there.transpose(0, 2, 1) @ there)
-    before = min(float(_separation(gram[None])[0]) for gram in present)
+        contests.append((_Information.of(here.reshape(-1, here.shape[-1])), there))
+    before = min(information.separation for information, _ in contests)
     chosen, separations = [], []
     for _ in range(count):
-        worst = np.min([_separation(gram + gain) for gram, gain in zip(present, gains, strict=True)], axis=0)
+        worst = np.min([information.separation + information.gains(there) for information, there in contests], axis=0)
         worst[chosen] = -np.inf
         best = int(np.argmax(worst))
         chosen.append(best)
         separations.append(worst[best])
-        present = [gram + gain[best] for gram, gain in zip(present, gains, strict=True)]
+        contests = [(information.with_rows(there[best]), there) for information, there in contests]
     points = tuple(targets[pool.target[index]].point for index in chosen)
     states = pool.states
     return Proposal(states.joint_angles[chosen], states.wrench[chosen], points, np.array(separations), before)
@@ -153,10 +151,45 @@ def _rows(model, estimate, bare, final, members, rival, observations):
     return whitener.apply(np.concatenate([known, other, made[..., None]], axis=-1))
 
 
-def _separation(gram):
-    """What is left of the last column off all others: the Schur complement, for each matrix (..., P, P)."""
-    size = gram.shape[-1] - 1
-    others, along = gram[..., :size, :size].copy(), gram[..., :size, size:]
-    others[..., np.arange(size), np.arange(size)] *= 1 + _RIDGE
-    others[..., np.arange(size), np.arange(size)] += np.finfo(float).tiny ** 0.5
-    return gram[..., size, size] - (along * np.linalg.solve(others, along))[..., 0].sum(axis=-1)
+@dataclass(frozen=True)
+class _Information:
+    """Normal equations of what was found, regressed on all that could stand in its place.
+
+    Attributes
+    ----------
+    gram : ndarray (P + 1, P + 1)
+        Of the rows of `_rows`.
+    inverse : ndarray (P, P)
+        Of the part of what stands in its place.
+    """
+
+    gram: np.ndarray
+    inverse: np.ndarray
+
+    @classmethod
+    def of(cls, rows):
+        """From whitened rows (R, P + 1)."""
+        return cls._from(rows.T @ rows)
+
+    @classmethod
+    def _from(cls, gram):
+        others = gram[:-1, :-1].copy()
+        others[np.diag_indices_from(others)] *= 1 + _RIDGE
+        return cls(gram, np.linalg.pinv(others, hermitian=True))
+
+    @property
+    def separation(self):
+        """Squared length of what was found that nothing else makes: the Schur complement."""
+        along = self.gram[:-1, -1]
+        return float(self.gram[-1, -1] - along @ self.inverse @ along)
+
+    def gains(self, pool):
+        """By how much the separation grows with each block (E, rows, P + 1): innovations over their covariance."""
+        others, found = pool[..., :-1], pool[..., -1]
+        innovation = found - others @ (self.inverse @ self.gram[:-1, -1])
+        covariance = np.eye(pool.shape[1]) + (others @ self.inverse) @ others.transpose(0, 2, 1)
+        return (innovation * np.linalg.solve(covariance, innovation[..., None])[..., 0]).sum(axis=-1)
+
+    def with_rows(self, rows):
+        """With one more block (rows, P + 1)."""
+        return self._from(self.gram + rows.T @ rows)

@@ -1,0 +1,92 @@
+"""Errors on held-out poses, model by model."""
+
+import textwrap
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from elastocal.figures.residuals import MICRO, MILLI
+from elastocal.figures.style import PALETTE, panels, styled
+
+METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
+LOOKS = {
+    "frames": ("#b9b9b9", "frames and targets only", ""),
+    "declared": (PALETTE[1], "declared model", ""),
+    "effect": (PALETTE[0], "with the effects found", ""),
+    "control": ("#e2e2e2", "control, which should not help", "////"),
+}
+# Beyond this ratio the smallest bars would be lost on a linear axis.
+_LARGEST_RATIO = 25
+_LINE = 26
+
+
+@styled
+def before_after(steps, noise_floor_m=None):
+    """Bars of the errors on held-out poses, one for each model.
+
+    Parameters
+    ----------
+    steps : sequence of dict
+        Rows of before_after.csv.
+    noise_floor_m : float, optional
+        RMS error that the noise alone leaves.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    labels = [step_name(step["step"]) for step in steps]
+    lines = [label.count("\n") + 1 for label in labels]
+    figure, axes = panels(1, len(METRICS), 30 + 4.0 * sum(lines) + 4.5 * len(steps), sharey=True)
+    # Rows as high as their names are long.
+    heights = np.array([0.55 + 0.45 * count for count in lines])
+    rows = np.cumsum(heights) - heights / 2
+    values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
+    scale, unit = (MILLI, "mm") if values.max() > 3e-3 else (MICRO, "µm")
+    known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
+    logarithmic = max(known) > _LARGEST_RATIO * min(known)
+    for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
+        for row, step in zip(rows, steps, strict=True):
+            value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
+            color, _, hatch = LOOKS[step["kind"]]
+            axis.barh(row, value, height=0.42, color=color, hatch=hatch, edgecolor="#8a8a8a" if hatch else color, linewidth=0.5)
+            axis.plot([low, high], [row, row], color="black", linewidth=1.1, gid="interval")
+            axis.plot(scale * step[f"train_{metric}_m"], row, "D", color="white", markeredgecolor="black", markersize=3.4)
+        if noise_floor_m:
+            axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
+        axis.set(title=title, xlabel=f"error ({unit})")
+        if logarithmic:
+            axis.set(xscale="log", xlim=(0.5 * scale * min(known), 1.6 * scale * values.max()))
+        else:
+            axis.set_xlim(0, None)
+        axis.grid(visible=False, axis="y")
+        axis.set_axisbelow(True)
+    axes[0, 0].set(yticks=rows, ylim=(heights.sum(), 0))
+    axes[0, 0].set_yticklabels(labels, fontsize=7.5)
+    figure.legend(handles=_legend({step["kind"] for step in steps}, noise_floor_m), loc="outside lower center", ncols=3)
+    return figure
+
+
+def step_name(name, most=3):
+    """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
+    parts = name.replace("_", " ").replace("@", " ").split(", ")
+    rest = f" and {len(parts) - most} more" if len(parts) > most else ""
+    return textwrap.fill(", ".join(parts[:most]) + rest, _LINE)
+
+
+def _legend(kinds, noise_floor_m):
+    handles = [
+        Patch(facecolor=color, hatch=hatch, edgecolor="#8a8a8a" if hatch else color, linewidth=0.5, label=label)
+        for kind, (color, label, hatch) in LOOKS.items()
+        if kind in kinds
+    ]
+    handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
+    handles.append(
+        Line2D(
+            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on training poses"
+        )
+    )
+    if noise_floor_m:
+        handles.append(Line2D([], [], color="black", linestyle=":", linewidth=1.2, label="RMS that noise alone leaves"))
+    return handles

@@ -1,0 +1,285 @@
+"""Residuals of a campaign, before and after: against what the robot did, and as arrows where it stood."""
+
+import numpy as np
+from matplotlib.lines import Line2D
+
+from elastocal.figures.style import PALETTE, panels, styled
+
+MICRO, MILLI = 1e6, 1e3
+STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
+# About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
+# what gives way does so in its direction.
+COMPONENTS = ("radial", "tangential", "vertical", "along the force")
+# More points than this are drawn as pixels, so that the PDF stays small, and more dots per inch then make them sharp.
+_MOST_VECTORS = 1500
+_PIXELS_PER_INCH = 200
+_BINS = 16
+_FEWEST_IN_BIN = 4
+# Of more states than this only one is drawn in each cell of a grid of so many columns.
+_MOST_ARROWS = 320
+_CELLS = 18
+# Length of the arrow of a large residual, as a share of the workspace.
+_ARROW = 0.16
+
+
+@styled
+def residuals(table):
+    """Residual against each joint angle, the load and the time, before and after.
+
+    Parameters
+    ----------
+    table : dict of str to ndarray
+        Columns of the residuals table.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One panel for each quantity that the campaign varies; each shows the component that this quantity explains best.
+    """
+    drawn_against, stages = quantities(table), _stages(table)
+    columns = 3
+    rows = -(-len(drawn_against) // columns)
+    figure, axes = panels(rows, columns, 28 + 52 * rows, sharey=True)
+    parts = {stage: components(table, stage) for stage in stages}
+    scale, unit = length_unit(np.abs(parts["before"]))
+    limit = scale * 1.15 * np.nanquantile(np.abs(parts["before"]), 0.998)
+    held_out = table["held_out"].astype(bool)
+    for axis, (label, values) in zip(axes.flat, drawn_against.items(), strict=False):
+        bins = bins_of(values)
+        shares = {stage: [share_explained(bins, part) for part in parts[stage].T] for stage in stages}
+        shown = int(np.argmax(shares["before"]))
+        for stage in stages:
+            _cloud(axis, values, scale * parts[stage][:, shown], held_out, STAGES[stage][1], bins)
+        percent = " → ".join(f"{100 * shares[stage][shown]:.0f} %" for stage in stages)
+        axis.set_title(f"{COMPONENTS[shown]}: {percent}", fontsize=8, loc="left")
+        axis.set(xlabel=label, ylim=(-limit, limit))
+        axis.axhline(0, color="black", linewidth=0.6)
+    for axis in axes.flat[len(drawn_against) :]:
+        axis.remove()
+    for axis in axes[:, 0]:
+        axis.set_ylabel(f"residual ({unit})")
+    note = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
+    handles = _legend(stages, held_out.any())
+    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.set_dpi(_PIXELS_PER_INCH)
+    return figure
+
+
+@styled
+def arrows(table):
+    """Residuals as arrows where the readings were taken, from the side and from above.
+
+    Parameters
+    ----------
+    table : dict of str to ndarray
+        Columns of the residuals table.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Repeats are averaged; where states are still many, one of each cell of a grid is drawn.
+    """
+    place, off, stages = *_states(table), _stages(table)
+    size = np.linalg.norm(off["before"], axis=1)
+    largest = max(np.quantile(size, 0.95), 1e-9)
+    extent = np.maximum(np.ptp(place, axis=0), 1e-3)
+    cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
+    views = {"from the side": (0, 2), "from above": (0, 1)}
+    figure, axes = panels(1, 2, 34 + float(np.clip(68 * extent[1:].max() / extent[0], 45, 130)))
+    length = _ARROW * extent.max()
+    for axis, (title, seen) in zip(axes[0], views.items(), strict=True):
+        shown = np.arange(len(place)) if cell_m is None else middle_of_cells(place[:, seen], size, cell_m)
+        at = place[shown][:, seen]
+        for order, stage in enumerate(stages):
+            tips = at + off[stage][shown][:, seen] * length / largest
+            head = {"width": 0.006 - 0.0025 * order, "headwidth": 3.2, "headlength": 4, "headaxislength": 3.6, "minlength": 0.3}
+            arrow = axis.quiver(*at.T, *(tips - at).T, angles="xy", scale_units="xy", scale=1, color=STAGES[stage][1], **head)
+            arrow.set(zorder=3 + order, gid=stage)
+            axis.update_datalim(tips)
+        axis.plot(0, 0, "+", color="black", markersize=8, gid="base")
+        axis.annotate("base", (0, 0), (4, 4), textcoords="offset points", fontsize=7)
+        axis.set_title(title, loc="left")
+        axis.set(xlabel="x (m)", ylabel=f"{'xyz'[seen[1]]} (m)", aspect="equal")
+        axis.margins(0.06)
+        axis.set_axisbelow(True)
+    _scale_arrow(axes[0, 1], largest, length)
+    note = (
+        f"one state of each cell of {1e3 * cell_m:g} mm, that of the middle residual"
+        if cell_m
+        else "each arrow: mean of the repeats"
+    )
+    handles = [Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0]) for stage in stages]
+    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=2, title_fontsize=7.5)
+    return figure
+
+
+def quantities(table):
+    """What a residual can be drawn against: angles, load and time, where the campaign varies them.
+
+    Parameters
+    ----------
+    table : dict of str to ndarray
+
+    Returns
+    -------
+    dict of str to ndarray
+        By the label of the axis.
+    """
+    joints = sum(name[0] == "q" and name[1:].isdigit() for name in table)
+    found = {f"angle of joint {joint} (°)": np.degrees(table[f"q{joint}"]) for joint in range(1, joints + 1)}
+    found["force (N)"] = np.linalg.norm([table[name] for name in ("fx", "fy", "fz")], axis=0)
+    time = table["time_s"] - np.nanmin(table["time_s"]) if np.isfinite(table["time_s"]).any() else table["time_s"]
+    hours = np.isfinite(time).any() and np.nanmax(time) > 7200
+    found["time (h)" if hours else "time (min)"] = time / (3600 if hours else 60)
+    return {label: values for label, values in found.items() if np.isfinite(values).any() and np.nanstd(values) > 1e-6}
+
+
+def components(table, stage):
+    """Position residuals in m, radial, tangential and vertical at the place of each reading, and along its force.
+
+    Parameters
+    ----------
+    table : dict of str to ndarray
+    stage : {"before", "after"}
+
+    Returns
+    -------
+    ndarray (M, 4)
+        Not a number along the force where there is none.
+    """
+    off = np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"])
+    force = np.column_stack([table[f"f{axis}"] for axis in "xyz"])
+    azimuth = np.arctan2(table["y"], table["x"])
+    cos, sin = np.cos(azimuth), np.sin(azimuth)
+    size = np.linalg.norm(force, axis=1)
+    along = np.full(len(off), np.nan)
+    np.divide((off * force).sum(axis=1), size, out=along, where=size > 0)
+    return np.column_stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0], off[:, 2], along])
+
+
+def length_unit(lengths_m):
+    """Factor and name of the unit in which lengths in m are best read."""
+    return (MILLI, "mm") if np.nanquantile(lengths_m, 0.95) > 1e-3 else (MICRO, "µm")
+
+
+def bins_of(values):
+    """Bin of each reading: its own for each value where there are few, else of about equal counts; -1 where there is none."""
+    finite = np.isfinite(values)
+    levels = np.unique(np.round(values[finite], 3))
+    edges = levels[:-1] + np.diff(levels) / 2
+    if len(levels) > _BINS:
+        edges = np.unique(np.quantile(values[finite], np.linspace(0, 1, _BINS + 1)[1:-1]))
+    return np.where(finite, np.searchsorted(edges, values), -1)
+
+
+def share_explained(bins, values):
+    """Share of the mean square of values that the means of their bins make, beyond what chance gives to as many bins.
+
+    Parameters
+    ----------
+    bins : ndarray of int (M,)
+    values : ndarray (M,)
+
+    Returns
+    -------
+    float
+        At least 0.
+    """
+    known = (bins >= 0) & np.isfinite(values)
+    if not known.any():
+        return 0.0
+    bins, values = bins[known], values[known]
+    counts = np.bincount(bins)
+    sums = np.bincount(bins, values)
+    explained = (sums[counts > 0] ** 2 / counts[counts > 0]).sum()
+    total, used = (values**2).sum(), (counts > 0).sum()
+    rest = (total - explained) / max(len(values) - used, 1)
+    return float(max(explained - used * rest, 0.0) / total) if total > 0 else 0.0
+
+
+def _cloud(axis, values, residual, held_out, color, bins):
+    """Points of one stage, those held out as crosses, with the running median and the middle half of all."""
+    as_pixels = len(values) > _MOST_VECTORS
+    alpha = float(np.clip(150 / len(values), 0.04, 0.35))
+    common = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
+    axis.scatter(values[~held_out], residual[~held_out], s=4, marker="o", edgecolors="none", **{**common, "linewidths": 0})
+    axis.scatter(values[held_out], residual[held_out], s=9, marker="x", **{**common, "alpha": min(1.5 * alpha, 1.0)})
+    middle, quartiles = [], []
+    for number in range(bins.max() + 1):
+        member = (bins == number) & np.isfinite(residual)
+        if member.sum() >= _FEWEST_IN_BIN:
+            middle.append(np.median(values[member]))
+            quartiles.append(np.quantile(residual[member], [0.25, 0.5, 0.75]))
+    if middle:
+        low, median, high = np.transpose(quartiles)
+        axis.fill_between(middle, low, high, color=color, alpha=0.22, linewidth=0)
+        axis.plot(middle, median, color=color, linewidth=1.6, marker="o", markersize=2.2)
+
+
+def middle_of_cells(at, size, side):
+    """The state of middle size in each cell of a grid.
+
+    Parameters
+    ----------
+    at : ndarray (N, 2)
+        m.
+    size : ndarray (N,)
+    side : float
+        m.
+
+    Returns
+    -------
+    ndarray of int
+        One for each cell that is not empty.
+    """
+    _, cell = np.unique(np.floor(at / side).astype(int), axis=0, return_inverse=True)
+    order = np.lexsort((size, cell.ravel()))
+    counts = np.bincount(cell.ravel())
+    return order[np.cumsum(counts) - counts + (counts - 1) // 2]
+
+
+def _stages(table):
+    """Both stages, or the first alone where nothing was found that changes a residual."""
+    same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
+    return tuple(STAGES)[: 1 if same else 2]
+
+
+def _legend(stages, with_held_out):
+    drawn = [STAGES[stage] for stage in stages]
+    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=f"{name}, median") for name, color in drawn]
+    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="training reading"))
+    if with_held_out:
+        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out reading"))
+    return handles
+
+
+def _states(table):
+    """Mean place and residuals of each state and target."""
+    keys = np.column_stack([table[name] for name in ("held_out", "session", "pose", "load", "target")])
+    _, state = np.unique(keys, axis=0, return_inverse=True)
+    place = _means(state.ravel(), np.column_stack([table[axis] for axis in "xyz"]))
+    off = {stage: np.column_stack([table[f"{stage}_d{axis}"] for axis in "xyz"]) for stage in STAGES}
+    return place, {stage: _means(state.ravel(), values) for stage, values in off.items()}
+
+
+def _cell_side(extent):
+    # One digit: a cell that can be told to others.
+    side = extent.max() / _CELLS
+    digit = 10.0 ** np.floor(np.log10(side))
+    return float(np.ceil(side / digit) * digit)
+
+
+def _means(group, values):
+    counts = np.bincount(group)
+    return np.column_stack([np.bincount(group, column) / counts for column in values.T])
+
+
+def _scale_arrow(axis, largest, length):
+    """An arrow of a round length beside the title."""
+    digit = 10.0 ** np.floor(np.log10(largest))
+    shown = max(step for step in (1, 2, 5) if step * digit <= largest * (1 + 1e-9)) * digit
+    scale, unit = (MILLI, "mm") if shown > 0.9995e-3 else (MICRO, "µm")
+    key = axis.quiver([0], [0], [0], [0], angles="xy", scale_units="xy", scale=1, color="black", width=0.006, minlength=0)
+    place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
+    axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:.3g} {unit}", **place)
+    key.set_visible(False)
