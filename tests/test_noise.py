@@ -42,8 +42,8 @@ def test_sensor_alone_is_found_and_no_joints_are_made_up(fanuc, rows):
 
 
 def test_joints_are_made_up_seldom(fanuc):
-    made_up = sum(noise_from_repeats(*drawn(fanuc, seed, poses=8, repeats=3)).joint_rad.any() for seed in range(12))
-    assert made_up <= 2
+    made_up = sum(noise_from_repeats(*drawn(fanuc, seed, poses=8, repeats=3)).joint_rad.any() for seed in range(6))
+    assert made_up <= 1
 
 
 @pytest.mark.parametrize("rows", [3, 6])

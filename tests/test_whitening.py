@@ -64,7 +64,7 @@ def test_rows_of_one_and_of_many_columns_are_whitened_alike(case):
 
 def test_whitened_simulated_noise_is_independent_and_of_unit_variance(case):
     seen, jacobian = case
-    rng, draws = np.random.default_rng(4), 20000
+    rng, draws = np.random.default_rng(4), 8000
     total = np.zeros((len(seen), seen.rows, draws))
     sensor = np.array([NOISE.position_m] * 3 + [NOISE.orientation_rad] * 3)[: seen.rows]
     for repeat in range(4):

@@ -125,7 +125,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         seen = seen_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
-        steps = steps if len(steps) < 6 else rng.standard_normal((3, len(steps))) @ steps
+        steps = steps if len(steps) < 6 else rng.standard_normal((2, len(steps))) @ steps
         expected = slopes(model, estimate, seen, around, steps)
         found = linearize(model, estimate, seen, around).sensitivities @ steps.T
         scale = np.maximum(np.abs(expected).max(axis=(0, 1)), 1e-300)
