@@ -1,0 +1,192 @@
+"""Forward selection: what is planted is found, alone or in pairs, and nothing is found where nothing is missing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import HAND, planted
+from scipy.stats import binom
+from synthetic import NOISE
+
+from elastocal.fitting import fit
+from elastocal.screening import directions, score
+from elastocal.selection import FAMILY_WISE_LEVEL, parameter_slice, search, without
+
+REPLICATES = 199
+NULLS = 16
+
+
+def searched(campaign, seed=0, **options):
+    draws = np.random.default_rng((7, seed))
+    return search(campaign.declared, campaign.observations, campaign.all_candidates, REPLICATES, draws, **options)
+
+
+def keys(found):
+    return {candidate.key for candidate in found.effects}
+
+
+def share_of_plausible(robot, key, share):
+    """Parameters of a candidate at a share of their plausible size."""
+    candidate = planted(robot, {}, poses=8).candidates[key]
+    return np.array([share * parameter.plausible for parameter in candidate.parameters])
+
+
+# One of each family that has a name of its own in small data.
+ONE_OF_EACH_FAMILY = {
+    "geometry": "joint_offset@3",
+    "gravity": "link_weight@2",
+    "transmission": "transmission_harmonic@3[orders 1-2]",
+    "elastic": "cross_compliance@2+3",
+    "gearbox": "hysteresis@2",
+    "drift": "frame_drift",
+}
+
+
+@pytest.mark.parametrize("family", ONE_OF_EACH_FAMILY)
+def test_planted_effect_is_found_and_nothing_else(family, fanuc):
+    key = ONE_OF_EACH_FAMILY[family]
+    size = share_of_plausible(fanuc, key, 0.6)
+    campaign = planted(fanuc, {key: size}, seed=1)
+    found = searched(campaign)
+    assert campaign.candidates[key].family == family
+    assert keys(found) == {key}
+    assert found.looks[0].scores.p_family[found.looks[0].chosen] < FAMILY_WISE_LEVEL
+    # The fit has it too, with the parameters that were planted.
+    mine = parameter_slice(found.final, key)
+    deviation = np.sqrt(np.diag(found.final.covariance))[mine]
+    off = np.abs(found.final.estimate.coefficients[-1] - size) / deviation
+    assert (off < 4).all(), off
+    assert not found.final.held[mine].any()
+    assert found.final.discrepancy_m <= found.declared.discrepancy_m
+    assert (found.final.whitened(found.final.residual) ** 2).mean() < 1.3
+
+
+@pytest.mark.parametrize("pair", [("joint_offset@3", "hysteresis@2"), ("link_weight@2", "frame_drift")])
+def test_two_planted_effects_are_both_found(pair, fanuc):
+    campaign = planted(fanuc, {key: share_of_plausible(fanuc, key, 0.6) for key in pair}, seed=2)
+    found = searched(campaign)
+    assert keys(found) == set(pair)
+    # Whatever else was taken on the way is not in the final fit.
+    assert {effect.key for effect in found.final.model.effects[1:]} == set(pair)
+
+
+@pytest.fixture(scope="module")
+def nothing_missing():
+    from conftest import load_robot
+
+    campaigns = [planted(load_robot("fanuc"), {}, seed=100 + number) for number in range(NULLS)]
+    return [(campaign, searched(campaign, number)) for number, campaign in enumerate(campaigns)]
+
+
+def test_nothing_is_found_where_nothing_is_missing(nothing_missing):
+    alarms = sum(bool(found.effects) for _, found in nothing_missing)
+    assert alarms <= binom.ppf(0.99, NULLS, FAMILY_WISE_LEVEL)
+
+
+def test_a_search_without_a_find_leaves_the_declared_fit(nothing_missing):
+    for _, found in nothing_missing:
+        if not found.effects:
+            assert found.final is found.declared
+            assert len(found.looks) == 1 and found.looks[0].chosen is None
+
+
+def test_force_scale_is_tested_only_where_compliances_are_nominal(fanuc, nothing_missing):
+    """Identified compliances make whatever a wrong scale of the force makes."""
+    seen = nothing_missing[0][1].looks[0].directions
+    assert "force_scale" not in {candidate.key for candidate, _ in seen.candidates}
+    assert "already" in seen.untestable["force_scale"]
+    campaign = planted(fanuc, {"force_scale": [0.05]}, seed=3, identified=False)
+    seen = directions(campaign.declared, campaign.observations, campaign.all_candidates)
+    tested = [candidate.key for candidate, _ in seen.candidates]
+    assert "force_scale" in tested and "force_scale" not in seen.untestable
+    scores = score(seen, REPLICATES, np.random.default_rng(0))
+    assert scores.p_family[tested.index("force_scale")] < FAMILY_WISE_LEVEL
+
+
+def test_offset_of_a_joint_that_a_fitted_frame_makes_is_not_tested(fanuc):
+    """Joint 1 turns the whole robot about an axis of the base."""
+    fitted = planted(fanuc, {}, seed=4, fitted_frames=True)
+    known = planted(fanuc, {}, seed=4)
+    names = {}
+    for which, campaign in (("fitted", fitted), ("known", known)):
+        seen = directions(campaign.declared, campaign.observations, campaign.all_candidates)
+        names[which] = {candidate.key for candidate, _ in seen.candidates}, seen.untestable
+    assert "joint_offset@1" in names["known"][0]
+    assert "joint_offset@1" not in names["fitted"][0]
+    assert "already" in names["fitted"][1]["joint_offset@1"]
+
+
+def test_candidates_without_their_covariates_are_not_tested(fanuc):
+    campaign = planted(fanuc, {}, seed=5)
+    bare = replace(
+        campaign.observations,
+        states=replace(campaign.observations.states, approach=None, time_s=None, temperature_c=None),
+    )
+    fitted = fit(campaign.declared.model, bare, NOISE, campaign.declared.estimate)
+    seen = directions(fitted, bare, campaign.all_candidates)
+    assert not {"hysteresis", "frame_drift", "thermal_growth"} & {candidate.effect for candidate, _ in seen.candidates}
+    for key, lacking in (("hysteresis@1", "approach"), ("frame_drift", "time"), ("thermal_growth[temperature]", "temperature")):
+        assert lacking in seen.untestable[key], seen.untestable[key]
+
+
+def test_nothing_to_test_finds_nothing(fanuc):
+    campaign = planted(fanuc, {"joint_offset@3": [1e-3]}, seed=6, poses=8)
+    found = search(campaign.declared, campaign.observations, [], REPLICATES, np.random.default_rng(0))
+    assert found.effects == () and found.final is campaign.declared
+    assert len(found.looks) == 1 and len(found.looks[0].scores.p_value) == 0
+
+
+def test_the_same_stream_gives_the_same_search_and_each_look_is_told(fanuc):
+    campaign = planted(fanuc, {"joint_offset@3": [3e-4]}, seed=7)
+    said = []
+    one, other = searched(campaign, 1, progress=said.append), searched(campaign, 1)
+    assert keys(one) == keys(other) == {"joint_offset@3"}
+    np.testing.assert_array_equal(one.looks[0].scores.p_family, other.looks[0].scores.p_family)
+    np.testing.assert_array_equal(one.final.estimate.coefficients[-1], other.final.estimate.coefficients[-1])
+    assert len(said) == len(one.looks)
+    assert "joint_offset@3" in said[0] and said[-1].endswith("none stands out")
+
+
+def test_effects_come_with_the_strongest_first(fanuc):
+    sizes = {"hysteresis@2": share_of_plausible(fanuc, "hysteresis@2", 0.3), "frame_drift": [2e-3, 0, 0, 0, 0, 0]}
+    campaign = planted(fanuc, sizes, seed=8)
+    found = searched(campaign)
+    statistics = []
+    for effect in found.effects:
+        mine = parameter_slice(found.final, effect.key)
+        values = found.final.estimate.coefficients[[e.key for e in found.final.model.effects].index(effect.key)]
+        covariance = found.final.covariance[np.ix_(mine, mine)]
+        statistics.append(values @ np.linalg.solve(covariance, values))
+    assert len(statistics) == 2
+    assert statistics == sorted(statistics, reverse=True)
+
+
+def test_a_fit_without_its_effects_is_the_fit_that_never_had_them(fanuc):
+    """At the noise of the one that has: the discrepancy is taken over."""
+    campaign = planted(fanuc, {"joint_offset@3": [5e-4]}, seed=9, targets=HAND)
+    offset, tilt = campaign.candidates["joint_offset@3"], campaign.candidates["joint_tilt@2"]
+    model, start = campaign.declared.model, campaign.declared.estimate
+    both = fit(model.with_effects([offset, tilt]), campaign.observations, NOISE, start.with_effects([offset, tilt]))
+    bare = without(both, {"joint_offset@3", "joint_tilt@2"}, campaign.observations)
+    again = fit(model, campaign.observations, NOISE, start, both.discrepancy_m)
+    assert [effect.key for effect in bare.model.effects] == [effect.key for effect in model.effects]
+    assert bare.discrepancy_m == both.discrepancy_m
+    np.testing.assert_allclose(bare.estimate.coefficients[0], again.estimate.coefficients[0], rtol=1e-4)
+    one = without(both, {"joint_tilt@2"}, campaign.observations)
+    assert [effect.key for effect in one.model.effects][1:] == ["joint_offset@3"]
+
+
+def test_parameters_of_an_effect_stand_where_the_fit_lists_them(fanuc):
+    campaign = planted(fanuc, {}, seed=10, poses=8, fitted_frames=True)
+    drift = campaign.candidates["frame_drift"]
+    fitted = fit(
+        campaign.declared.model.with_effects([drift]),
+        campaign.observations,
+        NOISE,
+        campaign.declared.estimate.with_effects([drift]),
+    )
+    springs, mine = parameter_slice(fitted, "joint_compliance"), parameter_slice(fitted, "frame_drift")
+    assert springs.tolist() == list(range(6, 12))
+    assert mine.tolist() == list(range(12, 12 + len(drift.parameters)))
+    assert [fitted.parameters[index][1].name for index in mine] == [parameter.name for parameter in drift.parameters]
+    assert len(parameter_slice(fitted, "not there")) == 0
