@@ -239,9 +239,6 @@ def test_no_discrepancy_where_the_noise_explains_the_residual(fanuc):
     assert fit(model, with_noise(seen, np.random.default_rng(32), position_m=54e-6), NOISE).discrepancy_m == 0.0
 
 
-@pytest.mark.xfail(
-    reason="brentq finds no change of sign: its upper end looks at positions alone", raises=ValueError, strict=True
-)
 def test_orientations_far_above_their_noise_are_taken_as_a_discrepancy_too(fanuc):
     model = model_of(fanuc, rows=6, targets=(Target("A", "6DoF", (0.0, 0.0, 0.0)),), fitted_frames=False)
     seen = seen_exactly(model, made_estimate(model, seed=33), made_states(6, 40, seed=34))

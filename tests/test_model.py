@@ -1,6 +1,7 @@
 """The composite model: predictions by hand-made chains, sensitivities by central differences of its own exact residuals."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -193,13 +194,16 @@ def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
 @pytest.mark.parametrize(("frame", "fitted"), [("tracker", True), ("base", False)])
 @pytest.mark.parametrize("compliance", ["nominal", "identify"])
 def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fitted, compliance):
-    campaign = Campaign("c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, None)
+    campaign = Campaign(
+        "c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, SimpleNamespace(time_s=np.array([7.0, 5.0]))
+    )
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
     model = declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TARGETS)
     assert model.identifies_compliance == (compliance == "identify")
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
     np.testing.assert_array_equal(model.nominal_compliance, fanuc.compliance)
+    assert model.time_zero_s == 5.0
 
 
 def test_coordinate_jacobian_is_that_of_each_target(case):

@@ -238,4 +238,7 @@ def _discrepancy(found, observations):
 
     if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
         return 0.0
-    return brentq(excess, 0.0, 10 * np.sqrt((weighted[:, :3] ** 2).mean()) + found.noise.position_m, rtol=1e-3)
+    highest = found.noise.position_m
+    while excess(highest) > 0:
+        highest *= 2
+    return brentq(excess, 0.0, highest, rtol=1e-3)

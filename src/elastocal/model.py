@@ -40,6 +40,8 @@ class Model:
         rad/(N m).
     effects : tuple of Candidate
         Joint compliances, where they are identified, among them.
+    time_zero_s : float
+        From which effects count the time: the first reading to be fitted.
     """
 
     sites: Sites
@@ -48,6 +50,7 @@ class Model:
     rows: int
     nominal_compliance: np.ndarray
     effects: tuple = ()
+    time_zero_s: float = 0.0
 
     @property
     def identifies_compliance(self):
@@ -134,6 +137,7 @@ def declared_model(campaign, effects=()):
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
         (*springs, *effects),
+        0.0 if campaign.readings.time_s is None else float(campaign.readings.time_s.min()),
     )
 
 
@@ -151,7 +155,7 @@ def circumstances(model, estimate, states):
     -------
     Circumstances
     """
-    return circumstances_of(model.sites, joint_compliances(model, estimate), states)
+    return circumstances_of(model.sites, joint_compliances(model, estimate), states, model.time_zero_s)
 
 
 def joint_compliances(model, estimate):

@@ -89,7 +89,8 @@ def noise_from_repeats(model, estimate, readings):
     if fitted.fun + joints > minimize(lambda logs: _negative_log_likelihood([*logs, *nothing], *data), both).fun:
         return sensor
     values = np.exp(fitted.x)
-    per_joint = max(total // (joints + 1), 1)
+    # Each approach draws a joint once, however many targets are read.
+    per_joint = max(min(total // (joints + 1), sum(len(part) for part in contrasts)), 1)
     inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
     return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
 
@@ -115,7 +116,8 @@ def taken_noise(campaign, model, estimate, readings):
     if declared is None:
         return repeats, []
     ratio = repeats.position_m / declared.position_m
-    low, high = np.sqrt(chi2.ppf([0.005, 0.995], repeats.degrees_of_freedom) / repeats.degrees_of_freedom)
+    of_positions = repeats.degrees_of_freedom * 3 // model.rows
+    low, high = np.sqrt(chi2.ppf([0.005, 0.995], of_positions) / of_positions)
     if low < ratio < high:
         return repeats, []
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]

@@ -1,4 +1,4 @@
-"""A tracker or a foot that wanders: a rigid motion of all readings, linear in time.
+"""A tracker or a foot that wanders: a rigid motion of all readings, linear in the time since the campaign began.
 
 Catalogue row 23.
 """
@@ -17,7 +17,7 @@ def candidates(sites):
     """One candidate, at the foot."""
 
     def displacement(circumstances):
-        hours = (circumstances.time_s - circumstances.time_s.min()) / _HOUR_S
+        hours = circumstances.time_s / _HOUR_S
         return [{coordinate: hours} for coordinate in sites.base]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}))]

@@ -123,7 +123,9 @@ class Circumstances:
         Of the last measuring point, with respect to the joints.
     end_rotation : ndarray (S, 3, 3)
     approach : ndarray (S, n) or None
-    time_s, temperature_c : ndarray (S,) or None
+    time_s : ndarray (S,) or None
+        Since the first reading to which the model was fitted.
+    temperature_c : ndarray (S,) or None
     """
 
     sites: Sites
@@ -143,7 +145,7 @@ class Circumstances:
         return generalized_forces(self.end_jacobian, wrench) * self.compliance
 
 
-def circumstances_of(sites, compliance, states):
+def circumstances_of(sites, compliance, states, time_zero_s=0.0):
     """What effects may depend on, in some states.
 
     Parameters
@@ -152,6 +154,8 @@ def circumstances_of(sites, compliance, states):
     compliance : ndarray (n,)
         rad/(N m).
     states : States
+    time_zero_s : float
+        From which effects count the time.
 
     Returns
     -------
@@ -175,7 +179,7 @@ def circumstances_of(sites, compliance, states):
         jacobian[..., :n],
         rotation,
         states.approach,
-        states.time_s,
+        None if states.time_s is None else states.time_s - time_zero_s,
         states.temperature_c,
     )
 

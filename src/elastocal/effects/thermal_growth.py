@@ -1,7 +1,7 @@
 """Links that grow as they warm up: alpha dT along each link.
 
-Catalogue row 18. With a measured temperature dT is its change from the first state; with the time alone it is the rise of a
-first order lag, 1 - exp(-t / t_0).
+Catalogue row 18. With a measured temperature dT is counted from 20 °C, at which dimensions are stated (ISO 1); with the time
+alone it is the rise of a first order lag since the campaign began, 1 - exp(-t / t_0).
 """
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 
 NAME, FAMILY = "thermal_growth", "drift"
+_REFERENCE_C = 20.0
 _LAG = Shape("lag", "s", 3600.0, 300.0, 36000.0)
 
 
@@ -25,10 +26,10 @@ def candidates(sites):
         }
 
     def by_temperature(circumstances):
-        return [grown(circumstances.temperature_c - circumstances.temperature_c[0])]
+        return [grown(circumstances.temperature_c - _REFERENCE_C)]
 
     def by_time(circumstances, lag):
-        return [grown(-np.expm1(-(circumstances.time_s - circumstances.time_s.min()) / lag))]
+        return [grown(-np.expm1(-circumstances.time_s / lag))]
 
     coefficient, growth = Parameter("expansion", "1/K", 3e-5), Parameter("final_growth", "m/m", 3e-4)
     return [

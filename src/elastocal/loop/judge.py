@@ -7,7 +7,7 @@ import numpy as np
 from elastocal.fitting import fit, fit_frames
 from elastocal.held_out import METRICS, grown, intervals, noise_floor, position_errors, summary
 from elastocal.loop.columns import residual_columns
-from elastocal.model import Model, circumstances, measured_in_base, residuals
+from elastocal.model import circumstances, measured_in_base, residuals
 from elastocal.observations import each_approach
 from elastocal.random_streams import stream
 
@@ -191,14 +191,7 @@ def _placed(fitted, case, part):
     """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
     if part is case or part.campaign.name == case.campaign.name:
         return fitted.model, fitted.estimate
-    model = Model(
-        part.model.sites,
-        part.model.targets,
-        part.model.fitted_frames,
-        part.model.rows,
-        fitted.model.nominal_compliance,
-        fitted.model.effects,
-    )
+    model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=fitted.model.effects)
     return model, fit_frames(fitted, model, part.observations, fitted.noise)
 
 
