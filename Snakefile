@@ -12,6 +12,7 @@ include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/loop.smk"
+include: "workflow/rules/loop_report.smk"
 
 
 rule all:

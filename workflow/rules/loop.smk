@@ -6,7 +6,16 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-LOOP_REPORTS = ["verdict.json", "before_after.csv", "candidates.parquet", "residuals.parquet", "next_experiment.csv"]
+LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confounding"]
+LOOP_REPORTS = [
+    "verdict.json",
+    "before_after.csv",
+    "candidates.parquet",
+    "residuals.parquet",
+    "next_experiment.csv",
+    *(f"figures/{figure}.pdf" for figure in LOOP_FIGURES),
+    "report.pdf",
+]
 
 
 def folder_of(campaign):

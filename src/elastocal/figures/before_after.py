@@ -5,6 +5,7 @@ import textwrap
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
 
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
@@ -44,6 +45,7 @@ def before_after(steps, noise_floor_m=None):
     rows = np.cumsum(heights) - heights / 2
     values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
     scale, unit = (MILLI, "mm") if values.max() > 3e-3 else (MICRO, "µm")
+    trained = np.array([[step[f"train_{metric}_m"] for metric in METRICS] for step in steps])
     known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
     logarithmic = max(known) > _LARGEST_RATIO * min(known)
     for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
@@ -57,7 +59,8 @@ def before_after(steps, noise_floor_m=None):
             axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
         axis.set(title=title, xlabel=f"error ({unit})")
         if logarithmic:
-            axis.set(xscale="log", xlim=(0.5 * scale * min(known), 1.6 * scale * values.max()))
+            axis.set(xscale="log", xlim=(0.5 * scale * min(known), 1.6 * scale * max(values.max(), trained.max())))
+            axis.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         else:
             axis.set_xlim(0, None)
         axis.grid(visible=False, axis="y")

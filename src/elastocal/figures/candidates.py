@@ -52,9 +52,9 @@ def scree(table):
     right.scatter(strength[order], ranks, s=14, c=_colours(table, order), zorder=3, linewidths=0)
     chosen = table["chosen"][order].astype(bool)
     right.scatter(strength[order][chosen], ranks[chosen], s=46, facecolors="none", edgecolors="black", linewidths=1.2, zorder=4)
-    right.set(ylabel="rank", title=f"all {len(order)} that these data can test")
+    right.set(ylabel="rank", title=f"all {len(order)} tested")
     right.set_ylim(len(order) + 1, 0)
-    right.yaxis.set_major_locator(MaxNLocator(integer=True))
+    right.yaxis.set_major_locator(MaxNLocator(8, integer=True, steps=[1, 2, 5, 10]))
     farthest = max(strength[order].max(initial=0.0), mark or 0.0, 2.0)
     for axis in (left, right):
         axis.set_xscale("function", functions=(lambda x: np.sqrt(np.clip(x, 0, None)), np.square))
@@ -184,7 +184,7 @@ def _ticks(farthest):
     steps = [0, 2, 5, 10, 20, 50, 100, 200, 300]
     shown = [step for step in steps if step <= 1.06 * farthest]
     # Near zero a square root spreads them, far out those near zero would lie on one another.
-    return [step for step in shown if step == 0 or np.sqrt(step) > 0.09 * np.sqrt(farthest)]
+    return [step for step in shown if step == 0 or np.sqrt(step) > 0.14 * np.sqrt(farthest)]
 
 
 def _families_legend(figure, table, order, mark):

@@ -19,7 +19,7 @@ _FEWEST_IN_BIN = 4
 _MOST_ARROWS = 320
 _CELLS = 18
 # Length of the arrow of a large residual, as a share of the workspace.
-_ARROW = 0.16
+_ARROW = 0.13
 
 
 @styled
@@ -60,7 +60,7 @@ def residuals(table):
         axis.set_ylabel(f"residual ({unit})")
     note = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
     handles = _legend(stages, held_out.any())
-    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=4, title_fontsize=7.5)
+    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
 
@@ -101,6 +101,7 @@ def arrows(table):
         axis.set_title(title, loc="left")
         axis.set(xlabel="x (m)", ylabel=f"{'xyz'[seen[1]]} (m)", aspect="equal")
         axis.margins(0.06)
+        axis.set_anchor("N")
         axis.set_axisbelow(True)
     _scale_arrow(axes[0, 1], largest, length)
     note = (
@@ -246,7 +247,7 @@ def _stages(table):
 
 def _legend(stages, with_held_out):
     drawn = [STAGES[stage] for stage in stages]
-    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=f"{name}, median") for name, color in drawn]
+    handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
     handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="training reading"))
     if with_held_out:
         handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out reading"))

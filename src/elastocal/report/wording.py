@@ -1,0 +1,133 @@
+"""Numbers, units and names of the loop as people write them."""
+
+import re
+
+import numpy as np
+
+MICRO, MILLI = 1e6, 1e3
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_KEY = re.compile(r"^(?P<effect>[^@\[]+)(?:@(?P<joints>[\d+]+))?(?:\[(?P<detail>.*)\])?$")
+# Effects whose numbers count links, which begin at the joint of the same number.
+_OF_LINKS = ("link_elasticity", "link_geometry")
+
+
+def words(name):
+    """A name of the catalogue or of a parameter as words."""
+    return name.replace("_", " ")
+
+
+def listed(items, most=None, rest="more"):
+    """Items in a sentence, at most so many of them."""
+    items = list(items)
+    if most is not None and len(items) > most:
+        items = [*items[:most], f"{len(items) - most} {rest}"]
+    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + " and " + items[-1] if items else "none"
+
+
+def counted(number, one, many=None):
+    """A number with its noun, with thin spaces in large numbers."""
+    return f"{grouped(number)} {one if number == 1 else many or one + 's'}"
+
+
+def grouped(number):
+    """A whole number with a thin space between thousands."""
+    return f"{number:,}".replace(",", "\u2009")
+
+
+def at_joints(effect, joints):
+    """Where an effect acts: " in joint 3", or nothing where it is no joint's."""
+    if not joints:
+        return ""
+    kind = "link" if effect in _OF_LINKS else "joint"
+    return f" in {kind}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
+
+
+def candidate_words(key):
+    """The key of a candidate as words: effect, joints, variant."""
+    found = _KEY.match(key)
+    if not found:
+        return words(key)
+    joints = found["joints"].split("+") if found["joints"] else []
+    detail = f", {found['detail']}" if found["detail"] else ""
+    return words(found["effect"]) + at_joints(found["effect"], joints) + detail
+
+
+def step_words(step):
+    """The name of a row of before_after.csv as words."""
+    if not step.startswith("control: "):
+        return words(step)
+    return "control: " + listed([candidate_words(key) for key in step.removeprefix("control: ").split(", ")], 3)
+
+
+def length(metres, digits=3):
+    """A length with its unit, µm below one millimetre; "unknown" where there is none."""
+    if metres is None:
+        return "unknown"
+    return f"{plain(MICRO * metres, digits)} µm" if abs(metres) < 0.9995e-3 else f"{plain(MILLI * metres, digits)} mm"
+
+
+def plain(value, digits=3):
+    """A number with so many significant digits and without an exponent."""
+    if value == 0:
+        return "0"
+    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{decimals}f}"
+
+
+def percent(share):
+    """A share in percent."""
+    return f"{100 * share:.0f} %"
+
+
+def p_words(p_value):
+    """A p-value with its relation."""
+    if p_value is None:
+        return "p unknown"
+    return f"p = {plain(p_value, 2)}" if p_value >= 1e-4 else "p < 0.0001"
+
+
+def scaled(value, error, unit):
+    """A value with its standard error in a unit that suits it.
+
+    Parameters
+    ----------
+    value : float
+    error : float or None
+        Two of its digits are given; none where it is not known or zero.
+    unit : str
+        As in the tables: rad/(N m), 1 for none.
+
+    Returns
+    -------
+    number, unit : str
+    """
+    factor, shown = _unit(value, unit)
+    number, error = factor * value, factor * error if error else 0.0
+    if not np.isfinite(error) or error <= 0:
+        error = 0.0
+    size = max(abs(number), error)
+    # What no prefix makes handy gets a power of ten.
+    power = 0 if size == 0 or 1e-3 <= size < 1e5 else int(np.floor(np.log10(size)))
+    number, error = number / 10.0**power, error / 10.0**power
+    if error:
+        decimals = max(0, 1 - int(np.floor(np.log10(error))))
+        text = f"{number:.{decimals}f} ± {error:.{decimals}f}"
+    else:
+        text = plain(number, 4)
+    if power:
+        text = f"({text})" if error else text
+        text += " · 10" + str(power).translate(_SUPERSCRIPTS)
+    return text.replace("-", "−"), shown
+
+
+def _unit(value, unit):
+    shown = {"1": "", "–": ""}.get(unit, unit)
+    factor = 1.0
+    if re.match(r"rad\b(?!/rad)", unit) and abs(value) < 1e-2:
+        factor, shown = MICRO, "µ" + shown
+    elif re.match(r"m\b(?!/m)", unit):
+        factor, prefix = (MICRO, "µ") if abs(value) < 1e-3 else (MILLI, "m") if abs(value) < 1 else (1.0, "")
+        shown = prefix + shown
+    for power, sign in (("^2", "²"), ("^3", "³")):
+        shown = shown.replace(power, sign)
+    return factor, re.sub(r"(?<=\w|²|³) (?=\w)", "·", shown)

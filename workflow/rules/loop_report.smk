@@ -1,0 +1,108 @@
+"""What the loop shows of a campaign: figures of its residuals, candidates and errors, and the report for whoever asked for it.
+
+Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Writes reports/loop/{campaign}/figures/*.pdf and *.png, and
+reports/loop/{campaign}/report.pdf.
+"""
+
+
+rule draw_residuals:
+    input:
+        descriptions=rules.read_campaign.output.descriptions,
+        residuals=rules.judge_held_out.output.residuals,
+        sources=sources("draw_residuals.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/residuals.pdf",
+        png="reports/loop/{campaign}/figures/residuals.png",
+    log:
+        "results/logs/draw_residuals/{campaign}.log",
+    benchmark:
+        "results/timings/draw_residuals/{campaign}.tsv"
+    script:
+        "../scripts/draw_residuals.py"
+
+
+rule draw_arrows:
+    input:
+        descriptions=rules.read_campaign.output.descriptions,
+        residuals=rules.judge_held_out.output.residuals,
+        sources=sources("draw_arrows.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/arrows.pdf",
+        png="reports/loop/{campaign}/figures/arrows.png",
+    log:
+        "results/logs/draw_arrows/{campaign}.log",
+    benchmark:
+        "results/timings/draw_arrows/{campaign}.tsv"
+    script:
+        "../scripts/draw_arrows.py"
+
+
+rule draw_candidates:
+    input:
+        candidates=rules.state_verdict.output.candidates,
+        sources=sources("draw_candidates.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/candidates.pdf",
+        png="reports/loop/{campaign}/figures/candidates.png",
+    log:
+        "results/logs/draw_candidates/{campaign}.log",
+    benchmark:
+        "results/timings/draw_candidates/{campaign}.tsv"
+    script:
+        "../scripts/draw_candidates.py"
+
+
+rule draw_confounding:
+    input:
+        candidates=rules.state_verdict.output.candidates,
+        confounding=rules.trace_effects.output.confounding,
+        sources=sources("draw_confounding.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/confounding.pdf",
+        png="reports/loop/{campaign}/figures/confounding.png",
+    log:
+        "results/logs/draw_confounding/{campaign}.log",
+    benchmark:
+        "results/timings/draw_confounding/{campaign}.tsv"
+    script:
+        "../scripts/draw_confounding.py"
+
+
+rule draw_before_after:
+    input:
+        before_after=rules.judge_held_out.output.before_after,
+        errors=rules.judge_held_out.output.errors,
+        sources=sources("draw_before_after.py"),
+    output:
+        pdf="reports/loop/{campaign}/figures/before_after.pdf",
+        png="reports/loop/{campaign}/figures/before_after.png",
+    log:
+        "results/logs/draw_before_after/{campaign}.log",
+    benchmark:
+        "results/timings/draw_before_after/{campaign}.tsv"
+    script:
+        "../scripts/draw_before_after.py"
+
+
+rule compile_loop_report:
+    input:
+        verdict=rules.state_verdict.output.verdict,
+        candidates=rules.state_verdict.output.candidates,
+        before_after=rules.judge_held_out.output.before_after,
+        residuals=rules.judge_held_out.output.residuals,
+        experiment=rules.weigh_rivals.output.experiment,
+        parameters=rules.trace_effects.output.parameters,
+        descriptions=rules.read_campaign.output.descriptions,
+        figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
+        pages="src/elastocal/report/loop.typ",
+        sources=sources("compile_loop_report.py"),
+    output:
+        report="reports/loop/{campaign}/report.pdf",
+    log:
+        "results/logs/compile_loop_report/{campaign}.log",
+    benchmark:
+        "results/timings/compile_loop_report/{campaign}.tsv"
+    params:
+        replicates=config["loop"]["replicates"],
+    script:
+        "../scripts/compile_loop_report.py"

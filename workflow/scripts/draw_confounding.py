@@ -1,0 +1,16 @@
+"""Angles between what the leading candidates of a search make."""
+
+from elastocal.figures.candidates import confounding
+from elastocal.figures.style import save
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
+from elastocal.storage import read_table
+
+from job import run
+
+
+def draw_confounding(job):
+    figure = confounding(read_table(job.input.candidates, CANDIDATES), read_table(job.input.confounding, CONFOUNDING))
+    save(figure, job.output.pdf, job.output.png)
+
+
+run(draw_confounding, snakemake)
