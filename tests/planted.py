@@ -83,4 +83,5 @@ def planted(robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None,
         true.coefficients[len(start.coefficients) + number][:] = size
     seen = seen_exactly(declared.with_effects(added), true, states)
     seen = with_noise(seen, np.random.default_rng((6, seed)))
-    return Planted(fit(declared, seen, NOISE, start), seen, candidates)
+    noise = replace(NOISE, joint_rad=np.zeros(declared.sites.joints))
+    return Planted(fit(declared, seen, noise, start), seen, candidates)
