@@ -36,7 +36,7 @@ FAULTS = {
     ),
     "unknown robot": (
         lambda study: study.configure({"robots": ["kuka", "abb"]}),
-        ["config.yaml: robots", "'abb'", "allowed: a file of config/robots: fanuc, kuka, kuka_extended"],
+        ["config.yaml: robots", "'abb'", "allowed: a file of config/robots: fanuc, ", "kuka, kuka_extended"],
     ),
     "negative noise level": (
         lambda study: study.configure({"noise_um": [200, -50]}),
