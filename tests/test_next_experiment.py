@@ -150,7 +150,8 @@ def test_the_same_stream_proposes_the_same(kuka):
 
 
 # A planar arm under loads in its plane, read as poses of its hand: bending of the upper arm makes what the compliances of both
-# joints and of one joint for the torque of the other make together. The elbow turns with the upper arm, not with the second joint.
+# joints and of one joint for the torque of the other make together. The elbow turns with the arm alone, not with the second
+# joint.
 PLANAR = "Ry(q1) Tx(1) [elbow] Ry(q2) Tx(0.8) [hand]"
 LIMITS = np.array([[-1.2, 1.2], [-1.2, 1.2]])
 UPPER_ARM, BOTH_JOINTS = "link_elasticity@1", "cross_compliance@1+2"

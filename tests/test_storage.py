@@ -286,3 +286,72 @@ def test_a_file_without_provenance_is_refused(tmp_path):
     pq.write_table(pa.table({"number": [1, 2]}), path)
     with refused(path, "elastocal.provenance"):
         read_provenance(path)
+
+
+TEXTS = TableSchema(
+    "texts",
+    (
+        Column("owner", "text", "", "one of its own for each row"),
+        Column("value", "float64", "m", "any", missing=True),
+        Column("held", "bool", "", "whether it is held"),
+        Column("kind", "string", "", "one for each row group"),
+    ),
+)
+ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "joint_offset@3", "", "x" * 300, "transmission_harmonic@1[orders 3-6]"]
+
+
+def text_block(texts, kind="k"):
+    return {"owner": texts, "value": np.arange(len(texts)) / 3, "held": np.arange(len(texts)) % 2 == 1, "kind": kind}
+
+
+def test_text_columns_come_back_row_by_row(tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    write_table(path, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
+    back = read_table(path, TEXTS)
+    assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["owner"].dtype == object
+    assert back["kind"].tolist() == ["k"] * 7 + ["l"] * 3
+    assert read_table(path, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
+    assert pq.ParquetFile(path).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
+
+
+def test_edited_texts_are_refused(tmp_path):
+    """Also where the same texts stand in another order: a row is what it says of itself."""
+    path = str(tmp_path / "texts.parquet")
+    for texts in (["b", "a"], ["a", "c"], ["a", ""]):
+        write_table(path, TEXTS, [text_block(["a", "b"])], ORIGIN)
+        rewritten(path, lambda table, texts=texts: replaced(table, "owner", texts))
+        with refused(path, "column owner, row group 0", "edited"):
+            read_table(path, TEXTS)
+
+
+@pytest.mark.parametrize("blocks", ["no block", "a block without rows", "only some blocks without rows"])
+def test_tables_without_rows_come_back(blocks, tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    none, some = text_block([]), text_block(["a"])
+    written = {"no block": [], "a block without rows": [none], "only some blocks without rows": [none, some, none]}[blocks]
+    write_table(path, TEXTS, written, ORIGIN)
+    back = read_table(path, TEXTS)
+    rows = 1 if "some" in blocks else 0
+    assert {name: (len(values), values.dtype) for name, values in back.items()} == {
+        "owner": (rows, np.dtype(object)),
+        "value": (rows, np.dtype("float64")),
+        "held": (rows, np.dtype(bool)),
+        "kind": (rows, np.dtype(object)),
+    }
+    assert list(read_table(path, TEXTS, ["value"])) == ["value"]
+    assert read_provenance(path) == ORIGIN
+    assert len(list(read_blocks(path, TEXTS))) == rows
+    with refused(path, "metadata elastocal.table", "texts", "things"):
+        read_table(path, SCHEMA)
+
+
+def test_a_value_that_an_empty_table_cannot_have_is_refused(tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    write_table(path, TEXTS, [], ORIGIN)
+    with refused(path, "kind", "'k'"):
+        read_table(path, TEXTS, kind="k")
+
+
+def test_texts_of_another_length_are_refused(tmp_path):
+    with refused("t.parquet", "rows", "one length"):
+        write_table("t.parquet", TEXTS, [text_block(["a", "b"]) | {"owner": ["a"]}], ORIGIN)
