@@ -13,7 +13,7 @@ FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox"
 FAMILY_WISE_LEVEL = 0.05
 # The smallest p-value that a double holds: what is drawn there is at least so far out.
 _FARTHEST = 308.0
-_NAMED = 22
+_NAMED = 18
 _LEADING = 20
 
 
@@ -36,7 +36,7 @@ def scree(table):
     strength = strengths(table)
     mark = family_wise_mark(strength[tested], table["p_family"][tested])
     named = order[:_NAMED]
-    figure, axes = panels(1, 2, max(70, 36 + 4.3 * len(named)), width_ratios=(1.25, 1))
+    figure, axes = panels(1, 2, max(70, 34 + 4.1 * len(named)), width_ratios=(1.25, 1))
     left, right = axes[0]
     rows = np.arange(len(named))
     left.barh(rows, strength[named], color=_colours(table, named), height=0.62, zorder=2)
@@ -56,9 +56,9 @@ def scree(table):
     right.set_ylim(len(order) + 1, 0)
     right.yaxis.set_major_locator(MaxNLocator(8, integer=True, steps=[1, 2, 5, 10]))
     farthest = max(strength[order].max(initial=0.0), mark or 0.0, 2.0)
-    for axis in (left, right):
+    for axis, apart in ((left, 0.13), (right, 0.2)):
         axis.set_xscale("function", functions=(lambda x: np.sqrt(np.clip(x, 0, None)), np.square))
-        axis.set(xlim=(0, 1.06 * farthest), xticks=_ticks(farthest), xlabel=r"$-\log_{10}$ p of the candidate alone")
+        axis.set(xlim=(0, 1.06 * farthest), xticks=_ticks(farthest, apart), xlabel=r"$-\log_{10}$ p of the candidate alone")
         if mark is not None:
             axis.axvline(mark, color="black", linestyle="--", linewidth=1, zorder=5, gid="family-wise")
     _families_legend(figure, table, order, mark)
@@ -86,7 +86,7 @@ def confounding(table, pairs):
     chosen = set(table["candidate"][table["chosen"].astype(bool)])
     angles = angle_matrix(names, pairs)
     count = len(names)
-    figure, axes = panels(1, 1, 20 + 4.5 * max(count, 6))
+    figure, axes = panels(1, 1, 18 + 4.2 * max(count, 6))
     axis = axes[0, 0]
     # Never black, so that the numbers can be read everywhere.
     colours = LinearSegmentedColormap.from_list("angles", ["#08306b", "#4292c6", "#c6dbef", "#ffffff"])
@@ -180,11 +180,15 @@ def _colours(table, indices):
     return [FAMILIES.get(table["family"][index], PALETTE[-1]) for index in indices]
 
 
-def _ticks(farthest):
+def _ticks(farthest, apart):
     steps = [0, 2, 5, 10, 20, 50, 100, 200, 300]
     shown = [step for step in steps if step <= 1.06 * farthest]
-    # Near zero a square root spreads them, far out those near zero would lie on one another.
-    return [step for step in shown if step == 0 or np.sqrt(step) > 0.14 * np.sqrt(farthest)]
+    kept = []
+    for step in shown:
+        # So far apart that their numbers do not touch, on an axis of square roots.
+        if not kept or np.sqrt(step) - np.sqrt(kept[-1]) > apart * np.sqrt(farthest):
+            kept.append(step)
+    return kept
 
 
 def _families_legend(figure, table, order, mark):

@@ -85,7 +85,7 @@ def arrows(table):
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
     cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
     views = {"from the side": (0, 2), "from above": (0, 1)}
-    figure, axes = panels(1, 2, 34 + float(np.clip(68 * extent[1:].max() / extent[0], 45, 130)))
+    figure, axes = panels(1, 2, 32 + float(np.clip(66 * extent[1:].max() / extent[0], 45, 100)))
     length = _ARROW * extent.max()
     for axis, (title, seen) in zip(axes[0], views.items(), strict=True):
         shown = np.arange(len(place)) if cell_m is None else middle_of_cells(place[:, seen], size, cell_m)
@@ -201,7 +201,7 @@ def share_explained(bins, values):
 def _cloud(axis, values, residual, held_out, color, bins):
     """Points of one stage, those held out as crosses, with the running median and the middle half of all."""
     as_pixels = len(values) > _MOST_VECTORS
-    alpha = float(np.clip(150 / len(values), 0.04, 0.35))
+    alpha = float(np.clip(400 / len(values), 0.05, 0.45))
     common = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
     axis.scatter(values[~held_out], residual[~held_out], s=4, marker="o", edgecolors="none", **{**common, "linewidths": 0})
     axis.scatter(values[held_out], residual[held_out], s=9, marker="x", **{**common, "alpha": min(1.5 * alpha, 1.0)})

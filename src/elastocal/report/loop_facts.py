@@ -16,6 +16,7 @@ from elastocal.report.wording import (
     grouped,
     length,
     listed,
+    members_words,
     p_words,
     percent,
     plain,
@@ -26,12 +27,12 @@ from elastocal.report.wording import (
 
 METRICS = ("mean", "rms", "p95", "max")
 TITLES = {
-    "adequate": "adequate: nothing is missing",
-    "named": "named: one effect is missing",
-    "class": "class: one effect of a few is missing",
+    "adequate": "adequate, nothing is missing that these data could show",
+    "named": "named, one effect is missing",
+    "class": "class, one of a few effects is missing",
     "several": "several effects are missing",
-    "unexplained": "unexplained: something is missing that the catalogue does not have",
-    "not_testable": "not testable: these data can show nothing",
+    "unexplained": "unexplained, more is missing than the catalogue accounts for",
+    "not_testable": "not testable, these data can show nothing",
 }
 NOISE_SOURCES = {
     "repeats": "from the differences between repeats of the same state",
@@ -74,7 +75,7 @@ def loop_facts(verdict, steps, experiment, table, candidates, descriptions, para
         "warnings": verdict["warnings"],
         "held_out_sentence": _held_out_sentence(verdict, steps),
         "measured": measured(table, descriptions),
-        "noise": noise_rows(verdict["noise"]),
+        "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
         "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],
         "floor": length(verdict["heldout"]["noise_floor_rms_m"]),
         "steps": step_rows(steps, verdict["heldout"]["noise_floor_rms_m"]),
@@ -182,10 +183,10 @@ def measured(table, descriptions):
     return [[name, *(part[name] for part in parts)] for name in parts[0]]
 
 
-def noise_rows(noise):
+def noise_rows(noise, with_orientation):
     """Rows of the noise: name, value with unit."""
     rows = [["sensor, each component of a position", length(noise["position_m"])]]
-    if noise["orientation_rad"] is not None:
+    if with_orientation:
         rows.append(["sensor, each component of an orientation", f"{plain(MICRO * noise['orientation_rad'])} µrad"])
     if any(noise["joint_rad"]):
         rows += [
@@ -231,11 +232,11 @@ def effect_facts(effect):
     held = len(effect["parameters"]) - len(known)
     gain = effect["heldout_gain"]
     return {
-        "name": words(effect["name"]) + at_joints(effect["name"], effect["joints"]),
+        "name": _capital(words(effect["name"])) + at_joints(effect["name"], effect["joints"]),
         "family": effect["family"],
         "description": _sentence(effect.get("detail") or description(effect["name"])),
-        "members": listed(map(candidate_words, members), 2 * _MOST_NAMES) if len(members) > 1 else "",
-        "parameters": [_parameter_row(entry, len(members) > 1) for entry in shown],
+        "members": members_words(members) if len(members) > 1 else "",
+        "parameters": [_parameter_row(entry, members) for entry in shown],
         "rest": rest,
         "held": f"{counted(held, 'parameter')} of it cannot be told with these data." if held else "",
         "p": "" if effect["p_value"] is None else p_words(effect["p_value"]),
@@ -269,7 +270,7 @@ def experiment_facts(rows):
     shown, gains = [], []
     for row in rows:
         cells = [row["point"], *(f"{np.degrees(row[name]):.1f}" for name in angles)]
-        cells += [f"{row[name]:.0f}" for name in (*forces, *moments)]
+        cells += [f"{round(row[name])}" for name in (*forces, *moments)]
         # A worth is a ratio of separations, which starts at one.
         cells.append(f"{row['separation'] / row['separation_without']:.2f}" if row["separation_without"] > 0 else "–")
         shown.append(([words(row["effect"])] if several else []) + [_minus(cell) for cell in cells])
@@ -284,10 +285,11 @@ def compliance_rows(compliance):
     for joint, (before, after, error) in enumerate(
         zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True), 1
     ):
-        decimals = max(0, 1 - int(np.floor(np.log10(error)))) if error else 3
-        rows.append(
-            [str(joint), f"{before:.{decimals}f}", f"{after:.{decimals}f}" + (f" ± {error:.{decimals}f}" if error else "")]
-        )
+        if not error:
+            rows.append([str(joint), f"{before:.4g}", f"{after:.4g}"])
+            continue
+        decimals = max(0, 1 - int(np.floor(np.log10(error))))
+        rows.append([str(joint), f"{before:.{decimals}f}", f"{after:.{decimals}f} ± {error:.{decimals}f}"])
     return rows
 
 
@@ -337,7 +339,7 @@ def _part(part, campaign):
         ),
         "repeats of a state": str(each.min())
         if each.min() == each.max()
-        else f"{each.min()} to {each.max()}, {np.median(each):g} in the middle",
+        else f"{each.min()} to {each.max()}, median {np.median(each):g}",
         "frame of the readings": frame,
         "time": "recorded" if np.isfinite(part["time_s"]).any() else "not recorded",
     }
@@ -401,11 +403,12 @@ def _gain(gain):
     return f"lowers the held-out RMS by {100 * gain:.0f} %" if gain >= 0 else f"raises the held-out RMS by {-100 * gain:.0f} %"
 
 
-def _parameter_row(entry, with_member):
-    member, _, name = entry["name"].partition(" ") if "@" in entry["name"] or with_member else ("", "", entry["name"])
-    value, unit = scaled(entry["value"], entry["std_error"], entry["unit"])
-    named = f"{candidate_words(member)}: {words(name)}" if with_member and member else words(name)
-    return [named, value, unit]
+def _parameter_row(entry, members):
+    # The longest, since keys may have blanks and one may begin another.
+    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default="")
+    name = words(entry["name"].removeprefix(f"{member} "))
+    where = f"{members_words([member])}: " if len(members) > 1 else ""
+    return [where + name, *scaled(entry["value"], entry["std_error"], entry["unit"])]
 
 
 def _distance_from_zero(entry):
@@ -449,7 +452,11 @@ def _method(verdict, tested, known, descriptions, replicates):
 
 def _sentence(text):
     text = text.strip()
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    return _capital(text) + ("" if text.endswith(".") else ".")
+
+
+def _capital(text):
+    return text[:1].upper() + text[1:]
 
 
 def _minus(text):

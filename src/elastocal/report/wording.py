@@ -5,6 +5,8 @@ import re
 import numpy as np
 
 MICRO, MILLI = 1e6, 1e3
+# A blank at which no line ends.
+_TIED = "\u00a0"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _KEY = re.compile(r"^(?P<effect>[^@\[]+)(?:@(?P<joints>[\d+]+))?(?:\[(?P<detail>.*)\])?$")
 # Effects whose numbers count links, which begin at the joint of the same number.
@@ -52,6 +54,33 @@ def candidate_words(key):
     return words(found["effect"]) + at_joints(found["effect"], joints) + detail
 
 
+def members_words(keys, most=12):
+    """What an effect was found as: its joints or links and variants, those of one joint together.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Keys of candidates of one effect.
+    most : int
+
+    Returns
+    -------
+    str
+    """
+    grouped_keys = {}
+    for key in sorted(keys, key=_natural):
+        found = _KEY.match(key)
+        where = at_joints(found["effect"], (found["joints"] or "").split("+")) if found["joints"] else ""
+        grouped_keys.setdefault(where.removeprefix(" in "), []).append(found["detail"] or "")
+    parts = [": ".join(filter(None, (where, ", ".join(filter(None, details))))) for where, details in grouped_keys.items()]
+    shown = [part for part in parts if part]
+    return "; ".join(shown[:most]) + (f"; {len(shown) - most} more" if len(shown) > most else "")
+
+
+def _natural(key):
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", key)]
+
+
 def step_words(step):
     """The name of a row of before_after.csv as words."""
     if not step.startswith("control: "):
@@ -63,7 +92,8 @@ def length(metres, digits=3):
     """A length with its unit, µm below one millimetre; "unknown" where there is none."""
     if metres is None:
         return "unknown"
-    return f"{plain(MICRO * metres, digits)} µm" if abs(metres) < 0.9995e-3 else f"{plain(MILLI * metres, digits)} mm"
+    factor, unit = (MICRO, "µm") if abs(metres) < 0.9995e-3 else (MILLI, "mm")
+    return f"{plain(factor * metres, digits)}{_TIED}{unit}"
 
 
 def plain(value, digits=3):
@@ -76,14 +106,14 @@ def plain(value, digits=3):
 
 def percent(share):
     """A share in percent."""
-    return f"{100 * share:.0f} %"
+    return f"{100 * share:.0f}{_TIED}%"
 
 
 def p_words(p_value):
     """A p-value with its relation."""
     if p_value is None:
         return "p unknown"
-    return f"p = {plain(p_value, 2)}" if p_value >= 1e-4 else "p < 0.0001"
+    return f"p{_TIED}={_TIED}{p_value:.2g}" if p_value >= 1e-4 else f"p{_TIED}<{_TIED}0.0001"
 
 
 def scaled(value, error, unit):
