@@ -1,0 +1,278 @@
+"""Closing the loop on a user's own campaign: one command, one folder, and no more work than an edit asks for."""
+
+import json
+import re
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from made_folders import made_folder, made_table
+from study_folder import Study
+
+from elastocal.table_schemas import COMPONENTS
+
+CELL = "cells/made"
+OWN = ("diagnose", "--config", f"campaign={CELL}")
+OFFSET = 1e-3
+STEPS = [
+    "read_campaign",
+    "check_data",
+    "estimate_noise",
+    "fit_declared",
+    "trace_effects",
+    "weigh_rivals",
+    "judge_held_out",
+    "state_verdict",
+]
+OF_THE_STUDY = "data/simulated/kuka/200um/measured.parquet"
+
+
+@pytest.fixture(scope="module")
+def diagnosed(kuka, tmp_path_factory):
+    """The sources, a campaign of a robot whose joint 3 stands 1 mrad off, its diagnosis, and some data of the study."""
+    study = Study.of_sources(tmp_path_factory.mktemp("loop") / "study")
+    made_folder(study.path(CELL), kuka, table=made_table(kuka, "made", offset_of_joint_3=OFFSET))
+    study.run(OF_THE_STUDY, *OWN)
+    return study
+
+
+@pytest.fixture
+def cell(diagnosed, tmp_path):
+    """A copy, to be changed."""
+    return diagnosed.copied_to(tmp_path / "study")
+
+
+def report(study, name):
+    return study.path(f"reports/loop/made/{name}")
+
+
+def test_verdict_has_every_key_of_the_contract(diagnosed):
+    verdict = json.loads(report(diagnosed, "verdict.json").read_text(encoding="utf-8"))
+    metrics = {"mean_m", "rms_m", "p95_m", "max_m"}
+    assert verdict["campaign"] == "made" and verdict["verdict"] == "named"
+    assert {"source", "position_m", "orientation_rad"} <= set(verdict["noise"])
+    heldout = verdict["heldout"]
+    assert set(heldout) >= {"before", "after", "noise_floor_rms_m", "reduction_ci95", "poses"}
+    assert set(heldout["before"]) == set(heldout["after"]) == metrics
+    assert heldout["after"]["rms_m"] < heldout["before"]["rms_m"] and len(heldout["reduction_ci95"]) == 2
+    compliance = verdict["compliance_urad_per_Nm"]
+    assert {name: len(values) for name, values in compliance.items()} == {"before": 6, "after": 6, "std_error": 6}
+    assert isinstance(verdict["warnings"], list)
+    (effect,) = verdict["effects"]
+    assert set(effect) >= {
+        "name",
+        "family",
+        "joints",
+        "parameters",
+        "p_value",
+        "heldout_gain",
+        "alternatives",
+        "angle_to_nearest_deg",
+    }
+    assert (effect["name"], effect["family"], effect["joints"], effect["alternatives"]) == ("joint_offset", "geometry", [3], [])
+    (parameter,) = effect["parameters"]
+    assert set(parameter) >= {"name", "value", "std_error", "unit"} and parameter["unit"] == "rad"
+    assert abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
+    assert 0 < effect["p_value"] < 0.05 and 0 < effect["heldout_gain"] < 1 and effect["angle_to_nearest_deg"] >= 0
+
+
+def test_every_file_of_the_contract_is_there(diagnosed, kuka):
+    table = pd.read_csv(diagnosed.path(CELL) / "measurements.csv")
+    steps = pd.read_csv(report(diagnosed, "before_after.csv"))
+    assert steps.kind.tolist()[:3] == ["frames", "declared", "effect"] and set(steps.kind[3:]) <= {"control"}
+    for metric in ("mean", "rms", "p95", "max"):
+        assert {f"train_{metric}_m", f"heldout_{metric}_m"} <= set(steps.columns)
+        assert any(column.startswith("heldout_") and f"{metric}_over_floor" in column for column in steps.columns)
+    residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas()
+    assert len(residuals) == len(table) and sorted(residuals.row) == list(range(1, len(table) + 1))
+    assert {f"{stage}_{name}" for stage in ("before", "after") for name, *_ in COMPONENTS} <= set(residuals.columns)
+    candidates = pq.ParquetFile(report(diagnosed, "candidates.parquet")).read().to_pandas()
+    assert {"p_value", "p_family", "angle_deg", "noncentrality", "note"} <= set(candidates.columns)
+    assert candidates.candidate[candidates.chosen].tolist() == ["joint_offset@3"]
+    # Nothing is confounded: there is nothing to measure.
+    proposed = pd.read_csv(report(diagnosed, "next_experiment.csv"))
+    assert len(proposed) == 0 and {"pose", "point", "q1", "q6", "fx", "mz"} <= set(proposed.columns)
+
+
+def test_residuals_and_figures_agree(diagnosed):
+    """Held-out figures are those of the residuals of the single readings, but for the repeats that they average."""
+    residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas().query("held_out")
+    steps = pd.read_csv(report(diagnosed, "before_after.csv")).set_index("kind")
+    for stage, kind in (("before", "declared"), ("after", "effect")):
+        mean = residuals.groupby(["pose", "load", "target"])[[f"{stage}_d{axis}" for axis in "xyz"]].mean()
+        rms = np.sqrt((mean.to_numpy() ** 2).sum(axis=1).mean())
+        assert steps.loc[kind, "heldout_rms_m"] == pytest.approx(rms, rel=1e-6)
+
+
+def test_a_finished_diagnosis_has_nothing_to_do(diagnosed):
+    assert diagnosed.planned(OF_THE_STUDY, *OWN) == set()
+
+
+def inputs_by_rule(study, *arguments):
+    """Files that the jobs of each rule read, from Snakemake's own plan."""
+    plan = study.snakemake("-n", "--forceall", *arguments)
+    assert plan.returncode == 0, plan.stderr[-2000:]
+    found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
+    return {rule: set(files.split(", ")) for rule, files in found}
+
+
+def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
+    inputs = inputs_by_rule(diagnosed, *OWN)
+    assert set(STEPS) <= set(inputs)
+    readers = {rule for rule, files in inputs.items() if any("held_out.parquet" in file for file in files)}
+    assert readers == {"judge_held_out"}
+    # Nor the file in which they stand with all others.
+    whole = {rule for rule, files in inputs.items() if any(file.startswith(CELL) for file in files)}
+    assert whole == {"read_campaign"}
+    # What the judgement makes goes to reports and the verdict, to no step before it.
+    judged = {
+        "results/loop/made/held_out_errors.json",
+        "reports/loop/made/before_after.csv",
+        "reports/loop/made/residuals.parquet",
+    }
+    for rule in STEPS[: STEPS.index("judge_held_out")]:
+        assert not inputs[rule] & judged
+
+
+def rules_of(planned):
+    return {job[0] for job in planned}
+
+
+def test_another_seed_of_the_held_out_poses_reruns_the_campaign_and_nothing_of_the_study(cell):
+    file = cell.path(CELL) / "campaign.yaml"
+    document = yaml.safe_load(file.read_text(encoding="utf-8"))
+    file.write_text(yaml.safe_dump(document | {"holdout": {"fraction": 0.3, "seed": 2}}), encoding="utf-8")
+    planned = cell.planned(OF_THE_STUDY, *OWN)
+    assert rules_of(planned) >= {*STEPS, "diagnose"}
+    assert {job[1] for job in planned if len(job) > 1} == {"made"}
+    assert "simulate" not in rules_of(planned) and "measure" not in rules_of(planned)
+
+
+EDITS = {
+    "an effect": (
+        "src/elastocal/effects/payload.py",
+        {"check_data", "trace_effects", "state_verdict"},
+        {"simulate", "measure"},
+    ),
+    "a fault": (
+        "src/elastocal/faults/outliers.py",
+        {"check_data", "trace_effects"},
+        {"read_campaign", "estimate_noise", "fit_declared"},
+    ),
+    "the selection": ("src/elastocal/selection.py", set(STEPS[4:]), set(STEPS[:4])),
+    "the judgement": ("src/elastocal/held_out.py", set(STEPS[6:]), set(STEPS[:6])),
+    "the verdict": ("src/elastocal/verdict.py", set(STEPS[7:]), set(STEPS[:7])),
+    "figures of the study": ("src/elastocal/figures/strategies.py", set(), set(STEPS)),
+    "style of all figures": ("src/elastocal/figures/style.py", set(), set(STEPS)),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_edit_reruns_what_depends_on_it_of(edit, cell):
+    path, rerun, untouched = EDITS[edit]
+    cell.append(path, "# an edit\n")
+    planned = rules_of(cell.planned(OF_THE_STUDY, *OWN))
+    assert rerun <= planned
+    assert not untouched & planned
+
+
+def _without_column(table):
+    return {name: values for name, values in table.items() if name != "q4"}
+
+
+def _not_a_number(table):
+    table["y"][7] = np.nan
+    return table
+
+
+BROKEN = {
+    "missing column": (_without_column, ["header", "'q4'"]),
+    "not a number": (_not_a_number, ["row 8", "column y", "nan"]),
+}
+
+
+@pytest.mark.parametrize("fault", BROKEN)
+def test_a_broken_campaign_ends_with_one_line(fault, unstarted, kuka):
+    spoil, words = BROKEN[fault]
+    made_folder(unstarted.path(CELL), kuka, table=made_table(kuka, "made"))
+    file = unstarted.path(CELL) / "measurements.csv"
+    table = pd.read_csv(file)
+    pd.DataFrame(spoil({name: table[name].to_numpy().copy() for name in table})).to_csv(file, index=False, na_rep="nan")
+    ended = unstarted.snakemake("-j2", *OWN)
+    assert ended.returncode != 0
+    said = [line for line in ended.stderr.splitlines() if line.startswith(f"{CELL}/measurements.csv")]
+    assert len(said) == 1, ended.stderr
+    assert "; allowed: " in said[0]
+    for word in words:
+        assert word in said[0], said
+    assert "Traceback" not in ended.stderr
+    log = unstarted.path("results/logs/read_campaign/made.log").read_text(encoding="utf-8").splitlines()
+    assert log == said
+    assert unstarted.files("results/loop/**/*.*", "reports/loop/**/*.*") == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"campaign": "kuka/7"}, ["campaign.yaml: campaign: ", "'kuka/7'"]),
+        ({"robot": "kukka"}, ["campaign.yaml: robot: ", "'kuka'"]),
+    ],
+)
+def test_nothing_starts_on_a_campaign_that_is_described_wrongly(changes, words, unstarted, kuka):
+    made_folder(unstarted.path(CELL), kuka)
+    file = unstarted.path(CELL) / "campaign.yaml"
+    document = yaml.safe_load(file.read_text(encoding="utf-8"))
+    file.write_text(yaml.safe_dump(document | changes), encoding="utf-8")
+    ended = unstarted.snakemake("-j1", *OWN)
+    of_snakemake = ("Using workflow specific profile", "Config file config.yaml is extended")
+    lines = [line for line in (ended.stdout + ended.stderr).splitlines() if not line.startswith(of_snakemake)]
+    assert ended.returncode != 0 and len(lines) == 1, lines
+    assert lines[0].startswith(CELL) and all(word in lines[0] for word in words)
+
+
+SAG = '''"""A sag of joint 2 that no other effect has."""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "sag", "gravity"
+
+
+def candidates(sites):
+    """One."""
+    return [Candidate(NAME, FAMILY, (2,), "", (Parameter("sag", "rad", 1e-3),), _displacement)]
+
+
+def _displacement(circumstances):
+    return [{1: np.cos(5 * circumstances.joint_angles[:, 1])}]
+'''
+TINY = {
+    "source": "simulated",
+    "robot": "kuka",
+    "declared_robot": "kuka",
+    "points": ["6DoF"],
+    "poses": 8,
+    "force_N": 500,
+    "ladder": [0, 1],
+    "offset_m": [0, 0.5, 0],
+    "repeats": 1,
+    "repeated_poses": 0,
+    "noise_m": 6.0e-5,
+    "noise_rad": 6.0e-5,
+}
+
+
+def test_a_new_effect_is_a_module_and_a_new_campaign_is_a_file(cell):
+    cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
+    cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(TINY), encoding="utf-8")
+    cell.configure({"loop": {"campaigns": ["tiny"]}})
+    looks, training = "results/loop/made/looks.parquet", "results/loop/tiny/training.parquet"
+    cell.run(looks, training, *OWN[1:])
+    assert "sag@2" in pq.ParquetFile(cell.path(looks)).read().column("candidate").to_pylist()
+    readings = pq.ParquetFile(cell.path(training)).read()
+    assert set(readings.column("pose").to_pylist()) < set(range(8))
+    planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")
+    assert {job for job in planned if job[0] in STEPS} == {(step, "tiny") for step in STEPS[1:]}
