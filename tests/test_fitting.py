@@ -79,12 +79,9 @@ def test_frames_and_targets_are_fitted_on_other_chains(name):
 
 
 @pytest.fixture(scope="module")
-def noisy():
+def noisy(fanuc):
     """A model with springs, an offset and two targets, fitted to readings with joint noise, repeats and two sessions."""
-    from conftest import load_robot
-
-    robot = load_robot("fanuc")
-    model = model_of(robot, "joint_offset@3", targets=TARGETS, identified=True)
+    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
     true = made_estimate(model, (0, 1), seed=7)
     states = made_states(6, 40, seed=8, sessions=2)
     states.repeats[:] = np.random.default_rng(9).integers(1, 4, 40)

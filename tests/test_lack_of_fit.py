@@ -18,10 +18,8 @@ def with_noise(fitted, **changes):
 
 
 @pytest.fixture(scope="module")
-def nothing_missing():
-    from conftest import load_robot
-
-    return [planted(load_robot("fanuc"), {}, seed=200 + number, poses=12) for number in range(CAMPAIGNS)]
+def nothing_missing(fanuc):
+    return [planted(fanuc, {}, seed=200 + number, poses=12) for number in range(CAMPAIGNS)]
 
 
 def test_p_values_are_uniform_where_nothing_is_missing(nothing_missing):

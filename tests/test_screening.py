@@ -20,12 +20,9 @@ REPLICATES = 199
 
 
 @pytest.fixture(scope="module")
-def base():
+def base(fanuc):
     """A small campaign with two loads a pose: model, its true values, readings without noise, all candidates."""
-    from conftest import load_robot
-
-    robot = load_robot("fanuc")
-    model = made_model(robot.chain, TARGET, compliance=robot.compliance)
+    model = made_model(fanuc.chain, TARGET, compliance=fanuc.compliance)
     states = made_states(6, 60, seed=1)
     # Each pose is loaded twice.
     states.pose[:] = np.arange(60) // 2

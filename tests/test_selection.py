@@ -71,10 +71,8 @@ def test_two_planted_effects_are_both_found(pair, fanuc):
 
 
 @pytest.fixture(scope="module")
-def nothing_missing():
-    from conftest import load_robot
-
-    campaigns = [planted(load_robot("fanuc"), {}, seed=100 + number) for number in range(NULLS)]
+def nothing_missing(fanuc):
+    campaigns = [planted(fanuc, {}, seed=100 + number) for number in range(NULLS)]
     return [(campaign, searched(campaign, number)) for number, campaign in enumerate(campaigns)]
 
 

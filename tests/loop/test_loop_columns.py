@@ -98,14 +98,11 @@ def test_estimates_come_back_from_their_table(kind, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def traced(tmp_path_factory):
+def traced(kuka, config_folder, tmp_path_factory):
     """A campaign with an offset of joint 3: the case, its declared fit and what a search found."""
-    from conftest import CONFIG, load_robot
-
-    kuka = load_robot("kuka")
     folder = tmp_path_factory.mktemp("loop") / "made"
     made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3), frame="tracker", measured="pose")
-    descriptions, training, _ = taken_in(folder, CONFIG / "robots")
+    descriptions, training, _ = taken_in(folder, config_folder / "robots")
     case = case_from(descriptions, reading_columns(training))
     noise = Noise("declared", 6e-5, 6e-5, np.zeros(6))
     declared = fit(case.model, case.observations, noise)

@@ -35,14 +35,11 @@ def with_effects(case, declared, *keys):
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(kuka, config_folder, tmp_path_factory):
     """Training and held-out cases of a robot whose joint 3 stands 1 mrad off, and its steps."""
-    from conftest import CONFIG, load_robot
-
-    kuka = load_robot("kuka")
     folder = tmp_path_factory.mktemp("judge") / "made"
     made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=OFFSET))
-    case, held_out = cases(folder, CONFIG / "robots")
+    case, held_out = cases(folder, config_folder / "robots")
     declared = fit(case.model, case.observations, NOISE)
     final, members = with_effects(case, declared, "joint_offset@3")
     beside = [[case.candidates["cross_compliance@1+2"]], [case.candidates["payload"]]]
