@@ -11,7 +11,7 @@ from elastocal.figures.style import PALETTE, panels, styled
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # As in selection.FAMILY_WISE_LEVEL, which a drawing job should not have to import all of the search for; a test compares them.
 FAMILY_WISE_LEVEL = 0.05
-# The smallest p-value that a double holds: what is drawn there is at least so far out.
+# Of the smallest p-value that a double holds.
 _FARTHEST = 308.0
 _NAMED = 18
 _LEADING = 20
@@ -33,6 +33,8 @@ def scree(table):
     """
     tested = np.isfinite(table["p_value"])
     order = leading(table)
+    if not len(order):
+        return _nothing_tested(table)
     strength = strengths(table)
     mark = family_wise_mark(strength[tested], table["p_family"][tested])
     named = order[:_NAMED]
@@ -44,7 +46,7 @@ def scree(table):
         if table["chosen"][index]:
             left.barh(row, strength[index], height=0.62, facecolor="none", edgecolor="black", linewidth=1.3, zorder=3)
         if strength[index] >= _FARTHEST:
-            left.annotate(">", (_FARTHEST, row), (2, 0), textcoords="offset points", va="center", fontsize=7.5)
+            left.annotate(">", (strength[index], row), (2, 0), textcoords="offset points", va="center", fontsize=7.5)
     left.set(yticks=rows, ylim=(len(named) - 0.4, -0.6), title="the leading candidates")
     left.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7)
     left.grid(visible=False, axis="y")
@@ -83,6 +85,8 @@ def confounding(table, pairs):
     known = set(pairs["one"]) | set(pairs["other"])
     order = [index for index in leading(table) if table["candidate"][index] in known]
     names = [table["candidate"][index] for index in shortlist(order, table["chosen"])]
+    if not names:
+        return _nothing_tested(table)
     chosen = set(table["candidate"][table["chosen"].astype(bool)])
     angles = angle_matrix(names, pairs)
     count = len(names)
@@ -135,9 +139,11 @@ def shortlist(order, chosen, count=_LEADING):
 
 
 def strengths(table):
-    """-log10 of the p-values, no larger than what a double can hold."""
+    """-log10 of the p-values; where a double cannot hold one, what the Bayesian criterion says that it is at least."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.minimum(-np.log10(table["p_value"]), _FARTHEST)
+        strength = -np.log10(table["p_value"])
+    # The criterion is twice the logarithm of the likelihood ratio less a penalty that outweighs the tail's polynomial.
+    return np.where(strength < _FARTHEST, strength, np.maximum(table["bic_gain"] / (2 * np.log(10)), _FARTHEST))
 
 
 def family_wise_mark(strength, p_family, level=FAMILY_WISE_LEVEL):
@@ -176,12 +182,20 @@ def short_name(key, longest=38):
     return words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
 
 
+def _nothing_tested(table):
+    figure, axes = panels(1, 1, 25)
+    axes[0, 0].set_axis_off()
+    note = f"None of {len(set(table['candidate']))} candidates can be tested with these data."
+    axes[0, 0].text(0.5, 0.5, note, ha="center", va="center")
+    return figure
+
+
 def _colours(table, indices):
     return [FAMILIES.get(table["family"][index], PALETTE[-1]) for index in indices]
 
 
 def _ticks(farthest, apart):
-    steps = [0, 2, 5, 10, 20, 50, 100, 200, 300]
+    steps = [0, *(digit * 10**power for power in range(6) for digit in (1, 2, 5))]
     shown = [step for step in steps if step <= 1.06 * farthest]
     kept = []
     for step in shown:

@@ -256,27 +256,24 @@ def description(effect):
 def experiment_facts(rows):
     """Table of the states proposed, angles in degrees; empty where nothing is confounded."""
     if not rows:
-        return {"heads": [], "rows": [], "gains": []}
+        return {"loaded": False, "heads": [], "rows": [], "gains": []}
     angles = [name for name in rows[0] if re.fullmatch(r"q\d+", name)]
-    forces, moments = ("fx", "fy", "fz"), ("mx", "my", "mz")
-    heads = [
-        "point",
-        *(f"{name} °" for name in angles),
-        *(f"{name} N" for name in forces),
-        *(f"{name} N·m" for name in moments),
-        "worth",
-    ]
+    loads = {"fx": "N", "fy": "N", "fz": "N", "mx": "N·m", "my": "N·m", "mz": "N·m"}
+    # Nothing is said of loads where all states are unloaded.
+    loads = loads if any(row[name] for row in rows for name in loads) else {}
+    heads = ["point", *(f"{name} °" for name in angles), *(f"{name} {unit}" for name, unit in loads.items()), "worth"]
     several = len({row["effect"] for row in rows}) > 1
     shown, gains = [], []
     for row in rows:
         cells = [row["point"], *(f"{np.degrees(row[name]):.1f}" for name in angles)]
-        cells += [f"{round(row[name])}" for name in (*forces, *moments)]
+        cells += [f"{round(row[name])}" for name in loads]
         # A worth is a ratio of separations, which starts at one.
         cells.append(f"{row['separation'] / row['separation_without']:.2f}" if row["separation_without"] > 0 else "–")
         shown.append(([words(row["effect"])] if several else []) + [_minus(cell) for cell in cells])
         last = (words(row["effect"]), plain(row["separation_without"]), plain(row["separation"]))
         gains = [gain for gain in gains if gain[0] != last[0]] + [last]
-    return {"heads": (["effect"] if several else []) + heads, "rows": shown, "gains": [list(gain) for gain in gains]}
+    heads = (["effect"] if several else []) + heads
+    return {"loaded": bool(loads), "heads": heads, "rows": shown, "gains": [list(gain) for gain in gains]}
 
 
 def compliance_rows(compliance):
@@ -427,12 +424,11 @@ def _other_parameters(verdict, parameters):
         counts[kind] += 1
         if kind == "declared":
             rows.append([candidate_words(owner), words(name), *scaled(value, error, unit)])
+    placed = counts["frame"] + counts["target"]
     return {
         "rows": rows[:_MOST_OTHERS],
         "left_out": max(len(rows) - _MOST_OTHERS, 0),
-        "placement": f"{counts['frame']} of frames and {counts['target']} of targets"
-        if counts["frame"] + counts["target"]
-        else "",
+        "placement": listed(f"{counts[kind]} of {kind}s" for kind in ("frame", "target") if counts[kind]) if placed else "",
     }
 
 

@@ -100,8 +100,9 @@ def plain(value, digits=3):
     """A number with so many significant digits and without an exponent."""
     if value == 0:
         return "0"
-    decimals = max(0, digits - 1 - int(np.floor(np.log10(abs(value)))))
-    return f"{value:.{decimals}f}"
+    # Rounded first: what rounds up to the next power of ten has one decimal less.
+    power = int(f"{value:.{digits - 1}e}".split("e")[1])
+    return f"{value:.{max(0, digits - 1 - power)}f}"
 
 
 def percent(share):

@@ -1,0 +1,242 @@
+"""Figures of the loop show what their tables hold, with units, and nothing where there is nothing."""
+
+import numpy as np
+import pytest
+from made_loop_tables import FAMILIES, candidate_table, confounding_table, residual_table, step_rows
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgba
+from matplotlib.quiver import Quiver, QuiverKey
+from matplotlib.text import Text
+
+from elastocal import selection
+from elastocal.figures import candidates as drawn
+from elastocal.figures.before_after import before_after, step_name
+from elastocal.figures.candidates import confounding, family_wise_mark, leading, scree, shortlist
+from elastocal.figures.residuals import arrows, bins_of, components, middle_of_cells, residuals, share_explained
+from elastocal.figures.style import save
+
+
+def texts(figure):
+    return [artist.get_text() for artist in figure.findobj(Text) if artist.get_text()]
+
+
+def assert_nothing_cut_off(figure):
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    figure.draw(renderer)
+    for artist in figure.findobj(Text):
+        # Ticks outside the limits of an axis exist and are not drawn.
+        if artist.get_text() and artist.get_visible() and not is_hidden_tick(artist, figure):
+            box = artist.get_window_extent(renderer)
+            assert figure.bbox.padded(1).contains(*box.min), f"{artist.get_text()!r} is cut off"
+            assert figure.bbox.padded(1).contains(*box.max), f"{artist.get_text()!r} is cut off"
+
+
+def is_hidden_tick(artist, figure):
+    drawn_ticks = set()
+    all_ticks = set()
+    for axis in figure.axes:
+        for one, limits in ((axis.xaxis, axis.get_xlim()), (axis.yaxis, axis.get_ylim())):
+            for tick in [*one.get_major_ticks(), *one.get_minor_ticks()]:
+                labels = {id(tick.label1), id(tick.label2)}
+                all_ticks |= labels
+                if min(limits) <= tick.get_loc() <= max(limits):
+                    drawn_ticks |= labels
+    return id(artist) in all_ticks - drawn_ticks
+
+
+def labels_of(figure):
+    return [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
+
+
+def test_residuals_have_a_panel_for_each_quantity_that_varies():
+    figure = residuals(residual_table())
+    assert labels_of(figure) == [f"angle of joint {joint} (°)" for joint in range(1, 7)] + ["force (N)", "time (min)"]
+    assert figure.axes[0].get_ylabel() == "residual (µm)"
+
+
+def test_residuals_leave_out_what_was_not_recorded_or_did_not_vary():
+    table = residual_table(loaded=False, timed=False)
+    table["q4"][:] = 0.3
+    assert labels_of(residuals(table)) == [f"angle of joint {joint} (°)" for joint in (1, 2, 3, 5, 6)]
+
+
+def test_the_joint_behind_the_residual_is_said_to_explain_it():
+    figure = residuals(residual_table(poses=120, loaded=False))
+    component, shares = figure.axes[1].get_title(loc="left").split(": ")
+    before, after = (float(share.removesuffix(" %")) for share in shares.split(" → "))
+    assert component == "vertical" and before > 90 and after < 10
+
+
+def test_held_out_readings_are_marked_apart():
+    table = residual_table()
+    clouds = [artist for artist in residuals(table).axes[0].collections if isinstance(artist, PathCollection)]
+    sizes = [len(cloud.get_offsets()) for cloud in clouds]
+    assert sizes == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
+
+
+def test_one_stage_is_drawn_where_nothing_was_found():
+    figure = residuals(residual_table(found=False))
+    assert "with the effects found" not in texts(figure)
+    assert (
+        len([artist for artist in arrows(residual_table(found=False)).axes[0].get_children() if isinstance(artist, Quiver)])
+        == 1
+    )
+
+
+def test_many_points_are_pixels():
+    table = residual_table(poses=400)
+    assert all(cloud.get_rasterized() for cloud in residuals(table).findobj(PathCollection) if len(cloud.get_offsets()))
+
+
+def test_millimetres_where_residuals_are_large():
+    table = residual_table()
+    table |= {name: 100 * values for name, values in table.items() if name.startswith(("before_d", "after_d"))}
+    assert residuals(table).axes[0].get_ylabel() == "residual (mm)"
+
+
+def test_components_are_those_about_the_vertical_and_along_the_force():
+    table = {"x": np.array([0.0, 1.0]), "y": np.array([2.0, 0.0])}
+    table |= {"before_dx": np.array([1.0, 1.0]), "before_dy": np.array([2.0, 2.0]), "before_dz": np.array([3.0, 3.0])}
+    table |= {"fx": np.array([0.0, 0.0]), "fy": np.array([0.0, -5.0]), "fz": np.array([0.0, 0.0])}
+    expected = [[2.0, -1.0, 3.0, np.nan], [1.0, 2.0, 3.0, -2.0]]
+    np.testing.assert_allclose(components(table, "before"), expected, atol=1e-12)
+
+
+def test_chance_explains_nothing():
+    rng = np.random.default_rng(0)
+    assert share_explained(bins_of(rng.uniform(size=2000)), rng.normal(size=2000)) < 0.01
+    assert share_explained(np.zeros(5, int), np.full(5, np.nan)) == 0.0
+
+
+def test_arrows_stand_where_readings_were_taken():
+    table = residual_table(poses=20, repeats=3)
+    figure = arrows(table)
+    before = next(
+        artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver) and artist.get_gid() == "before"
+    )
+    # Repeats are averaged: one arrow for each pose, load and target.
+    assert len(before.X) == 20 * 2 * 2
+    assert [axis.get_xlabel() for axis in figure.axes] == ["x (m)", "x (m)"]
+    assert [axis.get_ylabel() for axis in figure.axes] == ["z (m)", "y (m)"]
+    (key,) = figure.findobj(QuiverKey)
+    assert key.label == "200 µm"
+
+
+def test_large_campaigns_draw_one_state_of_each_cell():
+    figure = arrows(residual_table(poses=500))
+    quivers = [artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver)]
+    assert max(len(quiver.X) for quiver in quivers) < 500
+    assert any("one state of each cell" in text for text in texts(figure))
+
+
+def test_the_middle_of_each_cell_is_taken():
+    at = np.array([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [5.0, 5.0]])
+    assert sorted(middle_of_cells(at, np.array([3.0, 1.0, 2.0, 9.0]), 1.0)) == [2, 3]
+
+
+def test_scree_shows_the_leading_candidates_by_family():
+    table = candidate_table()
+    figure = scree(table)
+    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert names[:2] == ["effect 0 1", "effect 1 2"]
+    assert any("30 candidates tested, 5 more cannot be tested" in text for text in texts(figure))
+    assert set(FAMILIES) <= set(texts(figure)) and {"taken by the search", "family-wise 5 %"} <= set(texts(figure))
+    first = figure.axes[0].patches[0]
+    assert first.get_facecolor() == to_rgba(drawn.FAMILIES[table["family"][0]])
+    assert len({*drawn.FAMILIES.values()}) == len(FAMILIES)
+
+
+def test_the_family_wise_mark_lies_between_what_is_beyond_and_what_is_within():
+    assert 30 < family_wise_mark(np.array([40.0, 30.0, 29.0]), np.array([0.001, 0.04, 0.06])) + 1 < 31
+    assert family_wise_mark(np.array([1.0]), np.array([0.5])) is None
+
+
+def test_scree_without_anything_beyond_chance():
+    figure = scree(candidate_table(beyond=0, chosen=0))
+    assert any("none stands out" in text for text in texts(figure))
+
+
+def test_each_candidate_stands_once_at_its_best_shape():
+    table = candidate_table()
+    table["candidate"][3] = table["candidate"][1]
+    assert 3 not in leading(table) and 1 in leading(table)
+
+
+def test_strength_beyond_the_smallest_double_still_has_an_order():
+    table = candidate_table()
+    table["p_value"][:2], table["bic_gain"][:2] = 0.0, [9000.0, 5000.0]
+    strength = drawn.strengths(table)
+    assert strength[0] > strength[1] > 308
+
+
+def test_the_level_is_that_of_the_search():
+    assert drawn.FAMILY_WISE_LEVEL == selection.FAMILY_WISE_LEVEL
+
+
+def test_confounding_annotates_every_pair_and_marks_what_was_found():
+    table = candidate_table(count=12)
+    figure = confounding(table, confounding_table(table))
+    numbers = [artist for artist in figure.axes[0].texts if artist.get_text().isdigit()]
+    assert len(numbers) == 12 * 11
+    bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
+    assert bold == ["effect 0 1  1"]
+    assert figure.axes[1].get_ylabel() == "angle (°)"
+
+
+def test_what_was_found_is_on_the_shortlist_whatever_its_place():
+    chosen = np.arange(30) == 25
+    assert shortlist(list(range(30)), chosen, 5) == [0, 1, 2, 3, 25]
+
+
+def test_bars_for_every_model_and_measure():
+    steps = step_rows()
+    figure = before_after(steps, 5e-5)
+    assert [axis.get_title() for axis in figure.axes] == ["mean", "RMS", "95th percentile", "maximum"]
+    assert {axis.get_xlabel() for axis in figure.axes} == {"error (µm)"}
+    for axis, metric in zip(figure.axes, ("mean", "rms", "p95", "max"), strict=True):
+        assert [bar.get_width() for bar in axis.patches] == pytest.approx([1e6 * step[f"heldout_{metric}_m"] for step in steps])
+        assert len([line for line in axis.lines if line.get_gid() == "interval"]) == len(steps)
+        assert len([line for line in axis.lines if line.get_gid() == "noise floor"]) == 1
+    assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, False, False, True]
+
+
+def test_no_line_where_the_noise_is_not_known():
+    figure = before_after(step_rows(effects=(), controls=()))
+    assert not [line for line in figure.axes[0].lines if line.get_gid() == "noise floor"]
+
+
+def test_long_names_of_models_wrap():
+    name = "control: " + ", ".join(f"transmission_harmonic@{joint}[orders 31-36]" for joint in range(1, 7))
+    assert max(map(len, step_name(name).splitlines())) <= 26
+    assert "and 3 more" in step_name(name).replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    "figure",
+    [
+        lambda: residuals(residual_table()),
+        lambda: arrows(residual_table()),
+        lambda: scree(candidate_table(count=60)),
+        lambda: confounding(candidate_table(), confounding_table(candidate_table())),
+        lambda: before_after(step_rows(controls=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)), 5e-6),
+    ],
+    ids=["residuals", "arrows", "candidates", "confounding", "before_after"],
+)
+def test_nothing_is_cut_off_and_a_rerun_gives_the_same_bytes(figure, tmp_path):
+    assert_nothing_cut_off(figure())
+    for run in "ab":
+        save(figure(), str(tmp_path / f"{run}.pdf"), str(tmp_path / f"{run}.png"))
+    for kind in ("pdf", "png"):
+        assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()
+
+
+def test_where_nothing_can_be_tested_the_figures_say_so():
+    table = candidate_table(count=0, chosen=0)
+    for figure in (scree(table), confounding(table, confounding_table(table))):
+        assert texts(figure) == ["None of 5 candidates can be tested with these data."]
+
+
+def test_a_single_candidate():
+    table = candidate_table(count=1)
+    assert_nothing_cut_off(scree(table))

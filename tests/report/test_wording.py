@@ -1,0 +1,64 @@
+"""Numbers, units and names as people write them."""
+
+import pytest
+
+from elastocal.report.wording import candidate_words, counted, length, listed, members_words, p_words, plain, scaled, step_words
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "expected"),
+    [
+        (1.176e-4, 3.64e-6, "rad", ("117.6 ± 3.6", "µrad")),
+        (20.61, 8.42, "N m", ("20.6 ± 8.4", "N·m")),
+        (1.5365e-7, 2.678e-9, "1/(N m^2)", ("(1.537 ± 0.027) · 10⁻⁷", "1/(N·m²)")),
+        (-1.588e-4, 8.2e-6, "rad kg/(N m)", ("−158.8 ± 8.2", "µrad·kg/(N·m)")),
+        (2.0e-13, None, "rad/(N m)^3", ("2.000 · 10⁻⁷", "µrad/(N·m)³")),
+        (0.0012, 0.0001, "m", ("1.20 ± 0.10", "mm")),
+        (1000.0, None, "N", ("1000", "N")),
+        (0.02, 0.001, "1", ("0.0200 ± 0.0010", "")),
+        (0.0, 0.0, "rad", ("0", "µrad")),
+        (2e-4, 1e-5, "rad/rad", ("(2.00 ± 0.10) · 10⁻⁴", "rad/rad")),
+    ],
+)
+def test_values_come_in_units_that_suit_them(value, error, unit, expected):
+    assert scaled(value, error, unit) == expected
+
+
+def test_candidates_are_named_in_words():
+    assert candidate_words("lost_motion@3") == "lost motion in joint 3"
+    assert candidate_words("link_elasticity@1+2[one section]") == "link elasticity in links 1 and 2, one section"
+    assert candidate_words("force_bias[base axes]") == "force bias, base axes"
+    assert members_words(["payload"]) == ""
+
+
+def test_joints_count_up():
+    keys = [
+        "transmission_harmonic@10[orders 1-2]",
+        "transmission_harmonic@2[orders 13-18]",
+        "transmission_harmonic@2[orders 3-6]",
+    ]
+    assert members_words(keys) == "joint 2: orders 3-6, orders 13-18; joint 10: orders 1-2"
+
+
+def test_steps_are_named_in_words():
+    assert step_words("+ link_weight") == "+ link weight"
+    assert (
+        step_words("control: joint_offset@1, joint_offset@2") == "control: joint offset in joint 1 and joint offset in joint 2"
+    )
+
+
+def test_lengths_and_counts():
+    assert [length(value).replace("\u00a0", " ") for value in (1.2345e-4, 0.9999e-3, 0.0213)] == [
+        "123 µm",
+        "1.00 mm",
+        "21.3 mm",
+    ]
+    assert length(None) == "unknown"
+    assert counted(1, "pose") == "1 pose" and counted(12000, "pose") == "12\u2009000 poses"
+    assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
+    assert p_words(0.0004997).endswith("0.0005") and p_words(0.0).endswith("0.0001") and p_words(None) == "p unknown"
+
+
+def test_lists_are_sentences():
+    assert [listed("abc"), listed("a"), listed("")] == ["a, b and c", "a", "none"]
+    assert listed("abcde", 2) == "a, b and 3 more"
