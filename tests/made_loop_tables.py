@@ -50,6 +50,7 @@ def candidate_table(count=30, untestable=5, chosen=1, beyond=2):
         "effect": np.array([name.split("@")[0] for name in names], object),
         "family": np.array([FAMILIES[number % len(FAMILIES)] for number in range(total)], object),
         "joints": np.array([name.split("@")[1] for name in names], object),
+        "shape": np.where(rank == 1, 44.7213, np.nan),
         "p_value": where_tested(10.0 ** -(40.0 - rank)),
         "p_family": where_tested(np.where(rank < beyond, 0.0005, 0.9)),
         "statistic": where_tested(200 - 4 * rank),
@@ -62,7 +63,9 @@ def candidate_table(count=30, untestable=5, chosen=1, beyond=2):
 
 def confounding_table(candidates):
     """Angles of all pairs of the tested candidates of a table."""
-    names = candidates["candidate"][np.isfinite(candidates["p_value"])]
+    shapes = [f" {shape:.3g}" if np.isfinite(shape) else "" for shape in candidates["shape"]]
+    named = candidates["candidate"] + np.array(shapes, object)
+    names = named[np.isfinite(candidates["p_value"])]
     pairs = [(one, other) for number, one in enumerate(names) for other in names[:number]]
     return {
         "one": np.array([one for one, _ in pairs], object),

@@ -13,7 +13,15 @@ from elastocal import selection
 from elastocal.figures import candidates as drawn
 from elastocal.figures.before_after import before_after, step_name
 from elastocal.figures.candidates import confounding, family_wise_mark, leading, scree, shortlist
-from elastocal.figures.residuals import arrows, bins_of, components, middle_of_cells, residuals, share_explained
+from elastocal.figures.residuals import (
+    arrows,
+    bins_of,
+    components,
+    middle_of_cells,
+    residuals,
+    running_quartiles,
+    share_explained,
+)
 from elastocal.figures.style import save
 
 
@@ -64,7 +72,7 @@ def test_residuals_leave_out_what_was_not_recorded_or_did_not_vary():
 def test_the_joint_behind_the_residual_is_said_to_explain_it():
     figure = residuals(residual_table(poses=120, loaded=False))
     component, shares = figure.axes[1].get_title(loc="left").split(": ")
-    before, after = (float(share.removesuffix(" %")) for share in shares.split(" → "))
+    before, after = (float(share) for share in shares.removesuffix(" %").split(" → "))
     assert component == "vertical" and before > 90 and after < 10
 
 
@@ -107,6 +115,15 @@ def test_chance_explains_nothing():
     rng = np.random.default_rng(0)
     assert share_explained(bins_of(rng.uniform(size=2000)), rng.normal(size=2000)) < 0.01
     assert share_explained(np.zeros(5, int), np.full(5, np.nan)) == 0.0
+
+
+def test_no_line_crosses_a_gap():
+    values = np.concatenate([np.linspace(0, 10, 200), np.linspace(50, 60, 200)])
+    middle, quartiles = running_quartiles(values, np.sin(values), bins_of(values))
+    assert np.isnan(quartiles).all(axis=1).sum() == 1
+    assert middle[~np.isnan(quartiles[:, 1])].max() > 50
+    levels = np.repeat([0.0, 1000.0], 50)
+    assert not np.isnan(running_quartiles(levels, levels, bins_of(levels))[1]).any()
 
 
 def test_arrows_stand_where_readings_were_taken():

@@ -13,7 +13,7 @@ FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox"
 FAMILY_WISE_LEVEL = 0.05
 # Of the smallest p-value that a double holds.
 _FARTHEST = 308.0
-_NAMED = 18
+_NAMED = 15
 _LEADING = 20
 
 
@@ -83,12 +83,13 @@ def confounding(table, pairs):
     matplotlib.figure.Figure
     """
     known = set(pairs["one"]) | set(pairs["other"])
-    order = [index for index in leading(table) if table["candidate"][index] in known]
-    names = [table["candidate"][index] for index in shortlist(order, table["chosen"])]
-    if not names:
+    order = [index for index in leading(table) if name_in_pairs(table, index) in known]
+    shown = shortlist(order, table["chosen"])
+    if not shown:
         return _nothing_tested(table)
+    names = [table["candidate"][index] for index in shown]
     chosen = set(table["candidate"][table["chosen"].astype(bool)])
-    angles = angle_matrix(names, pairs)
+    angles = angle_matrix([name_in_pairs(table, index) for index in shown], pairs)
     count = len(names)
     figure, axes = panels(1, 1, 18 + 4.2 * max(count, 6))
     axis = axes[0, 0]
@@ -165,6 +166,12 @@ def family_wise_mark(strength, p_family, level=FAMILY_WISE_LEVEL):
     return float((np.sqrt(beyond.min()) + np.sqrt(within.max())) ** 2 / 4)
 
 
+def name_in_pairs(table, index):
+    """Name of a candidate in the confounding table, which has it once for each value of its shape."""
+    shape = table["shape"][index]
+    return table["candidate"][index] + (f" {shape:.3g}" if np.isfinite(shape) else "")
+
+
 def angle_matrix(names, pairs):
     """Angles between candidates as a symmetric matrix with zeros on its diagonal; not a number where unknown."""
     place = {name: number for number, name in enumerate(names)}
@@ -195,7 +202,7 @@ def _colours(table, indices):
 
 
 def _ticks(farthest, apart):
-    steps = [0, *(digit * 10**power for power in range(6) for digit in (1, 2, 5))]
+    steps = [0, *(digit * 10**power for power in range(-1, 6) for digit in (1, 2, 5))]
     shown = [step for step in steps if step <= 1.06 * farthest]
     kept = []
     for step in shown:

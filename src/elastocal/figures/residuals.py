@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 
 from elastocal.figures.style import PALETTE, panels, styled
 
@@ -9,11 +10,14 @@ MICRO, MILLI = 1e6, 1e3
 STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
 # About the vertical of the base, since what turns with the first joint then stays one component; and along the force, since
 # what gives way does so in its direction.
-COMPONENTS = ("radial", "tangential", "vertical", "along the force")
+COMPONENTS = ("radial", "tangential", "vertical", "along force")
 # More points than this are drawn as pixels, so that the PDF stays small, and more dots per inch then make them sharp.
 _MOST_VECTORS = 1500
 _PIXELS_PER_INCH = 200
-_BINS = 16
+# Bins of a running median: as many as leave so many readings in each, within limits.
+_FEWEST_BINS, _MOST_BINS, _READINGS_IN_BIN = 16, 50, 80
+# No line is drawn over a share of the range in which there is no reading.
+_GAP = 0.1
 _FEWEST_IN_BIN = 4
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
 _MOST_ARROWS = 320
@@ -37,12 +41,15 @@ def residuals(table):
         One panel for each quantity that the campaign varies; each shows the component that this quantity explains best.
     """
     drawn_against, stages = quantities(table), _stages(table)
-    columns = 3
+    # Three in a row, or four where that saves a row.
+    columns = min((3, 4), key=lambda count: -(-len(drawn_against) // count))
     rows = -(-len(drawn_against) // columns)
-    figure, axes = panels(rows, columns, 28 + 52 * rows, sharey=True)
+    figure, axes = panels(rows, columns, 24 + 43 * rows, sharey=True)
     parts = {stage: components(table, stage) for stage in stages}
     scale, unit = length_unit(np.abs(parts["before"]))
-    limit = scale * 1.15 * np.nanquantile(np.abs(parts["before"]), 0.998)
+    # A few readings may lie outside, which would press all others together.
+    low, high = scale * np.nanquantile(parts["before"], [0.001, 0.999])
+    limits = (min(1.2 * low, -0.2 * high), max(1.2 * high, -0.2 * low))
     held_out = table["held_out"].astype(bool)
     for axis, (label, values) in zip(axes.flat, drawn_against.items(), strict=False):
         bins = bins_of(values)
@@ -50,9 +57,9 @@ def residuals(table):
         shown = int(np.argmax(shares["before"]))
         for stage in stages:
             _cloud(axis, values, scale * parts[stage][:, shown], held_out, STAGES[stage][1], bins)
-        percent = " → ".join(f"{100 * shares[stage][shown]:.0f} %" for stage in stages)
-        axis.set_title(f"{COMPONENTS[shown]}: {percent}", fontsize=8, loc="left")
-        axis.set(xlabel=label, ylim=(-limit, limit))
+        percent = " → ".join(f"{100 * shares[stage][shown]:.0f}" for stage in stages)
+        axis.set_title(f"{COMPONENTS[shown]}: {percent} %", fontsize=7.5, loc="left")
+        axis.set(xlabel=label, ylim=limits)
         axis.axhline(0, color="black", linewidth=0.6)
     for axis in axes.flat[len(drawn_against) :]:
         axis.remove()
@@ -85,7 +92,7 @@ def arrows(table):
     extent = np.maximum(np.ptp(place, axis=0), 1e-3)
     cell_m = _cell_side(extent) if len(place) > _MOST_ARROWS else None
     views = {"from the side": (0, 2), "from above": (0, 1)}
-    figure, axes = panels(1, 2, 32 + float(np.clip(66 * extent[1:].max() / extent[0], 45, 100)))
+    figure, axes = panels(1, 2, 32 + float(np.clip(66 * extent[1:].max() / extent[0], 45, 72)))
     length = _ARROW * extent.max()
     for axis, (title, seen) in zip(axes[0], views.items(), strict=True):
         shown = np.arange(len(place)) if cell_m is None else middle_of_cells(place[:, seen], size, cell_m)
@@ -168,8 +175,9 @@ def bins_of(values):
     finite = np.isfinite(values)
     levels = np.unique(np.round(values[finite], 3))
     edges = levels[:-1] + np.diff(levels) / 2
-    if len(levels) > _BINS:
-        edges = np.unique(np.quantile(values[finite], np.linspace(0, 1, _BINS + 1)[1:-1]))
+    if len(levels) > _FEWEST_BINS:
+        count = int(np.clip(finite.sum() / _READINGS_IN_BIN, _FEWEST_BINS, _MOST_BINS))
+        edges = np.unique(np.quantile(values[finite], np.linspace(0, 1, count + 1)[1:-1]))
     return np.where(finite, np.searchsorted(edges, values), -1)
 
 
@@ -205,16 +213,42 @@ def _cloud(axis, values, residual, held_out, color, bins):
     common = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
     axis.scatter(values[~held_out], residual[~held_out], s=4, marker="o", edgecolors="none", **{**common, "linewidths": 0})
     axis.scatter(values[held_out], residual[held_out], s=9, marker="x", **{**common, "alpha": min(1.5 * alpha, 1.0)})
-    middle, quartiles = [], []
+    middle, quartiles = running_quartiles(values, residual, bins)
+    axis.fill_between(middle, quartiles[:, 0], quartiles[:, 2], color=color, alpha=0.22, linewidth=0)
+    # Edged in white, so that it is seen on a dense cloud of its own colour; a bin between two gaps has no line but a point.
+    axis.plot(middle, quartiles[:, 1], color=color, linewidth=1.3, path_effects=[withStroke(linewidth=2.4, foreground="white")])
+    axis.plot(middle, quartiles[:, 1], color=color, linestyle="", marker="o", markersize=1.8)
+
+
+def running_quartiles(values, residual, bins):
+    """Quartiles of the residual bin by bin, with a row that is not a number where a line would cross a gap.
+
+    Parameters
+    ----------
+    values, residual : ndarray (M,)
+    bins : ndarray of int (M,)
+        From `bins_of`.
+
+    Returns
+    -------
+    middle : ndarray (B,)
+        Median of the values in each bin.
+    quartiles : ndarray (B, 3)
+    """
+    ordered = np.sort(values[np.isfinite(values)])
+    few = len(np.unique(np.round(ordered, 3))) <= _FEWEST_BINS
+    wide = np.flatnonzero(np.diff(ordered) > (np.inf if few else _GAP * np.ptp(ordered)))
+    gaps, rows = ordered[wide], []
     for number in range(bins.max() + 1):
         member = (bins == number) & np.isfinite(residual)
-        if member.sum() >= _FEWEST_IN_BIN:
-            middle.append(np.median(values[member]))
-            quartiles.append(np.quantile(residual[member], [0.25, 0.5, 0.75]))
-    if middle:
-        low, median, high = np.transpose(quartiles)
-        axis.fill_between(middle, low, high, color=color, alpha=0.22, linewidth=0)
-        axis.plot(middle, median, color=color, linewidth=1.6, marker="o", markersize=2.2)
+        if member.sum() < _FEWEST_IN_BIN:
+            continue
+        at = np.median(values[member])
+        if rows and ((gaps >= rows[-1][0]) & (gaps < at)).any():
+            rows.append([at, np.nan, np.nan, np.nan])
+        rows.append([at, *np.quantile(residual[member], [0.25, 0.5, 0.75])])
+    rows = np.array(rows).reshape(-1, 4)
+    return rows[:, 0], rows[:, 1:]
 
 
 def middle_of_cells(at, size, side):
