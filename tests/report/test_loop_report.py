@@ -125,6 +125,13 @@ def test_every_verdict_compiles_within_its_margins(campaign, pictures, pages, tm
     assert_within_margins(pages)
 
 
+def test_a_fault_of_the_readings_is_no_effect():
+    facts = facts_of(CAMPAIGNS["fault of the data"])
+    assert facts["faulty"] and facts["verdict"] == "named, the readings are at fault"
+    assert facts["effects"][0]["parameters"] == [["newtons for each unit of force written", "1000", "N"]]
+    assert not facts_of(CAMPAIGNS["named"])["faulty"]
+
+
 def test_long_names_wrap(pictures, pages, tmp_path):
     long = "a_campaign_with_a_name_that_nobody_would_type_twice_but_that_a_script_made_" + "x1_" * 20
     effect = effect_entry(parameters=["compliance_times_mass_at_end_of_link_" + "and_of_another_" * 8])

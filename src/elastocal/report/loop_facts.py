@@ -35,10 +35,11 @@ TITLES = {
     "not_testable": "not testable, these data can show nothing",
 }
 NOISE_SOURCES = {
-    "repeats": "from the differences between repeats of the same state",
-    "declared": "as the campaign declares it; there are too few repeats to check it",
-    "residual": "unknown: there are neither repeats nor a declared noise, so the residual itself was taken for it",
+    "repeats": "The noise is taken from the differences between repeats of the same state.",
+    "declared": "The noise is taken as the campaign declares it; there are too few repeats to check it.",
+    "residual": "The noise is not known: with neither repeats nor a declared noise the residual itself was taken for it.",
 }
+_OF_DATA = "data"
 # More than these would fill pages that nobody reads; the tables have them all.
 _MOST_PARAMETERS, _SHOWN_PARAMETERS = 16, 10
 _MOST_OTHERS = 40
@@ -67,10 +68,12 @@ def loop_facts(verdict, steps, experiment, table, candidates, descriptions, para
         JSON-serialisable; strings ready to print, lists for tables.
     """
     tested = len(set(candidates["candidate"][np.isfinite(candidates["p_value"])]))
+    faulty = any(effect["family"] == _OF_DATA for effect in verdict["effects"])
     return {
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
-        "verdict": TITLES[verdict["verdict"]],
+        "verdict": f"{verdict['verdict']}, the readings are at fault" if faulty else TITLES[verdict["verdict"]],
+        "faulty": faulty,
         "sentences": sentences(verdict, tested),
         "warnings": verdict["warnings"],
         "held_out_sentence": _held_out_sentence(verdict, steps),
@@ -106,16 +109,12 @@ def sentences(verdict, tested):
     list of str
     """
     said, found = verdict["verdict"], verdict["effects"]
-    if found and found[0]["family"] == "data":
-        faults = listed(
-            words(effect["name"]) + at_joints(effect["name"], effect["joints"])
-            for effect in found
-            if effect["family"] == "data"
-        )
-        details = [_sentence(effect["detail"]) for effect in found if effect["family"] == "data"]
+    faults = [effect for effect in found if effect["family"] == _OF_DATA]
+    if faults:
         return [
-            f"The readings themselves are at fault ({faults}) and must be corrected before anything can be traced.",
-            *details,
+            f"The readings themselves are at fault ({listed(map(_named, faults))}).",
+            *(_sentence(fault["detail"]) for fault in faults),
+            "They must be corrected before anything can be traced; all that follows was made with the readings as they are.",
         ]
     before, after = (verdict["lack_of_fit"][stage] for stage in ("before", "after"))
     tested = counted(tested, "candidate")
