@@ -27,7 +27,11 @@ ROWS = [
     {"kind": "effect", "step": "+ payload", "heldout_rms_m": 1e-4},
     {"kind": "control", "step": "control: x", "heldout_rms_m": 7e-4},
 ]
-LOOKS = {"look": np.array([0, 0, 0, 1]), "p_value": np.array([0.1, np.nan, 0.2, 0.3])}
+LOOKS = {
+    "look": np.array([0, 0, 0, 1]),
+    "candidate": np.array(["a", "b", "c", "a"]),
+    "p_value": np.array([0.1, np.nan, 0.2, 0.3]),
+}
 FAULT = {
     "name": "wrong_unit",
     "detail": "degrees for radians",
@@ -132,7 +136,7 @@ def test_a_fit_that_lacks_nothing_is_adequate_and_one_without_tests_not_testable
     _, final = fits
     fine = said(case, (final, final))
     assert fine["verdict"] == "adequate" and fine["effects"] == [] and fine["warnings"] == ["of the noise"]
-    none = {"look": np.zeros(0, int), "p_value": np.zeros(0)}
+    none = {name: values[:0] for name, values in LOOKS.items()}
     assert said(case, (final, final), looks=none)["verdict"] == "not_testable"
 
 
