@@ -1,8 +1,8 @@
 """Robust generalized least squares on the composite model, by Gauss-Newton steps on exact predictions.
 
-What the data cannot tell is named and held: going through the parameters in their order, one that its predecessors explain so
-well that its standard error would exceed its plausible size keeps its value and is listed. Nothing is regularised but series
-whose parameters carry a prior, which is reported with them.
+What the data cannot tell is named and held: a parameter whose standard error would exceed its plausible size, first beside
+those before it and then beside all, keeps its value and is listed. Nothing is regularised but series whose parameters carry a
+prior, which is reported with them.
 """
 
 from dataclasses import dataclass, replace
@@ -193,7 +193,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
 
 
 def identifiable(gram, frozen):
-    """Which parameters the data can tell from zero at their plausible size, given the parameters before them.
+    """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
 
     Parameters
     ----------
@@ -217,6 +217,13 @@ def identifiable(gram, frozen):
         if left_over > max(1.0, 1e-11 * gram[number, number]):
             factor[len(kept), : len(kept)], factor[len(kept), len(kept)] = row, np.sqrt(left_over)
             kept.append(number)
+    # Parameters that came later may have taken from what their predecessors could be told by.
+    while kept:
+        deviation = np.sqrt(np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])))
+        worst = int(np.argmax(deviation))
+        if deviation[worst] <= 1.0:
+            break
+        kept.pop(worst)
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask

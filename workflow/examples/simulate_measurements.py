@@ -1,7 +1,7 @@
 """Fill the folder of a campaign with measurements of a simulated robot, to see the format and to try the loop without one.
 
-Usage: python workflow/examples/simulate_measurements.py FOLDER ROBOT_FILE. FOLDER has a campaign.yaml that measures poses in the
-base frame; ROBOT_FILE is the robot that is measured, which may have more than the one that the campaign declares.
+Usage: python workflow/examples/simulate_measurements.py FOLDER ROBOT_FILE. FOLDER has a campaign.yaml that measures poses in
+the base frame; ROBOT_FILE is the robot that is measured, which may have more than the one that the campaign declares.
 """
 
 import argparse

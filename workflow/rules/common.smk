@@ -55,3 +55,29 @@ def strategy_document(wildcards):
 def cells(kind, robots, noise, strategies=config["strategies"]):
     """Results of one kind for robots, noise levels and strategies."""
     return expand(f"results/{kind}/{{robot}}/{{noise}}um/{{strategy}}.parquet", robot=robots, noise=noise, strategy=strategies)
+
+
+def folder_of(campaign):
+    return OWN[campaign] if campaign in OWN else f"data/campaigns/{campaign}"
+
+
+def files_of(wildcards):
+    """Files that a campaign is read from, those of the campaign that holds its test included."""
+    if wildcards.campaign in OWN:
+        return campaign_files(OWN[wildcards.campaign], "config/robots")
+    other = SOURCES[wildcards.campaign].get("holdout", {}).get("campaign")
+    names = [wildcards.campaign, *([Path(other).name] if other else [])]
+    return expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
+
+
+def loop_reports(campaigns):
+    return expand("reports/loop/{campaign}/{file}", campaign=campaigns, file=LOOP_REPORTS)
+
+
+def folds_of_one(campaigns):
+    """Campaigns that hold out the folds of the same readings, by the importer of these."""
+    folds = {}
+    for name in campaigns:
+        if "fold" in SOURCES[name]:
+            folds.setdefault(SOURCES[name]["importer"], []).append(name)
+    return folds

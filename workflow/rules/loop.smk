@@ -18,32 +18,6 @@ LOOP_REPORTS = [
 ]
 
 
-def folder_of(campaign):
-    return OWN[campaign] if campaign in OWN else f"data/campaigns/{campaign}"
-
-
-def files_of(wildcards):
-    """Files that a campaign is read from, those of the campaign that holds its test included."""
-    if wildcards.campaign in OWN:
-        return campaign_files(OWN[wildcards.campaign], "config/robots")
-    other = SOURCES[wildcards.campaign].get("holdout", {}).get("campaign")
-    names = [wildcards.campaign, *([Path(other).name] if other else [])]
-    return expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
-
-
-def loop_reports(campaigns):
-    return expand("reports/loop/{campaign}/{file}", campaign=campaigns, file=LOOP_REPORTS)
-
-
-def folds_of_one(campaigns):
-    """Campaigns that hold out the folds of the same readings, by the importer of these."""
-    folds = {}
-    for name in campaigns:
-        if "fold" in SOURCES[name]:
-            folds.setdefault(SOURCES[name]["importer"], []).append(name)
-    return folds
-
-
 rule simulate_campaign:
     input:
         sources=sources("simulate_campaign.py"),
@@ -58,7 +32,6 @@ rule simulate_campaign:
         campaign="|".join(SIMULATED) or "none",
     params:
         source=lambda wildcards: SOURCES[wildcards.campaign],
-        folder="data/campaigns/{campaign}",
         seed=config["seed"],
     script:
         "../scripts/simulate_campaign.py"
@@ -79,8 +52,6 @@ rule import_campaign:
         campaign="|".join(PUBLIC) or "none",
     params:
         source=lambda wildcards: SOURCES[wildcards.campaign],
-        folder="data/campaigns/{campaign}",
-        robots="config/robots",
         kept="data/public",
     script:
         "../scripts/import_campaign.py"

@@ -1,5 +1,7 @@
 """Measured data of other people as a campaign's folder."""
 
+from pathlib import Path
+
 from elastocal.campaign import folds_of
 from elastocal.importers import fanuc_cpa, fanuc_joint, fanuc_static, ur10_ipa
 from elastocal.public_data import fetch
@@ -12,12 +14,13 @@ IMPORTERS = {"fanuc_static": fanuc_static, "fanuc_cpa": fanuc_cpa, "fanuc_joint"
 def import_campaign(job):
     settings = job.params.source
     paths = [fetch(name, job.params.kept) for name in settings["files"]]
-    folder, name = job.params.folder, job.wildcards.campaign
-    robots = (job.params.robots,) if settings["importer"] == "fanuc_joint" else ()
+    folder, name = Path(job.output.document).parent, job.wildcards.campaign
+    described = Path(job.input.robots[0]).parent
+    robots = (described,) if settings["importer"] == "fanuc_joint" else ()
     write = IMPORTERS[settings["importer"]].write_campaign
     write(*paths, folder, *robots, name=name, holdout=settings.get("holdout"))
     if "fold" in settings:
-        write(*paths, folder, *robots, name=name, holdout=folds_of(folder, job.params.robots, **settings["fold"]))
+        write(*paths, folder, *robots, name=name, holdout=folds_of(folder, described, **settings["fold"]))
 
 
 run(import_campaign, snakemake)

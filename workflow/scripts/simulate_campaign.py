@@ -1,5 +1,7 @@
 """A campaign of a simulated robot, with what its declared robot lacks."""
 
+from pathlib import Path
+
 from elastocal.campaign import write_campaign
 from elastocal.campaign_simulation import Plan, simulated_measurements
 from elastocal.robot import robot_from_document
@@ -22,7 +24,7 @@ def simulate_campaign(job):
         "holdout": {"fraction": 0.3, "seed": 1},
     }
     table = simulated_measurements(robot, plan, job.params.seed, name)
-    write_campaign(job.params.folder, document, table, robot.joints)
+    write_campaign(Path(job.output.document).parent, document, table, robot.joints)
 
 
 run(simulate_campaign, snakemake)

@@ -79,7 +79,7 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
     dict
     """
     before, after = lack_of_fit(declared, case.observations), lack_of_fit(final, case.observations)
-    tested = int(np.isfinite(looks["p_value"][looks["look"] == 0]).sum())
+    tested = len(set(looks["candidate"][(looks["look"] == 0) & np.isfinite(looks["p_value"])]))
     decisive = [fault for fault in faults if fault["decisive"]]
     missing = declared.discrepancy_m, final.discrepancy_m
     evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive))
