@@ -183,14 +183,9 @@ def test_a_file_among_the_campaigns_is_a_campaign(config, campaigns_folder):
     assert campaign_sources(of_one_campaign(config, "another"), campaigns_folder)["another"]["poses"] == 9
 
 
-ONE_OF = pytest.mark.xfail(
-    strict=True, reason="the schema's oneOf names neither the key nor what is allowed, but the whole document"
-)
-
-
 @pytest.mark.parametrize(
     "fault",
-    [pytest.param(fault, marks=() if "robot" in fault else ONE_OF) for fault in FAULTY_SOURCES],
+    FAULTY_SOURCES,
 )
 def test_fault_in_a_campaigns_file_is_one_line_that_names_it(fault, config, campaigns_folder):
     changes, key, words = FAULTY_SOURCES[fault]
