@@ -13,7 +13,7 @@ from elastocal.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting import fit
 from elastocal.model import circumstances, effect_columns, linearize
-from elastocal.screening import absorbed, cross_validated_gain, directions, leverage_adjusted, score
+from elastocal.screening import absorbed, cross_validated_gains, directions, leverage_adjusted, score
 
 TARGET = (Target("A", "6DoF", None),)
 REPLICATES = 199
@@ -143,7 +143,7 @@ def test_planted_effect_of_noncentrality_100_is_found(base, key):
     best = max(range(len(found.columns)), key=lambda index: scores.bic_gain[index])
     cosines = [np.linalg.svd(found.columns[best].T @ found.columns[index])[1][0] for index in planted]
     assert best in planted or max(cosines) > 0.7
-    gain, error = max(cross_validated_gain(found, index, 5) for index in planted)
+    gain, error = max(zip(*cross_validated_gains(found, planted, 5), strict=True))
     assert gain > 2 * error > 0
 
 
@@ -152,7 +152,7 @@ def test_gain_is_negative_in_the_mean_where_nothing_is_missing(nothing_missing):
         gains = []
         for found, _ in nothing_missing:
             index = next(i for i, (candidate, _) in enumerate(found.candidates) if candidate.key == key)
-            gains.append(cross_validated_gain(found, index, 5)[0])
+            gains.append(cross_validated_gains(found, [index], 5)[0][0])
         assert np.mean(gains) < 0, key
         assert np.mean(np.array(gains) > 0) < 0.5
 
@@ -168,7 +168,7 @@ def test_gain_is_that_of_fits_without_each_fold(base):
         for basis, sign in ((found.model, 1), (both, -1)):
             values = np.linalg.lstsq(basis[~out], found.residual[~out])[0]
             per_row[out] += sign * (found.residual[out] - basis[out] @ values) ** 2
-    gain, error = cross_validated_gain(found, 0, 5)
+    (gain,), (error,) = cross_validated_gains(found, [0], 5)
     np.testing.assert_allclose(gain, per_row.sum(), rtol=1e-5)
     per_pose = np.array([per_row[found.cluster == pose].sum() for pose in range(30)])
     np.testing.assert_allclose(error, np.sqrt(30) * per_pose.std(ddof=1), rtol=1e-5)

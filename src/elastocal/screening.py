@@ -236,40 +236,49 @@ def leverage_adjusted(found):
     return adjusted
 
 
-def cross_validated_gain(found, winner, folds):
-    """How much better a candidate predicts poses that were left out.
+def cross_validated_gains(found, candidates, folds):
+    """How much better candidates, each alone, predict poses that were left out.
 
     Parameters
     ----------
     found : Directions
-    winner : int
+    candidates : sequence of int
+        Which of the candidates.
     folds : int
 
     Returns
     -------
-    gain, std_error : float
+    gains, std_errors : ndarray (K,)
         Fall of the squared whitened error, summed over all poses, and its standard error over poses.
     """
-    basis = np.concatenate([found.model, found.columns[winner]], axis=1)
-    before = found.model.shape[1]
-    whole, along = np.eye(basis.shape[1]), basis.T @ found.residual
+    model, residual = found.model, found.residual
+    columns = [found.columns[index] for index in candidates]
+    ends = np.cumsum([part.shape[1] for part in columns])
+    together = np.concatenate(columns, axis=1)
+    along = together.T @ residual
     # Neighbouring numbers often mean neighbouring poses: deal them out in turn.
     fold = found.cluster % folds
-    gain = np.zeros(len(found.residual))
+    gains = np.zeros((len(columns), len(residual)))
     for number in range(folds):
         out = np.flatnonzero(fold == number)
-        left = basis[out]
+        known, made, seen = model[out], together[out], residual[out]
         # The columns are orthonormal over all poses: what is left of them without a fold is the identity less its share.
-        rest = whole - left.T @ left
-        rest[np.diag_indices_from(rest)] += _ROUNDING
-        right = along - left.T @ found.residual[out]
-        factor = np.linalg.cholesky(rest)
-        # The factor of the model alone is the leading block of the factor of both.
-        for count, sign in ((before, 1.0), (len(whole), -1.0)):
-            solved = cho_solve((factor[:count, :count], True), right[:count])
-            gain[out] += sign * (found.residual[out] - left[:, :count] @ solved) ** 2
-    per_pose = np.bincount(found.cluster, gain)
-    return float(per_pose.sum()), float(np.sqrt(len(per_pose)) * per_pose.std(ddof=1))
+        factor = _inflated_factor(np.eye(model.shape[1]) - known.T @ known)
+        error = seen + known @ cho_solve(factor, known.T @ seen)
+        beyond = made + known @ cho_solve(factor, known.T @ made)
+        right = along - made.T @ error
+        for candidate, (end, part) in enumerate(zip(ends, columns, strict=True)):
+            mine = slice(end - part.shape[1], end)
+            solved = cho_solve(_inflated_factor(np.eye(part.shape[1]) - made[:, mine].T @ beyond[:, mine]), right[mine])
+            gains[candidate, out] = error**2 - (error - beyond[:, mine] @ solved) ** 2
+    per_pose = np.array([np.bincount(found.cluster, gain) for gain in gains])
+    return per_pose.sum(axis=1), np.sqrt(per_pose.shape[1]) * per_pose.std(axis=1, ddof=1)
+
+
+def _inflated_factor(matrix):
+    """Cholesky factor of a matrix that rounding may have made singular."""
+    inflated = matrix + _ROUNDING * np.eye(len(matrix))
+    return np.linalg.cholesky(inflated), True
 
 
 def _bic_gain(statistic, rest, parameters, rows):

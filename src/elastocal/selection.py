@@ -6,12 +6,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from elastocal.fitting import Fit, fit
-from elastocal.screening import Directions, Scores, absorbed, cross_validated_gain, directions, score
+from elastocal.screening import Directions, Scores, absorbed, cross_validated_gains, directions, score
 
 FAMILY_WISE_LEVEL = 0.05
 # An effect that is chosen must predict poses that were left out better, by this many standard errors.
 _GAIN_STD_ERRORS = 1.0
-_FOLDS = 10
+FOLDS = 10
 # Exact refits; each finds what the linear look before it could not see.
 _ROUNDS = 4
 # Up to so many chosen effects are weighed against each single one that could stand for all of them.
@@ -147,9 +147,9 @@ def _look(seen, replicates, stream):
     for index in np.argsort(-scores.bic_gain):
         if scores.p_family[index] >= FAMILY_WISE_LEVEL:
             continue
-        gain, std_error = cross_validated_gain(seen, index, _FOLDS)
+        (gain,), (std_error,) = cross_validated_gains(seen, [index], FOLDS)
         if gain > _GAIN_STD_ERRORS * std_error:
-            return Look(seen, scores, int(index), gain, std_error, tuple(refused))
+            return Look(seen, scores, int(index), float(gain), float(std_error), tuple(refused))
         refused.append(seen.candidates[index][0].key)
     return Look(seen, scores, None, refused=tuple(refused))
 

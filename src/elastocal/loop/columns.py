@@ -5,6 +5,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaign import Readings
 from elastocal.model import Estimate, parameters
+from elastocal.screening import cross_validated_gains
+from elastocal.selection import FOLDS
 from elastocal.study.columns import COMPONENT_NAMES, WRENCH_NAMES
 
 IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
@@ -134,6 +136,11 @@ def look_blocks(looks, candidates):
         block["parameters"] = np.concatenate([look.scores.parameters, np.zeros(len(left))])
         for name in ("statistic", "p_value", "p_family", "bic_gain"):
             block[name] = np.concatenate([getattr(look.scores, name), untested])
+        gains = np.full((2, count), np.nan)
+        if count and not number:
+            gains = np.array(cross_validated_gains(look.directions, range(count), FOLDS))
+        for name, values in zip(("heldout_gain", "heldout_gain_std_error"), gains, strict=True):
+            block[name] = np.concatenate([values, untested])
         block["retained"] = np.concatenate([look.directions.retained, untested])
         block["noncentrality"] = np.concatenate([look.directions.noncentrality, untested])
         block["chosen"] = np.arange(count + len(left)) == (-1 if look.chosen is None else look.chosen)

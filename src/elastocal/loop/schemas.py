@@ -72,6 +72,10 @@ LOOKS = TableSchema(
         Column("p_value", "float64", "", "of this test alone", missing=True),
         Column("p_family", "float64", "", "of the smallest p-value of all candidates, by a bootstrap over poses", missing=True),
         Column("bic_gain", "float64", "", "by how much the extended Bayesian criterion falls", missing=True),
+        Column(
+            "heldout_gain", "float64", "", "cross-validated fall of the squared whitened error; first look only", missing=True
+        ),
+        Column("heldout_gain_std_error", "float64", "", "its standard error over poses", missing=True),
         Column("retained", "float64", "", "share of the sensitivities that the model does not make itself", missing=True),
         Column("noncentrality", "float64", "", "of the test if the effect had its plausible size", missing=True),
         Column("chosen", "bool", "", "whether this look took the candidate"),
