@@ -13,19 +13,12 @@ from elastocal.campaign import Target, read_campaign
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting import Fit, fit
 from elastocal.loop.case import case_from, noise_facts, noise_from
-from elastocal.loop.columns import (
-    correlation_columns,
-    estimate_from,
-    found_columns,
-    look_blocks,
-    parameter_columns,
-    reading_columns,
-    readings_from,
-    rival_blocks,
-)
 from elastocal.loop.conclude import attributions_from, candidate_columns
+from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
 from elastocal.loop.intake import taken_in
+from elastocal.loop.reading_columns import reading_columns, readings_from
 from elastocal.loop.schemas import CORRELATIONS, FOUND, LOOKS, PARAMETERS, RIVALS, readings
+from elastocal.loop.search_columns import found_columns, look_blocks, rival_blocks
 from elastocal.model import parameters
 from elastocal.noise import Noise
 from elastocal.selection import Search, search

@@ -11,11 +11,11 @@ from elastocal.attribution import Attribution
 from elastocal.fitting import fit
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.loop.case import case_from, noise_facts
-from elastocal.loop.columns import reading_columns
 from elastocal.loop.conclude import concluded
 from elastocal.loop.declared import noise_of
 from elastocal.loop.experiment import proposal_frame
 from elastocal.loop.intake import taken_in
+from elastocal.loop.reading_columns import reading_columns
 from elastocal.noise import Noise
 
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))

@@ -13,9 +13,9 @@ from elastocal.fitting import fit
 from elastocal.held_out import METRICS
 from elastocal.kinematics import poses, poses_and_jacobians
 from elastocal.loop.case import case_from
-from elastocal.loop.columns import reading_columns
 from elastocal.loop.intake import taken_in
 from elastocal.loop.judge import Step, controls, judged, model_steps, residual_blocks
+from elastocal.loop.reading_columns import reading_columns
 from elastocal.model import joint_compliances
 from elastocal.noise import Noise
 

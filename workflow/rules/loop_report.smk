@@ -1,7 +1,7 @@
 """What the loop shows of a campaign: figures of its residuals, candidates and errors, and the report for whoever asked for it.
 
-Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Writes reports/loop/{campaign}/figures/*.pdf and *.png, and
-reports/loop/{campaign}/report.pdf.
+Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Writes reports/loop/{campaign}/figures/*.pdf and *.png,
+reports/loop/{campaign}/report.pdf and, of the study too, the pictures of the README.
 """
 
 
@@ -106,3 +106,18 @@ rule compile_loop_report:
         replicates=config["loop"]["replicates"],
     script:
         "../scripts/compile_loop_report.py"
+
+
+rule pictures:
+    input:
+        figures=expand("reports/figures/{figure}.png", figure=FIGURES),
+        loop=expand("reports/loop/kuka_extended_end_effector/figures/{figure}.png", figure=["arrows", "candidates"]),
+    output:
+        figures=expand("docs/{figure}.png", figure=FIGURES),
+        loop=expand("docs/loop_{figure}.png", figure=["arrows", "candidates"]),
+    log:
+        "results/logs/pictures.log",
+    benchmark:
+        "results/timings/pictures.tsv"
+    shell:
+        "(cp {input.figures} docs/; for one in {input.loop}; do cp $one docs/loop_$(basename $one); done) 2> {log}"

@@ -48,16 +48,3 @@ rule compile_report:
         figures=FIGURES,
     script:
         "../scripts/compile_report.py"
-
-
-rule pictures:
-    input:
-        figures=expand("reports/figures/{figure}.png", figure=FIGURES),
-    output:
-        pictures=expand("docs/{figure}.png", figure=FIGURES),
-    log:
-        "results/logs/pictures.log",
-    benchmark:
-        "results/timings/pictures.tsv"
-    shell:
-        "cp {input.figures} docs/ 2> {log}"

@@ -2,7 +2,7 @@
 
 from elastocal.fitting import fit
 from elastocal.loop.case import noise_from
-from elastocal.loop.columns import correlation_columns, parameter_columns
+from elastocal.loop.fit_columns import correlation_columns, parameter_columns
 from elastocal.loop.opened import opened_case, opened_json
 from elastocal.loop.schemas import CORRELATIONS, PARAMETERS
 from elastocal.provenance import provenance

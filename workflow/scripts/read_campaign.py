@@ -3,8 +3,8 @@
 import json
 
 from elastocal.frames import write_text
-from elastocal.loop.columns import reading_columns
 from elastocal.loop.intake import taken_in
+from elastocal.loop.reading_columns import reading_columns
 from elastocal.loop.schemas import readings
 from elastocal.provenance import provenance
 from elastocal.storage import write_table

@@ -3,9 +3,10 @@
 import sys
 
 from elastocal.attribution import confounding
-from elastocal.loop.columns import confounding_columns, correlation_columns, found_columns, look_blocks, parameter_columns
+from elastocal.loop.fit_columns import correlation_columns, parameter_columns
 from elastocal.loop.opened import opened_case, opened_fit, opened_json
 from elastocal.loop.schemas import CONFOUNDING, CORRELATIONS, FOUND, LOOKS, PARAMETERS
+from elastocal.loop.search_columns import confounding_columns, found_columns, look_blocks
 from elastocal.provenance import provenance
 from elastocal.random_streams import stream
 from elastocal.selection import search

@@ -2,10 +2,10 @@
 
 from elastocal.attribution import attribute
 from elastocal.frames import write_csv
-from elastocal.loop.columns import rival_blocks
 from elastocal.loop.experiment import proposal_frame
 from elastocal.loop.opened import opened_case, opened_fit
 from elastocal.loop.schemas import FOUND, RIVALS
+from elastocal.loop.search_columns import rival_blocks
 from elastocal.provenance import provenance
 from elastocal.random_streams import stream
 from elastocal.storage import read_table, write_table

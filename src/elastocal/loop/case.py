@@ -7,7 +7,8 @@ import numpy as np
 from elastocal.campaign import Campaign, described_campaign
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting import fit
-from elastocal.loop.columns import estimate_from, readings_from
+from elastocal.loop.fit_columns import estimate_from
+from elastocal.loop.reading_columns import readings_from
 from elastocal.model import Model, declared_model
 from elastocal.noise import Noise
 from elastocal.observations import Observations, averaged

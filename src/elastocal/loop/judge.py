@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.fitting import fit, fit_frames
 from elastocal.held_out import METRICS, grown, intervals, noise_floor, position_errors, summary
-from elastocal.loop.columns import residual_columns
+from elastocal.loop.reading_columns import residual_columns
 from elastocal.model import circumstances, measured_in_base, residuals
 from elastocal.observations import each_approach
 from elastocal.random_streams import stream

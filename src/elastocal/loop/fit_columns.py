@@ -1,0 +1,85 @@
+"""Fits to columns of tables and back."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.model import Estimate, parameters
+
+_FIT = "fit"
+
+
+def parameter_columns(fitted):
+    """Columns of the parameters table of a fit."""
+    named = parameters(fitted.model, fitted.estimate)
+    values = _absolute_values(fitted.model, fitted.estimate)
+    return {
+        "owner": [owner for owner, _ in named] + [_FIT],
+        "parameter": [parameter.name for _, parameter in named] + ["discrepancy"],
+        "unit": [parameter.unit for _, parameter in named] + ["m"],
+        "value": np.append(values, fitted.discrepancy_m),
+        "std_error": np.append(np.sqrt(np.diag(fitted.covariance)), np.nan),
+        "held": np.append(fitted.held, False),
+        "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named] + [np.nan]),
+    }
+
+
+def correlation_columns(fitted):
+    """Columns of the correlations table of a fit: every pair of parameters that are not held."""
+    named = [f"{owner} {parameter.name}" for owner, parameter in parameters(fitted.model, fitted.estimate)]
+    free = np.flatnonzero(~fitted.held)
+    deviation = np.sqrt(np.diag(fitted.covariance))[free]
+    correlation = fitted.covariance[np.ix_(free, free)] / np.outer(deviation, deviation)
+    rows, columns = np.tril_indices(len(free), -1)
+    return {
+        "one": [named[free[row]] for row in rows],
+        "other": [named[free[column]] for column in columns],
+        "correlation": correlation[rows, columns],
+    }
+
+
+def estimate_from(columns, model, sessions):
+    """The estimate of a model, and the discrepancy of its fit, from the columns of the parameters table.
+
+    Parameters
+    ----------
+    columns : dict of str to ndarray
+    model : Model
+    sessions : sequence of int
+
+    Returns
+    -------
+    Estimate
+    discrepancy_m : float
+    """
+    values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
+
+    def placed(owner, default):
+        shift = [values.get((owner, name), missing) for name, missing in zip(("dx", "dy", "dz"), default, strict=True)]
+        return shift, Rotation.from_rotvec([values.get((owner, name), 0.0) for name in ("rx", "ry", "rz")]).as_matrix()
+
+    frames = [placed(f"frame {session}", (0.0, 0.0, 0.0)) for session in sessions]
+    targets = [placed(f"target {target.name}", target.offset_m or (0.0, 0.0, 0.0)) for target in model.targets]
+    estimate = Estimate(
+        tuple(int(session) for session in sessions),
+        np.array([turn for _, turn in frames]),
+        np.array([shift for shift, _ in frames]),
+        np.array([shift for shift, _ in targets]),
+        np.array([turn for _, turn in targets]),
+        tuple(np.array([values[effect.key, p.name] for p in effect.parameters]) for effect in model.effects),
+        tuple(np.array([values[effect.key, s.name] for s in effect.shapes]) for effect in model.effects),
+    )
+    return estimate, float(values[_FIT, "discrepancy"])
+
+
+def _absolute_values(model, estimate):
+    parts = []
+    if model.fitted_frames:
+        for shift, turn in zip(estimate.frame_position, estimate.frame_rotation, strict=True):
+            parts += [shift, Rotation.from_matrix(turn).as_rotvec()]
+    for number, target in enumerate(model.targets):
+        if target.offset_m is None:
+            parts.append(estimate.target_offset[number])
+            if model.rows == 6:
+                parts.append(Rotation.from_matrix(estimate.target_rotation[number]).as_rotvec())
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([*parts, *effects]) if parts or effects else np.zeros(0)
