@@ -119,6 +119,7 @@ def test_effects_are_gathered_in_the_order_in_which_their_names_come(fanuc):
 
 FAR, NEAR = CONFOUNDED_DEG + 1, CONFOUNDED_DEG - 1
 RIVALS = {
+    "fits as well but makes something else": (75.0, 1.0, 2, False),
     "fits as well": (FAR, CONFOUNDED_BIC - 1, 1, True),
     "fits better": (FAR, -50.0, 1, True),
     "fits worse": (FAR, CONFOUNDED_BIC + 1, 1, False),
@@ -138,7 +139,7 @@ def test_a_rival_is_an_alternative_where_it(rival):
 
 
 def test_alternatives_come_with_the_closest_first():
-    found = Attribution("e", (), 0.01, ("a", "b", "c"), np.full(3, 90.0), np.array([5.0, -3.0, 1.0]), np.ones(3, int), 1)
+    found = Attribution("e", (), 0.01, ("a", "b", "c"), np.full(3, 50.0), np.array([5.0, -3.0, 1.0]), np.ones(3, int), 1)
     assert found.alternatives == ("b", "c", "a")
 
 

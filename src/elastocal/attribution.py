@@ -12,6 +12,8 @@ from elastocal.selection import without
 CONFOUNDED_BIC = 6.0
 CONFOUNDED_DEG = 20.0
 CONFOUNDED_BIC_NEAR = 20.0
+# Beyond this angle a candidate makes less than a quarter of what was found: it may be missing too, but does not stand for it.
+UNRELATED_DEG = 60.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Attribution:
         """
         near = (self.angle_deg < CONFOUNDED_DEG) & (self.rival_parameters <= self.found_parameters)
         confounded = self.bic_difference < np.where(near, CONFOUNDED_BIC_NEAR, CONFOUNDED_BIC)
+        confounded &= self.angle_deg < UNRELATED_DEG
         order = np.argsort(self.bic_difference)
         return tuple(self.rivals[index] for index in order if confounded[index])
 

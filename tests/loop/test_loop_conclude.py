@@ -59,7 +59,7 @@ def fits(case):
 def attribution(case, key, *alternatives, angles=()):
     count = len(alternatives)
     candidate = case.candidates[key]
-    angles = np.array(angles) if angles else np.full(count, 60.0)
+    angles = np.array(angles) if angles else np.full(count, 50.0)
     return Attribution(candidate.effect, (candidate,), 0.01, alternatives, angles, np.zeros(count), np.ones(count, int), 1)
 
 
