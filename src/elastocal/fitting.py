@@ -76,7 +76,7 @@ class Fit:
         return self.whitener.apply(values * weights)
 
 
-def fit(model, observations, noise, start=None, discrepancy_m=None):
+def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discrepancy_m=0.0):
     """Fit a model.
 
     Parameters
@@ -88,6 +88,8 @@ def fit(model, observations, noise, start=None, discrepancy_m=None):
         Of this model; by `registered` without.
     discrepancy_m : float, optional
         As in `Fit`; found from the residual without.
+    likely_discrepancy_m : float
+        Where the search for it begins, which saves time and changes nothing else.
 
     Returns
     -------
@@ -96,7 +98,7 @@ def fit(model, observations, noise, start=None, discrepancy_m=None):
     start = registered(model, observations) if start is None else start
     if discrepancy_m is not None:
         return _robustly(model, observations, noise, start, discrepancy_m)
-    discrepancy = 0.0
+    discrepancy = likely_discrepancy_m
     found = _robustly(model, observations, noise, start, discrepancy)
     for _ in range(_DISCREPANCY_ROUNDS):
         before, discrepancy = discrepancy, _discrepancy(found, observations)

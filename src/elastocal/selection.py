@@ -165,7 +165,7 @@ def _refitted(fitted, observations, added):
     effects = [candidate for candidate, _ in added]
     model, start = fitted.model.with_effects(effects), fitted.estimate.with_effects(effects)
     shapes = (*fitted.estimate.shapes, *(np.array(values, float) for _, values in added))
-    return fit(model, observations, fitted.noise, replace(start, shapes=shapes))
+    return fit(model, observations, fitted.noise, replace(start, shapes=shapes), None, fitted.discrepancy_m)
 
 
 def _with_noise_of(fitted, other):

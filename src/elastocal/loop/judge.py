@@ -184,7 +184,8 @@ def residual_blocks(steps, case, held_out):
 
 def _with(case, noise, declared, added):
     model = case.model.with_effects(added)
-    return fit(model, case.observations, noise, declared.estimate.with_effects(added))
+    start = declared.estimate.with_effects(added)
+    return fit(model, case.observations, noise, start, None, declared.discrepancy_m)
 
 
 def _placed(fitted, case, part):
