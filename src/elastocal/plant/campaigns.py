@@ -1,0 +1,237 @@
+"""Campaigns of a physical robot: what is done, what is read, the folder that an analyst gets, and the truth that he does not."""
+
+import hashlib
+import json
+import platform
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from elastocal.campaign import write_campaign
+from elastocal.plant.physical_robot import Schedule, seen_poses
+from elastocal.plant.tracker import rotation_vector
+from elastocal.whole_files import appearing_whole
+
+COVARIATES = ("approach", "time", "temperature")
+
+
+@dataclass(frozen=True)
+class Design:
+    """How a campaign is made, and what is written down of it.
+
+    Attributes
+    ----------
+    poses : int
+    held_out : int
+        The last poses, which no step of the analysis may see before its last.
+    force_N : float
+        Largest force; its direction is random in each pose.
+    ladder : tuple of float
+        Shares of it, 0 first: each is a load.
+    lever_m : tuple of float
+        From the flange to where the force acts, base axes.
+    repeats, repeated_poses : int
+        How often loads 0 and 1 of the first poses are read.
+    approach_each_load : bool
+        Whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
+    seconds_per_state : float
+    points : tuple of str
+        Measuring points with a target each; empty for all.
+    covariates : tuple of str
+        Which of `COVARIATES` are written down.
+    declared_noise : (float, float) or None
+        Standard deviations that the campaign claims, m and rad; right or wrong.
+    declared : tuple of str
+        Effects that the campaign says its model has.
+    measured : {"pose", "position"}
+    frame : {"base", "tracker"}
+    """
+
+    poses: int = 30
+    held_out: int = 9
+    force_N: float = 1000.0
+    ladder: tuple = (0.0, 1.0, 0.5, -0.5, -1.0)
+    lever_m: tuple = (0.0, 0.5, 0.0)
+    repeats: int = 4
+    repeated_poses: int = 10
+    approach_each_load: bool = True
+    seconds_per_state: float = 25.0
+    points: tuple = ()
+    covariates: tuple = COVARIATES
+    declared_noise: tuple | None = None
+    declared: tuple = ()
+    measured: str = "pose"
+    frame: str = "base"
+
+
+def stream(seed, purpose):
+    """Random numbers for one purpose: numpy Generator that depends on the two alone."""
+    digest = hashlib.sha256(f"plant/{seed}/{purpose}".encode()).digest()
+    return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
+
+
+def schedule_of(arm, design, seed):
+    """Draw what is done.
+
+    Parameters
+    ----------
+    arm : Arm
+    design : Design
+    seed : int
+
+    Returns
+    -------
+    Schedule
+    """
+    draws = stream(seed, "schedule")
+    low, high = arm.limits.T
+    angles = low + (high - low) * draws.random((design.poses, arm.joints))
+    direction = draws.standard_normal((design.poses, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    states, approach, previous = [], [], []
+    for pose in range(design.poses):
+        for repeat in range(design.repeats if pose < design.repeated_poses else 1):
+            for load in range(len(design.ladder) if repeat == 0 else min(2, len(design.ladder))):
+                fresh = design.approach_each_load or load == 0
+                previous.append(-1 if fresh else len(states) - 1)
+                approach.append(approach[-1] + fresh if approach else 0)
+                states.append((pose, load, repeat))
+    pose, load, repeat = np.array(states).T
+    approach = np.array(approach)
+    sense = draws.choice([-1, 1], (approach[-1] + 1, arm.joints))[approach]
+    force = design.force_N * np.array(design.ladder)[load, None] * direction[pose]
+    lever = np.broadcast_to(np.array(design.lever_m), force.shape)
+    time = design.seconds_per_state * np.arange(1, len(states) + 1)
+    training = pose < design.poses - design.held_out
+    return Schedule(
+        angles[pose], force, lever, pose, load, repeat, approach, sense, np.array(previous), time, training, int(seed)
+    )
+
+
+def measured_table(robot, design, schedule):
+    """Columns of the file of measurements.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    design : Design
+    schedule : Schedule
+
+    Returns
+    -------
+    table : dict of str to ndarray
+    outliers : list of (int, str)
+        State and target of every reading that is one.
+    """
+    position, rotation = seen_poses(robot, schedule)
+    position, rotation, outlier = robot.tracker.read(position, rotation, stream(schedule.seed, "readings"))
+    if design.frame == "tracker":
+        position, rotation = robot.tracker.in_own_frame(position, rotation)
+    arm, shown = robot.arm, robot.arm.shown_angles(schedule.angle)
+    joints, wrench = range(1, arm.joints + 1), schedule.shown_wrench
+    points = design.points or arm.points
+    common = {"pose": schedule.pose, "load": schedule.load, "repeat": schedule.repeat}
+    after = {f"q{j}": shown[:, j - 1] for j in joints} | dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench.T, strict=True))
+    covariates = {
+        "approach": {f"approach{j}": schedule.sense[:, j - 1].astype(float) for j in joints},
+        "time": {"time_s": schedule.time_s},
+        "temperature": {"temperature_c": robot.warmth.shown(schedule.time_s)},
+    }
+    parts = []
+    for name in points:
+        target = arm.points.index(name)
+        part = common | {"target": np.full(len(wrench), name)} | after | dict(zip("xyz", position[:, target].T, strict=True))
+        if design.measured == "pose":
+            part |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[:, target]).T, strict=True))
+        for covariate in design.covariates:
+            part |= covariates[covariate]
+        parts.append(part)
+    table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+    # Minus zero would tell of the sign of the load that the ladder takes at zero.
+    table = {name: column + 0.0 if column.dtype.kind == "f" else column for name, column in table.items()}
+    return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if arm.points[target] in points]
+
+
+def campaign_document(name, robot_name, arm, design):
+    """Contents of campaign.yaml; nothing in it depends on the defects."""
+    document = {
+        "campaign": name,
+        "robot": robot_name,
+        "measured": design.measured,
+        "frame": design.frame,
+        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.points or arm.points},
+        "compliance": "identify",
+        "declared": list(design.declared),
+        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
+    }
+    if design.declared_noise is not None:
+        document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
+    return document
+
+
+def write_blind_campaign(folder, name, robot_name, robot, design, seed, kind="parquet"):
+    """Measure, and write what the analyst gets.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The campaign's own.
+    name : str
+        Of the campaign; must not give the truth away.
+    robot_name : str
+        Robot file in config/robots.
+    robot : PhysicalRobot
+    design : Design
+    seed : int
+    kind : {"parquet", "csv"}
+
+    Returns
+    -------
+    dict
+        What a truth document says of the making of the data.
+    """
+    schedule = schedule_of(robot.arm, design, seed)
+    table, outliers = measured_table(robot, design, schedule)
+    write_campaign(folder, campaign_document(name, robot_name, robot.arm, design), table, robot.arm.joints, kind)
+    return {
+        "campaign": name,
+        "robot": robot_name,
+        "seed": int(seed),
+        "design": asdict(design),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+        "noise": {"sigma_m": robot.tracker.sigma_m, "sigma_m_per_m": robot.tracker.sigma_m_per_m, "sigma_rad": robot.tracker.sigma_rad},
+        "outliers": [list(outlier) for outlier in outliers],
+        "readings": len(table["pose"]),
+        "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
+    }
+
+
+def write_truth(path, truth, campaign_folder):
+    """Seal a truth document: sorted JSON, outside of the campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+    truth : dict
+    campaign_folder : str or Path
+
+    Returns
+    -------
+    str
+        SHA-256 of the file, to be published before any diagnosis.
+
+    Raises
+    ------
+    ValueError
+        The file would lie in the campaign's folder.
+    """
+    path, folder = Path(path), Path(campaign_folder)
+    if folder.resolve() in path.resolve().parents:
+        raise ValueError(f"{path}: the truth must not lie in the campaign's folder {folder}")
+    text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.write(text)
+    return hashlib.sha256(text.encode()).hexdigest()

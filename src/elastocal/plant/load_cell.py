@@ -1,0 +1,72 @@
+"""What the flange feels when the load cell shows the wanted force.
+
+The experimenter pulls until the display shows what the plan says; a cell that errs makes the flange feel something else. So the
+campaign holds what was shown, and the arm deflects by what was felt: the felt force solves shown = cell(felt).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.plant.arm import turned
+
+_SWEEPS = 40
+
+
+@dataclass(frozen=True)
+class LoadCell:
+    """A cell between the pull and the flange, and where it pulls. The default is perfect.
+
+    Attributes
+    ----------
+    scale : float
+        Shown = (1 + scale) felt.
+    turn_rad : tuple of float
+        Rotation vector by which the cell is mounted askew: it shows R(turn)^T felt.
+    bias_N : tuple of float
+        Shown without a force. It is not zeroed between poses.
+    shift_m : tuple of float
+        Where the force really acts, from where the plan says.
+    crosstalk_per_N : float
+        Quadratic: shown x gets k F_y F_z, and so on round the axes.
+    in_flange : bool
+        Whether turn, bias and shift are fixed in the flange's axes rather than in the base's.
+    """
+
+    scale: float = 0.0
+    turn_rad: tuple = (0.0, 0.0, 0.0)
+    bias_N: tuple = (0.0, 0.0, 0.0)
+    shift_m: tuple = (0.0, 0.0, 0.0)
+    crosstalk_per_N: float = 0.0
+    in_flange: bool = False
+
+    def shown(self, felt):
+        """Force on the display, in the cell's axes, for the force that the flange feels (S, 3), N."""
+        crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
+        return (1.0 + self.scale) * felt @ turned(np.array(self.turn_rad)) + np.array(self.bias_N) + crossed
+
+    def felt(self, force, lever, flange_rotation):
+        """Wrench on the flange.
+
+        Parameters
+        ----------
+        force : ndarray (S, 3)
+            As shown, N, base axes; a row of zeros where nothing pulls.
+        lever : ndarray (S, 3)
+            From the flange's origin to where the plan lets the force act, m, base axes.
+        flange_rotation : ndarray (S, 3, 3)
+
+        Returns
+        -------
+        ndarray (S, 6)
+            N, N m at the flange's origin, base axes.
+        """
+        axes = flange_rotation if self.in_flange else np.broadcast_to(np.eye(3), flange_rotation.shape)
+        wanted = np.einsum("sji,sj->si", axes, force)
+        found = wanted.copy()
+        for _ in range(_SWEEPS):
+            found += wanted - self.shown(found)
+        loaded = force.any(axis=1)[:, None]
+        felt = np.where(loaded, np.einsum("sij,sj->si", axes, found), 0.0)
+        arm = lever + axes @ np.array(self.shift_m)
+        return np.concatenate([felt, np.cross(arm, felt)], axis=1)
