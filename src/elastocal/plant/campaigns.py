@@ -1,18 +1,12 @@
-"""Campaigns of a physical robot: what is done, what is read, the folder that an analyst gets, and the truth that he does not."""
+"""Campaigns of a physical robot: what is done with it, and the table of what is read."""
 
-import hashlib
-import json
-import platform
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
-from elastocal.campaign import write_campaign
 from elastocal.plant.physical_robot import Schedule, seen_poses
+from elastocal.plant.random_numbers import stream
 from elastocal.plant.tracker import rotation_vector
-from elastocal.whole_files import appearing_whole
 
 COVARIATES = ("approach", "time", "temperature")
 
@@ -64,12 +58,6 @@ class Design:
     declared: tuple = ()
     measured: str = "pose"
     frame: str = "base"
-
-
-def stream(seed, purpose):
-    """Random numbers for one purpose: numpy Generator that depends on the two alone."""
-    digest = hashlib.sha256(f"plant/{seed}/{purpose}".encode()).digest()
-    return np.random.Generator(np.random.PCG64(int.from_bytes(digest[:16], "little")))
 
 
 def schedule_of(arm, design, seed):
@@ -149,89 +137,8 @@ def measured_table(robot, design, schedule):
             part |= covariates[covariate]
         parts.append(part)
     table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-    # Minus zero would tell of the sign of the load that the ladder takes at zero.
-    table = {name: column + 0.0 if column.dtype.kind == "f" else column for name, column in table.items()}
+    # State by state, as a tracker goes round its targets.
+    order = np.argsort(np.tile(np.arange(len(wrench)), len(points)), kind="stable")
+    # Minus zeros are products of the ladder's zero and mean nothing.
+    table = {name: column[order] + 0.0 if column.dtype.kind == "f" else column[order] for name, column in table.items()}
     return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if arm.points[target] in points]
-
-
-def campaign_document(name, robot_name, arm, design):
-    """Contents of campaign.yaml; nothing in it depends on the defects."""
-    document = {
-        "campaign": name,
-        "robot": robot_name,
-        "measured": design.measured,
-        "frame": design.frame,
-        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.points or arm.points},
-        "compliance": "identify",
-        "declared": list(design.declared),
-        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
-    }
-    if design.declared_noise is not None:
-        document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
-    return document
-
-
-def write_blind_campaign(folder, name, robot_name, robot, design, seed, kind="parquet"):
-    """Measure, and write what the analyst gets.
-
-    Parameters
-    ----------
-    folder : str or Path
-        The campaign's own.
-    name : str
-        Of the campaign; must not give the truth away.
-    robot_name : str
-        Robot file in config/robots.
-    robot : PhysicalRobot
-    design : Design
-    seed : int
-    kind : {"parquet", "csv"}
-
-    Returns
-    -------
-    dict
-        What a truth document says of the making of the data.
-    """
-    schedule = schedule_of(robot.arm, design, seed)
-    table, outliers = measured_table(robot, design, schedule)
-    write_campaign(folder, campaign_document(name, robot_name, robot.arm, design), table, robot.arm.joints, kind)
-    return {
-        "campaign": name,
-        "robot": robot_name,
-        "seed": int(seed),
-        "design": asdict(design),
-        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
-        "noise": {"sigma_m": robot.tracker.sigma_m, "sigma_m_per_m": robot.tracker.sigma_m_per_m, "sigma_rad": robot.tracker.sigma_rad},
-        "outliers": [list(outlier) for outlier in outliers],
-        "readings": len(table["pose"]),
-        "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
-    }
-
-
-def write_truth(path, truth, campaign_folder):
-    """Seal a truth document: sorted JSON, outside of the campaign's folder.
-
-    Parameters
-    ----------
-    path : str or Path
-    truth : dict
-    campaign_folder : str or Path
-
-    Returns
-    -------
-    str
-        SHA-256 of the file, to be published before any diagnosis.
-
-    Raises
-    ------
-    ValueError
-        The file would lie in the campaign's folder.
-    """
-    path, folder = Path(path), Path(campaign_folder)
-    if folder.resolve() in path.resolve().parents:
-        raise ValueError(f"{path}: the truth must not lie in the campaign's folder {folder}")
-    text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
-        file.write(text)
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -9,6 +9,7 @@ from elastocal.plant.drives import Visits
 from elastocal.plant.gears import GearStates, LinearSprings
 from elastocal.plant.load_cell import LoadCell
 from elastocal.plant.multibody import machine_of
+from elastocal.plant.random_numbers import stream
 from elastocal.plant.statics import Loading, equilibrium, generalized_forces
 from elastocal.plant.structure import Structure
 from elastocal.plant.tracker import EccentricNest, Tracker
@@ -75,6 +76,23 @@ class PhysicalRobot:
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     nest: EccentricNest | None = None
+
+
+def specimen(arm, seed, spread=0.15):
+    """One robot of a series: its gears are softer or stiffer than the robot file says, evenly up to a share of `spread`.
+
+    Parameters
+    ----------
+    arm : Arm
+    seed : int
+    spread : float
+
+    Returns
+    -------
+    PhysicalRobot
+        Faultless.
+    """
+    return PhysicalRobot(arm, arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints))
 
 
 @dataclass(frozen=True)

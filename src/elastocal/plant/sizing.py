@@ -105,7 +105,7 @@ class Yardstick:
         return columns
 
 
-def size_for(yardstick, robot_of_size, start, target, quantity="retained"):
+def size_for(yardstick, robot_of_size, start, target, quantity="retained", largest=np.inf):
     """Size of a defect at which its non-centrality is as wanted.
 
     Parameters
@@ -118,6 +118,8 @@ def size_for(yardstick, robot_of_size, start, target, quantity="retained"):
     target : float
         Non-centrality.
     quantity : {"retained", "raw"}
+    largest : float
+        No larger size is tried.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def size_for(yardstick, robot_of_size, start, target, quantity="retained"):
     Raises
     ------
     ValueError
-        Where no size has it to one per cent: the defect is absorbed whatever its size, or saturates.
+        No size has it to one per cent: the defect is absorbed whatever its size, saturates, or would be larger than allowed.
 
     Notes
     -----
@@ -147,5 +149,8 @@ def size_for(yardstick, robot_of_size, start, target, quantity="retained"):
             slope = np.log(value / last[1]) / np.log(size / last[0])
             exponent = slope if 0.3 < slope < 8.0 else 2.0
         last = (size, value)
-        size *= float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0))
-    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {value:.3g} of {signal.raw:.3g} raw at {size:.3g}")
+        size = min(largest, size * float(np.clip((target / value) ** (1.0 / exponent), 0.02, 50.0)))
+        if size == last[0]:
+            break
+    found = f"{value:.3g} of {signal.raw:.3g} raw at {size:.3g}"
+    raise ValueError(f"no size found for a {quantity} non-centrality of {target:g}: {found}")
