@@ -1,8 +1,8 @@
-"""Defects: everything that can be wrong with a physical robot, named as the catalogue does, or ``outside:...`` where it does not.
+"""Defects: all that can be wrong with a physical robot, named as in the catalogue, or ``outside:...`` where it is not there.
 
-A defect has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn; they
-do not change with the size. Laws are those of `gears`, `drives`, `structure`, `load_cell` and `tracker`: none is the catalogue's
-formula where a machine would do otherwise.
+A defect has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn;
+they do not change with the size. Laws are those of `gears`, `drives`, `structure`, `load_cell` and `tracker`: none is the
+catalogue's formula where a machine would do otherwise.
 """
 
 from collections.abc import Callable

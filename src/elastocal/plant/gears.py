@@ -62,8 +62,8 @@ class _AtJoint:
 class DeadBand(_AtJoint):
     """Play between flanks that only a seal's weak spring bridges: theta = D clip(tau / tau_t, -1, 1).
 
-    In series with the gear's spring, so that beyond the torque tau_t that closes the gap the flanks lie on each other and the play
-    adds a constant D, half of the gap. For tau_t -> 0 it is a true dead band.
+    In series with the gear's spring, so that beyond the torque tau_t that closes the gap the flanks lie on each other and the
+    play adds a constant D, half of the gap. For tau_t -> 0 it is a true dead band.
 
     Attributes
     ----------
@@ -179,8 +179,8 @@ class Coupling:
 class BoucWen(_AtJoint):
     """Friction that remembers: theta = h z, dz = (d tau / tau_h) (1 - |z|^m (beta sign(z d tau) + 1 - beta)).
 
-    A drive that came in the sense s arrives with z = s, the whole of its friction wound up. Each change of the load then moves z
-    along a loop that depends on the order of loads and not on their speed.
+    A drive that came in the sense s arrives with z = s, the whole of its friction wound up. Each change of the load then moves
+    z along a loop that depends on the order of loads and not on their speed.
 
     Attributes
     ----------

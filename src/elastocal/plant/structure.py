@@ -18,7 +18,7 @@ class TaperedTube:
     axial_N, shear_N : float
         E A and k G A; inf where the link does not stretch or shear.
     taper : float
-        Share of the diameter that is lost at the far end; E I and G J go with the third power of the diameter, E A with the first.
+        Share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k G A with itself.
     """
 
     bending_Nm2: float
