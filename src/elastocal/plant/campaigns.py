@@ -88,7 +88,9 @@ def schedule_of(arm, design, seed):
                 states.append((pose, load, repeat))
     pose, load, repeat = np.array(states).T
     approach = np.array(approach)
-    sense = draws.choice([-1, 1], (approach[-1] + 1, arm.joints))[approach]
+    # A repeat comes from the same side, so that it is one: what differs between repeats is then chance and not friction.
+    sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
+    sense = sense[pose, load if design.approach_each_load else 0 * load]
     force = design.force_N * np.array(design.ladder)[load, None] * direction[pose]
     lever = np.broadcast_to(np.array(design.lever_m), force.shape)
     time = design.seconds_per_state * np.arange(1, len(states) + 1)

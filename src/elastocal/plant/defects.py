@@ -331,9 +331,12 @@ def _lost_motion(robot, joints, size, draws):
 
 @_register("hysteresis", "rad", 5e-5, _each_joint, ("approach",))
 def _hysteresis(robot, joints, size, draws):
-    """Under load part of the wound-up friction turns round, so that the mean half width is less than that at rest."""
+    """Under load part of the wound-up friction turns round, so that the mean half width is less than that at rest.
+
+    The catalogue's half width is counted along the approach, and friction is against it.
+    """
     torque = _usual_torque_Nm(robot, joints[0]) * draws.uniform(2.0, 6.0)
-    return _with_gear(robot, gears.BoucWen(joints[0], size, torque)), {"half_width": size}
+    return _with_gear(robot, gears.BoucWen(joints[0], size, torque)), {"half_width": -size}
 
 
 # Load

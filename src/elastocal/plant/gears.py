@@ -177,10 +177,11 @@ class Coupling:
 
 @dataclass(frozen=True)
 class BoucWen(_AtJoint):
-    """Friction that remembers: theta = h z, dz = (d tau / tau_h) (1 - |z|^m (beta sign(z d tau) + 1 - beta)).
+    """Friction that remembers: theta = -h z, dz = (d tau / tau_h) (1 - |z|^m (beta sign(z d tau) + 1 - beta)).
 
-    A drive that came in the sense s arrives with z = s, the whole of its friction wound up. Each change of the load then moves
-    z along a loop that depends on the order of loads and not on their speed.
+    Friction holds back: an arm that came in the sense s stays behind its drive, z = s with all of its friction wound up. Each
+    change of the load then moves z along a loop that depends on the order of loads and not on their speed, the deflection
+    lagging behind the torque. h / tau_h must be less than the gear's compliance, or the arm would recede from a push.
 
     Attributes
     ----------
@@ -209,7 +210,7 @@ class BoucWen(_AtJoint):
         for state in np.flatnonzero(~fresh):
             before = states.previous[state]
             z[state] = self.moved(z[before : before + 1], torque[state : state + 1] - torque[before])[0]
-        return self.half_width_rad * z
+        return -self.half_width_rad * z
 
     def moved(self, z, change):
         """z after the torque has changed steadily by `change` (S,), by the midpoint rule."""
