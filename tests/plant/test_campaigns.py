@@ -40,8 +40,8 @@ def test_the_analysis_reads_the_folder_and_holds_out_the_designed_poses(tmp_path
     campaign = read_campaign(tmp_path / "case0", ROBOTS)
     training, held_out = split(campaign)
     schedule = schedule_of(fanuc_specimen.arm, small, 2)
-    assert set(training.readings.pose) == set(schedule.pose[schedule.training])
-    assert set(held_out.readings.pose) == set(schedule.pose[~schedule.training])
+    assert set(training.pose) == set(schedule.pose[schedule.training])
+    assert set(held_out.pose) == set(schedule.pose[~schedule.training])
     assert len(campaign.readings.pose) == 4 * len(schedule.pose)
 
 

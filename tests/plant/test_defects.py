@@ -4,13 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from analysed_robots import analysed
 
 from elastocal.effects.catalogue import effects
+from elastocal.effects.protocol import circumstances_of
 from elastocal.errors import InputError
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.observations import States
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.physical_robot import seen_poses
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import rotation_vector
+from elastocal.sites import sites_of
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))
@@ -24,8 +29,9 @@ COMPARABLE = {
     "cross_compliance": 0.02,
     "lost_motion": 0.2,
     "force_scale": 0.02,
-    "force_misalignment": 0.05,
-    "force_bias": 0.05,
+    # The plant's cell hangs in the pull, so that a wrong force brings a wrong moment; the catalogue's sits at the flange.
+    "force_misalignment": 0.15,
+    "force_bias": 0.15,
     "application_point": 0.02,
 }
 
@@ -78,17 +84,15 @@ def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(fanuc_spe
 @pytest.mark.parametrize("kind", sorted(COMPARABLE))
 def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(fanuc_specimen, schedule, kind):
     """The catalogue's law with the truth's parameters foretells what the plant does, to first order."""
-    from analysed_robots import analysed
-
-    from elastocal.effects.protocol import circumstances_of
-    from elastocal.kinematics import poses_and_jacobians
-    from elastocal.observations import States
-    from elastocal.sites import sites_of
-
-    defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), seed=3)
+    defect = drawn_defect(kind, fanuc_specimen.arm, 3)
     parameters = truth_of(fanuc_specimen, defect)["parameters"]
     states = States(
-        schedule.angle, schedule.shown_wrench, schedule.sense.astype(float), schedule.time_s, 20 + 0 * schedule.time_s
+        session=0 * schedule.pose,
+        pose=schedule.pose,
+        load=schedule.load,
+        joint_angles=schedule.angle,
+        wrench=schedule.shown_wrench,
+        repeats=1 + 0 * schedule.pose,
     )
     sites = sites_of(analysed("fanuc").chain)
     given = circumstances_of(sites, fanuc_specimen.compliance, states)
