@@ -9,15 +9,16 @@ import pytest
 from analysed_robots import ROBOTS
 
 from elastocal.campaign import read_campaign, split
-from elastocal.plant.campaigns import Design, measured_table, schedule_of
-from elastocal.plant.defects import Defect, truth_of, with_defects
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.campaigns import Design, continued, measured_table, schedule_of
+from elastocal.plant.defects import Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.folders import write_blind_campaign, write_truth
-from elastocal.plant.physical_robot import Warmth, specimen
+from elastocal.plant.physical_robot import Warmth, seen_poses, specimen
 from elastocal.plant.tracker import Tracker, rotation_vector
 
 
 def made(folder, robot, design, seed=2, **more):
-    return write_blind_campaign(folder, "case0", "fanuc", robot, design, seed, **more)
+    return write_blind_campaign(folder, "case0", "fanuc", robot, design, schedule_of(robot.arm, design, seed), **more)
 
 
 def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanuc_arm):
@@ -47,10 +48,8 @@ def test_the_analysis_reads_the_folder_and_holds_out_the_designed_poses(tmp_path
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "abb", "fanuc_cpa"])
 def test_angles_stand_in_the_folder_as_the_controller_shows_them(tmp_path, small, name):
-    from elastocal.plant.arm import arm_from_file
-
     robot = specimen(arm_from_file(ROBOTS / f"{name}.yaml"), 1)
-    write_blind_campaign(tmp_path / "c", "c", name, robot, small, 2)
+    write_blind_campaign(tmp_path / "c", "c", name, robot, small, schedule_of(robot.arm, small, 2))
     readings = read_campaign(tmp_path / "c", ROBOTS).readings
     np.testing.assert_allclose(readings.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
 
@@ -171,8 +170,6 @@ def test_castings_warm_up_behind_the_thermometer_and_reach_it():
 
 
 def test_links_grow_in_proportion_to_their_castings_warmth(fanuc_specimen, small):
-    from elastocal.plant.physical_robot import seen_poses
-
     schedule = schedule_of(fanuc_specimen.arm, small, 2)
     grown = seen_poses(replace(fanuc_specimen, expansion_per_K=1e-5), schedule)
     nominal = seen_poses(fanuc_specimen, schedule)
@@ -180,3 +177,22 @@ def test_links_grow_in_proportion_to_their_castings_warmth(fanuc_specimen, small
     share = 1e-5 * (fanuc_specimen.warmth.of_castings(schedule.time_s) - 20.0)
     np.testing.assert_allclose(grown[0][unloaded], (nominal[0] * (1 + share)[:, None, None])[unloaded], atol=1e-12)
     assert np.abs(rotation_vector(grown[1] @ np.swapaxes(nominal[1], -1, -2))[unloaded]).max() < 1e-12
+
+
+@pytest.mark.parametrize("kind", ["frame_drift", "outside:slipping_zero", "hysteresis"])
+def test_a_further_experiment_changes_no_reading_that_is_there(fanuc_specimen, small, kind):
+    robot = with_defects(fanuc_specimen, [drawn_defect(kind, fanuc_specimen.arm, 1)])
+    robot = replace(robot, tracker=replace(robot.tracker, outliers=0.05))
+    schedule = schedule_of(robot.arm, small, 2)
+    angle = np.repeat(schedule.angle[[0, -1]] * 0.5, 2, axis=0)
+    wrench = np.concatenate([schedule.shown_wrench[schedule.load == 1][:2], schedule.shown_wrench[schedule.load == 1][2:4]])
+    longer = continued(schedule, angle, wrench)
+    before, after = (measured_table(robot, small, given)[0] for given in (schedule, longer))
+    for column in before:
+        np.testing.assert_array_equal(before[column], after[column][: len(before[column])])
+    rows = slice(len(schedule.pose), None)
+    assert longer.load[rows].tolist() == [0, 1, 2, 0, 1, 2]
+    assert longer.pose[rows].tolist() == [8, 8, 8, 9, 9, 9]
+    np.testing.assert_allclose(longer.shown_wrench[rows][[1, 2, 4, 5]], wrench, atol=1e-9)
+    assert not longer.shown_wrench[rows][[0, 3]].any()
+    assert longer.training[rows].all()

@@ -1,6 +1,6 @@
 """Campaigns of a physical robot: what is done with it, and the table of what is read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -98,6 +98,57 @@ def schedule_of(arm, design, seed):
     return Schedule(
         angles[pose], force, lever, pose, load, repeat, approach, sense, np.array(previous), time, training, int(seed)
     )
+
+
+def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
+    """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    angle : ndarray (E, n)
+        rad; equal rows that follow each other are one pose.
+    wrench : ndarray (E, 6)
+        As it shall be shown, N, N m at the flange, base axes; the moment is that of the force at a lever.
+    seconds_per_state, pause_s : float
+        Pace, and how long after the last state the first one comes.
+
+    Returns
+    -------
+    Schedule
+        Each further state is approached afresh and none is held out. Each new pose starts without a load, as load 0.
+    """
+    draws = stream(schedule.seed, f"continued after {len(schedule.pose)} states")
+    angle, wrench = np.asarray(angle, float), np.asarray(wrench, float)
+    new = np.concatenate([[True], (np.diff(angle, axis=0) != 0).any(axis=1)])
+    pose = int(schedule.pose.max()) + np.cumsum(new)
+    rows, load = [], []
+    for state, first in enumerate(new):
+        if first:
+            rows.append((state, 0.0))
+            load.append(0)
+        if wrench[state].any():
+            rows.append((state, 1.0))
+            load.append(load[-1] + 1)
+    state, share = np.array([row for row, _ in rows]), np.array([share for _, share in rows])[:, None]
+    force, moment = wrench[state, :3], wrench[state, 3:]
+    square = (force**2).sum(axis=1, keepdims=True)
+    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
+    count = np.arange(1, len(state) + 1)
+    further = {
+        "angle": angle[state],
+        "force": share * force,
+        "lever": lever,
+        "pose": pose[state],
+        "load": np.array(load),
+        "repeat": np.zeros(len(state), int),
+        "approach": schedule.approach.max() + count,
+        "sense": draws.choice([-1, 1], (len(state), angle.shape[1])),
+        "previous": np.full(len(state), -1),
+        "time_s": schedule.time_s[-1] + pause_s + seconds_per_state * count,
+        "training": np.ones(len(state), bool),
+    }
+    return replace(schedule, **{name: np.concatenate([getattr(schedule, name), more]) for name, more in further.items()})
 
 
 def measured_table(robot, design, schedule):

@@ -192,6 +192,11 @@ def _usual_torque_Nm(robot, joint):  # noqa: N802 - units in names keep their ca
     return 1500.0 if joint < robot.arm.joints - 3 else 450.0
 
 
+def _drawn_frame(robot, error, draws):
+    """In the flange's axes or not, beside the errors of the load cell that are so already."""
+    return (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
+
+
 # Geometry
 
 
@@ -349,21 +354,21 @@ def _force_scale(robot, joints, size, draws):
 
 @_register("force_misalignment", "rad", 0.02, _nowhere)
 def _force_misalignment(robot, joints, size, draws):
-    turn, flange = size * _direction(draws), bool(draws.integers(2))
-    return replace(robot, cell=replace(robot.cell, turn_rad=tuple(turn), in_flange=flange)), _named("about_", turn)
+    turn, frame = size * _direction(draws), _drawn_frame(robot, "turn", draws)
+    return replace(robot, cell=replace(robot.cell, turn_rad=tuple(turn), in_flange=frame)), _named("about_", turn)
 
 
 @_register("force_bias", "N", 20.0, _nowhere)
 def _force_bias(robot, joints, size, draws):
     """What is felt beyond what is shown is minus the bias of the display."""
-    felt, flange = size * _direction(draws), bool(draws.integers(2))
-    return replace(robot, cell=replace(robot.cell, bias_N=tuple(-felt), in_flange=flange)), _named("along_", felt)
+    felt, frame = size * _direction(draws), _drawn_frame(robot, "bias", draws)
+    return replace(robot, cell=replace(robot.cell, bias_N=tuple(-felt), in_flange=frame)), _named("along_", felt)
 
 
 @_register("application_point", "m", 0.02, _nowhere)
 def _application_point(robot, joints, size, draws):
-    shift, flange = size * _direction(draws), bool(draws.integers(2))
-    return replace(robot, cell=replace(robot.cell, shift_m=tuple(shift), in_flange=flange)), _named("shift_", shift)
+    shift, frame = size * _direction(draws), _drawn_frame(robot, "shift", draws)
+    return replace(robot, cell=replace(robot.cell, shift_m=tuple(shift), in_flange=frame)), _named("shift_", shift)
 
 
 # Drift

@@ -103,10 +103,10 @@ class SlippingZero:
     share: float = 0.3
 
     def __call__(self, visits):
-        draws = np.random.default_rng([visits.seed, 7])
+        sizes, whether = (np.random.default_rng([visits.seed, 7, part]) for part in range(2))
         # Approaches are numbered in the order of time.
         number = int(visits.approach.max()) + 1
-        slips = self.step_rad * draws.standard_normal(number) * (draws.random(number) < self.share)
+        slips = self.step_rad * sizes.standard_normal(number) * (whether.random(number) < self.share)
         return _one(visits, self.joint, np.cumsum(slips)[visits.approach])
 
 

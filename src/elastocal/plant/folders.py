@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from elastocal.campaign import write_campaign
-from elastocal.plant.campaigns import measured_table, schedule_of
+from elastocal.plant.campaigns import measured_table
 from elastocal.whole_files import appearing_whole
 
 
@@ -31,7 +31,7 @@ def campaign_document(name, robot_name, arm, design):
     return document
 
 
-def write_blind_campaign(folder, name, robot_name, robot, design, seed, kind="parquet"):
+def write_blind_campaign(folder, name, robot_name, robot, design, schedule, kind="parquet"):
     """Measure, and write what the analyst gets.
 
     Parameters
@@ -44,7 +44,7 @@ def write_blind_campaign(folder, name, robot_name, robot, design, seed, kind="pa
         Robot file in config/robots.
     robot : PhysicalRobot
     design : Design
-    seed : int
+    schedule : Schedule
     kind : {"parquet", "csv"}
 
     Returns
@@ -52,13 +52,12 @@ def write_blind_campaign(folder, name, robot_name, robot, design, seed, kind="pa
     dict
         What a truth document says of the making of the data.
     """
-    schedule = schedule_of(robot.arm, design, seed)
     table, outliers = measured_table(robot, design, schedule)
     write_campaign(folder, campaign_document(name, robot_name, robot.arm, design), table, robot.arm.joints, kind)
     return {
         "campaign": name,
         "robot": robot_name,
-        "seed": int(seed),
+        "seed": schedule.seed,
         "design": asdict(design),
         "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
         "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},

@@ -29,8 +29,8 @@ class LoadCell:
         Where the force really acts, from where the plan says.
     crosstalk_per_N : float
         Quadratic: shown x gets k F_y F_z, and so on round the axes.
-    in_flange : bool
-        Whether turn, bias and shift are fixed in the flange's axes rather than in the base's.
+    in_flange : tuple of str
+        Which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
     """
 
     scale: float = 0.0
@@ -38,12 +38,14 @@ class LoadCell:
     bias_N: tuple = (0.0, 0.0, 0.0)
     shift_m: tuple = (0.0, 0.0, 0.0)
     crosstalk_per_N: float = 0.0
-    in_flange: bool = False
+    in_flange: tuple = ()
 
-    def shown(self, felt):
-        """Force on the display, in the cell's axes, for the force that the flange feels (S, 3), N."""
+    def shown(self, felt, flange_rotation):
+        """Force on the display for the force that is felt, both (S, 3), N, base axes."""
+        turn, bias, _ = self._errors(flange_rotation)
+        askew = np.einsum("sji,sj->si", turned(turn), felt)
         crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
-        return (1.0 + self.scale) * felt @ turned(np.array(self.turn_rad)) + np.array(self.bias_N) + crossed
+        return (1.0 + self.scale) * askew + bias + crossed
 
     def felt(self, force, lever, flange_rotation):
         """Wrench on the flange.
@@ -61,12 +63,15 @@ class LoadCell:
         ndarray (S, 6)
             N, N m at the flange's origin, base axes.
         """
-        axes = flange_rotation if self.in_flange else np.broadcast_to(np.eye(3), flange_rotation.shape)
-        wanted = np.einsum("sji,sj->si", axes, force)
-        found = wanted.copy()
+        found = force.copy()
         for _ in range(_SWEEPS):
-            found += wanted - self.shown(found)
-        loaded = force.any(axis=1)[:, None]
-        felt = np.where(loaded, np.einsum("sij,sj->si", axes, found), 0.0)
-        arm = lever + axes @ np.array(self.shift_m)
-        return np.concatenate([felt, np.cross(arm, felt)], axis=1)
+            found += force - self.shown(found, flange_rotation)
+        felt = np.where(force.any(axis=1)[:, None], found, 0.0)
+        return np.concatenate([felt, np.cross(lever + self._errors(flange_rotation)[2], felt)], axis=1)
+
+    def _errors(self, flange_rotation):
+        """Turn, bias and shift in base axes, (S, 3) each."""
+        named = {"turn": self.turn_rad, "bias": self.bias_N, "shift": self.shift_m}
+        turns = [flange_rotation if name in self.in_flange else np.eye(3) for name in named]
+        shape = (len(flange_rotation), 3)
+        return [np.broadcast_to(axes @ np.array(error), shape) for axes, error in zip(turns, named.values(), strict=True)]

@@ -102,11 +102,13 @@ class Tracker:
         position, rotation, outlier
             The last one bool (S, targets).
         """
+        # A generator each, so that readings that come later change none that are there.
+        chance, metres, radians = draws.spawn(3)
         sigma = self.sigma_at(position)[..., None]
-        outlier = draws.random(position.shape[:2]) < self.outliers
+        outlier = chance.random(position.shape[:2]) < self.outliers
         large = np.where(outlier, self.outlier_sigmas, 1.0)[..., None]
-        position = position + large * sigma * draws.standard_normal(position.shape)
-        turn = turned(large * self.sigma_rad * draws.standard_normal(position.shape))
+        position = position + large * sigma * metres.standard_normal(position.shape)
+        turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
         return position, turn @ rotation, outlier
 
     def sigma_at(self, position):
