@@ -25,6 +25,8 @@ LEVELS = (10.0, 25.0, 50.0, 200.0)
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
 FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
 _DRAWS = 8
+# Times the plausible size.
+_IMPLAUSIBLE = 3.0
 
 # Settings by name: what is other than usual about the design, the tracker and the drives.
 SETTINGS = {
@@ -210,36 +212,46 @@ def defects_of(case, robot, design):
     Returns
     -------
     list of (Defect, dict)
-        Each with what the truth says of its size: target, quantity, signal, draws.
+        Each with what the truth says of its size: target, quantity, signal, which draw.
 
     Notes
     -----
-    Where a place has no size of the wanted non-centrality the next one is drawn; where none of eight has, as with a wrong force
-    scale, the raw non-centrality is taken instead, and the truth says so: nothing can find that.
+    Where a place has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is drawn; of
+    eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the raw
+    non-centrality is taken instead, and the truth says so: nothing can find that.
     """
     yardstick = Yardstick(robot, schedule_of(robot.arm, design, case.seed), free_frame=design.frame == "tracker")
     found = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
-        for quantity, draw in [("retained", draw) for draw in range(_DRAWS)] + [("raw", draw) for draw in range(_DRAWS)]:
-            defect = drawn_defect(effect, robot.arm, case.seed + 1000 * order + draw)
-            try:
-                size, signal = _sized(yardstick, robot, defect, level, quantity)
-            except ValueError:
-                continue
-            share = size / KINDS[effect].plausible
-            told = {"non_centrality": level, "of": quantity, "draws": draw + 1, "share_of_plausible": share}
-            found.append((replace(defect, size=size), told | {"signal": asdict(signal)}))
-            break
-        else:
+        drawn = [drawn_defect(effect, robot.arm, case.seed + 1000 * order + draw) for draw in range(_DRAWS)]
+        sized = _first_plausible(yardstick, robot, drawn, level, "retained") or _first_plausible(
+            yardstick, robot, drawn, level, "raw"
+        )
+        if sized is None:
             raise ValueError(f"{case.key}: no {effect} has a non-centrality of {level:g}")
+        found.append(sized)
     return found
 
 
-def _sized(yardstick, robot, defect, level, quantity):
-    def robot_of_size(size):
-        return with_defects(robot, [replace(defect, size=size)])
+def _first_plausible(yardstick, robot, drawn, level, quantity):
+    """The first of the drawn defects that needs no implausible size, or else the least implausible; None where none has any."""
+    least = None
+    for number, defect in enumerate(drawn, 1):
 
-    return size_for(yardstick, robot_of_size, defect.size, level, quantity, KINDS[defect.effect].largest)
+        def robot_of_size(size, defect=defect):
+            return with_defects(robot, [replace(defect, size=size)])
+
+        try:
+            size, signal = size_for(yardstick, robot_of_size, defect.size, level, quantity, KINDS[defect.effect].largest)
+        except ValueError:
+            continue
+        share = size / KINDS[defect.effect].plausible
+        told = {"non_centrality": level, "of": quantity, "draw": number, "share_of_plausible": share, "signal": asdict(signal)}
+        if least is None or share < least[1]["share_of_plausible"]:
+            least = (replace(defect, size=size), told)
+        if share <= _IMPLAUSIBLE:
+            break
+    return least
 
 
 def make_case(case, blind_folder, sealed_folder, robots_folder):
