@@ -104,10 +104,18 @@ def test_loads_without_a_move_share_their_approach(fanuc_arm, small):
 
 
 def test_covariates_may_be_left_out_and_declared_noise_may_be_wrong(tmp_path, fanuc_specimen, small):
-    design = replace(small, covariates=("time",), declared_noise=(3e-5, 3e-5), points=("6DoF",), measured="position")
+    design = replace(
+        small,
+        covariates=("time",),
+        declared_noise=(3e-5, 3e-5),
+        declared=("joint_offset",),
+        points=("6DoF",),
+        measured="position",
+    )
     made(tmp_path / "case0", fanuc_specimen, design)
     campaign = read_campaign(tmp_path / "case0", ROBOTS)
     assert campaign.noise == {"position_m": 3e-5, "orientation_rad": 3e-5}
+    assert campaign.declared == ("joint_offset",)
     assert campaign.readings.approach is None
     assert campaign.readings.temperature_c is None
     assert campaign.readings.time_s is not None

@@ -131,7 +131,13 @@ def test_base_springs_and_bearing_tilt_deflect_as_springs_of_the_chain():
 
 
 def test_weight_turns_the_joints_as_pinocchio_says(arm):
-    masses = (Mass(1, 300.0, 0.4), Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)), Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)))
+    masses = (
+        Mass(1, 300.0, 0.4),
+        Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)),
+        Mass(2, 90.0, 0.9),
+        Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)),
+        Mass(arm.joints, 30.0, 0.5),
+    )
     load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
     machine = machine_of(arm, Structure(masses=masses, payload=load))
     angles, _ = angles_and_wrenches(arm)

@@ -19,7 +19,7 @@ from elastocal.sites import sites_of
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))
-# Their first order is what the catalogue's law says it is, to so much of its largest component.
+# Their first order is what the catalogue's law says it is, to so much of its root mean square.
 COMPARABLE = {
     "joint_offset": 0.02,
     "link_geometry": 0.02,
@@ -27,11 +27,11 @@ COMPARABLE = {
     "transmission_ratio": 0.02,
     "joint_tilt": 0.02,
     "cross_compliance": 0.02,
-    "lost_motion": 0.2,
+    # A dead band with edges is not a tanh where the torque is small.
+    "lost_motion": 0.3,
     "force_scale": 0.02,
-    # The plant's cell hangs in the pull, so that a wrong force brings a wrong moment; the catalogue's sits at the flange.
-    "force_misalignment": 0.15,
-    "force_bias": 0.15,
+    "force_misalignment": 0.05,
+    "force_bias": 0.05,
     "application_point": 0.02,
 }
 
@@ -84,7 +84,9 @@ def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(fanuc_spe
 @pytest.mark.parametrize("kind", sorted(COMPARABLE))
 def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(fanuc_specimen, schedule, kind):
     """The catalogue's law with the truth's parameters foretells what the plant does, to first order."""
-    defect = drawn_defect(kind, fanuc_specimen.arm, 3)
+    # A load cell in the pull has nothing comparable: the first seed that has.
+    defects = (drawn_defect(kind, fanuc_specimen.arm, seed) for seed in range(3, 20))
+    defect = next(defect for defect in defects if truth_of(fanuc_specimen, defect)["parameters"])
     parameters = truth_of(fanuc_specimen, defect)["parameters"]
     states = States(
         session=0 * schedule.pose,
@@ -113,8 +115,7 @@ def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(fanuc_speci
                 turn[:, coordinate] += parameters[parameter.name] * column
         jacobians = [poses_and_jacobians(sites.chain, coordinates, point)[2] for point in sites.chain.points]
         wanted = np.stack([np.einsum("sij,sj->si", jacobian, turn) for jacobian in jacobians], axis=1)
-        # By the median, for the regularised edge of a dead band differs from the tanh near zero torque.
-        best = min(best, np.median(np.linalg.norm(found - wanted, axis=-1)) / np.abs(wanted).max())
+        best = min(best, np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
     assert best < COMPARABLE[kind]
 
 

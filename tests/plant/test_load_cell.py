@@ -62,3 +62,10 @@ def test_a_wrong_application_point_changes_the_moment_alone(pull, in_flange):
     np.testing.assert_allclose(
         felt[:, 3:], np.cross(lever + (facing @ shift if "shift" in in_flange else shift), force), atol=1e-9
     )
+
+
+@pytest.mark.parametrize("mount", ["pull", "flange"])
+def test_a_wrong_force_brings_a_wrong_moment_unless_moments_are_measured_too(pull, mount):
+    force, lever, _ = pull
+    felt = LoadCell(bias_N=(5.0, -3.0, 2.0), mount=mount).felt(*pull)
+    np.testing.assert_allclose(felt[:, 3:], np.cross(lever, felt[:, :3] if mount == "pull" else force), atol=1e-9)

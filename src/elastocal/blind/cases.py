@@ -56,7 +56,9 @@ _UNSEEN = {
 
 @dataclass(frozen=True)
 class Case:
-    """Attributes
+    """One case, from which its campaign and its truth follow.
+
+    Attributes
     ----------
     key : str
         What it is; sealed.

@@ -53,7 +53,9 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Arm:
-    """Attributes
+    """An arm, all fixed rotations and lengths sorted into stretches.
+
+    Attributes
     ----------
     name : str
     stretches : tuple of Stretch

@@ -25,7 +25,9 @@ _SHORTEST_LINK_M = 0.1
 
 @dataclass(frozen=True)
 class Defect:
-    """Attributes
+    """One thing that is wrong with a robot.
+
+    Attributes
     ----------
     effect : str
         A key of `KINDS`.
@@ -45,7 +47,9 @@ class Defect:
 
 @dataclass(frozen=True)
 class Kind:
-    """Attributes
+    """What all defects of one name have in common.
+
+    Attributes
     ----------
     unit : str
         Of the size.
@@ -195,6 +199,17 @@ def _usual_torque_Nm(robot, joint):  # noqa: N802 - units in names keep their ca
 def _drawn_frame(robot, error, draws):
     """In the flange's axes or not, beside the errors of the load cell that are so already."""
     return (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
+
+
+def _with_wrong_cell(robot, error, draws, **changes):
+    """The error in a frame that is drawn, of a cell at a place that is drawn."""
+    frame, mount = _drawn_frame(robot, error, draws), ("pull", "flange")[draws.integers(2)]
+    return replace(robot, cell=replace(robot.cell, in_flange=frame, mount=mount, **changes))
+
+
+def _if_at_flange(robot, parameters):
+    """The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable."""
+    return parameters if robot.cell.mount == "flange" else {}
 
 
 # Geometry
@@ -354,15 +369,17 @@ def _force_scale(robot, joints, size, draws):
 
 @_register("force_misalignment", "rad", 0.02, _nowhere)
 def _force_misalignment(robot, joints, size, draws):
-    turn, frame = size * _direction(draws), _drawn_frame(robot, "turn", draws)
-    return replace(robot, cell=replace(robot.cell, turn_rad=tuple(turn), in_flange=frame)), _named("about_", turn)
+    turn = size * _direction(draws)
+    wrong = _with_wrong_cell(robot, "turn", draws, turn_rad=tuple(turn))
+    return wrong, _if_at_flange(wrong, _named("about_", turn))
 
 
 @_register("force_bias", "N", 20.0, _nowhere)
 def _force_bias(robot, joints, size, draws):
     """What is felt beyond what is shown is minus the bias of the display."""
-    felt, frame = size * _direction(draws), _drawn_frame(robot, "bias", draws)
-    return replace(robot, cell=replace(robot.cell, bias_N=tuple(-felt), in_flange=frame)), _named("along_", felt)
+    felt = size * _direction(draws)
+    wrong = _with_wrong_cell(robot, "bias", draws, bias_N=tuple(-felt))
+    return wrong, _if_at_flange(wrong, _named("along_", felt))
 
 
 @_register("application_point", "m", 0.02, _nowhere)

@@ -14,7 +14,9 @@ _REFERENCE_C = 20.0
 
 @dataclass(frozen=True)
 class GearStates:
-    """Attributes
+    """What the gears of a robot are exposed to, in S states of it.
+
+    Attributes
     ----------
     torque, unloaded : ndarray (S, n)
         N m, now and before the external load came on.

@@ -31,6 +31,9 @@ class LoadCell:
         Quadratic: shown x gets k F_y F_z, and so on round the axes.
     in_flange : tuple of str
         Which of "turn", "bias" and "shift" are fixed in the flange's axes rather than in the base's.
+    mount : {"pull", "flange"}
+        In the line of pull one number is measured: a force that is wrong acts at the same lever and brings a wrong moment.
+        Between flange and tool six are: the forces may be wrong where the moments are right.
     """
 
     scale: float = 0.0
@@ -39,6 +42,7 @@ class LoadCell:
     shift_m: tuple = (0.0, 0.0, 0.0)
     crosstalk_per_N: float = 0.0
     in_flange: tuple = ()
+    mount: str = "pull"
 
     def shown(self, felt, flange_rotation):
         """Force on the display for the force that is felt, both (S, 3), N, base axes."""
@@ -67,7 +71,8 @@ class LoadCell:
         for _ in range(_SWEEPS):
             found += force - self.shown(found, flange_rotation)
         felt = np.where(force.any(axis=1)[:, None], found, 0.0)
-        return np.concatenate([felt, np.cross(lever + self._errors(flange_rotation)[2], felt)], axis=1)
+        moment = np.cross(lever, felt if self.mount == "pull" else force)
+        return np.concatenate([felt, moment + np.cross(self._errors(flange_rotation)[2], felt)], axis=1)
 
     def _errors(self, flange_rotation):
         """Turn, bias and shift in base axes, (S, 3) each."""

@@ -45,7 +45,9 @@ class Warmth:
 
 @dataclass(frozen=True)
 class PhysicalRobot:
-    """Attributes
+    """All that is true of a robot and its instruments; the default is faultless.
+
+    Attributes
     ----------
     arm : Arm
     compliance : ndarray (n,)

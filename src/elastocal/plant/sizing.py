@@ -19,7 +19,9 @@ _ROUNDS = 12
 
 @dataclass(frozen=True)
 class Signal:
-    """Attributes
+    """What a defect does to the readings.
+
+    Attributes
     ----------
     raw, retained : float
         Non-centralities before and after absorption.

@@ -35,7 +35,9 @@ class Loading:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """Attributes
+    """Where an arm came to rest, in S states.
+
+    Attributes
     ----------
     coordinates : ndarray (S, coordinates)
         rad, m.

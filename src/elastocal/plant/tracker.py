@@ -35,7 +35,9 @@ class Drift:
 
 @dataclass(frozen=True)
 class Tracker:
-    """Attributes
+    """A laser tracker; the default only has noise.
+
+    Attributes
     ----------
     sigma_m, sigma_m_per_m : float
         Standard deviation of a coordinate is sigma_m + sigma_m_per_m * range.
