@@ -204,3 +204,4 @@ def test_a_further_experiment_changes_no_reading_that_is_there(fanuc_specimen, s
     np.testing.assert_allclose(longer.shown_wrench[rows][[1, 2, 4, 5]], wrench, atol=1e-9)
     assert not longer.shown_wrench[rows][[0, 3]].any()
     assert longer.training[rows].all()
+    assert (np.diff(longer.time_s) > 0).all()

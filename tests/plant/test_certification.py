@@ -8,11 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from analysed_robots import ROBOTS, analysed
+from support import OTHER_CHAINS, robot_of
 
 from elastocal.elastostatics import generalized_forces as joint_torques
 from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
 from elastocal.links import extended_chain, spring_compliance
-from elastocal.plant.arm import arm_from_file
+from elastocal.plant.arm import arm_from_document, arm_from_file
 from elastocal.plant.multibody import machine_of
 from elastocal.plant.statics import Loading, equilibrium, generalized_forces
 from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
@@ -68,6 +69,29 @@ def test_poses_without_load_are_those_of_the_kinematics(key):
         position, rotation = poses(robot.chain, angles, point)
         np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
         np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+
+
+@pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
+def test_joints_that_turn_backwards_fixed_rotations_and_points_inside_links_are_read_alike(name_of_chain):
+    """Poses and deflections of chains of three to seven joints."""
+    text = OTHER_CHAINS[name_of_chain]
+    robot = robot_of(text)
+    n = robot.joints
+    document = {
+        "name": "test",
+        "chain": text,
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+        "joint_limits_deg": [[-180, 180]] * n,
+    }
+    arm = arm_from_document(document)
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    _, rest = at_rest(arm, angles, 0.0 * wrench)
+    for number, point in enumerate(robot.chain.points):
+        position, rotation = poses(robot.chain, angles, point)
+        np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
+        np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+    wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
+    np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
 
 
 def test_joint_springs_deflect_all_points_as_the_reduced_model_to_second_order(arm, name):
