@@ -1,0 +1,1 @@
+"""The blind proof: cases with a truth that the diagnosis does not see."""

@@ -1,0 +1,319 @@
+"""The cases of the blind proof as data, and the making of one: a campaign for the analyst and a truth that is sealed.
+
+A case is named by a hash, so that neither its folder nor its place in a list tells what is in it, and is seeded by its key:
+adding cases, or making them in another order or in blocks, changes none that is there.
+"""
+
+import hashlib
+from dataclasses import asdict, dataclass, field, replace
+from itertools import combinations
+from pathlib import Path
+
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.campaigns import Design, continued, schedule_of
+from elastocal.plant.defects import KINDS, OUTSIDE, drawn_defect, truth_of, with_defects
+from elastocal.plant.drives import Repeatability
+from elastocal.plant.folders import write_blind_campaign, write_truth
+from elastocal.plant.physical_robot import specimen
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.sizing import Yardstick, size_for
+from elastocal.plant.tracker import Tracker
+from elastocal.whole_files import appearing_whole
+
+ROBOTS = ("kuka", "fanuc", "abb")
+LEVELS = (10.0, 25.0, 50.0, 200.0)
+NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
+FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
+_DRAWS = 8
+# Times the plausible size.
+_IMPLAUSIBLE = 3.0
+
+# Settings by name: what is other than usual about the design, the tracker and the drives.
+SETTINGS = {
+    "usual": {},
+    # Without repeats there is nothing but the word of the campaign.
+    **{f"declared_noise_times_{ratio:g}": {"declared_ratio": ratio} for ratio in (0.5, 0.8, 0.9, 1.1, 1.5)},
+    "repeatability": {"joint_rad": 2e-5},
+    "repeatability_without_moves": {"joint_rad": 2e-5, "design": {"approach_each_load": False}},
+    "range_dependent_noise": {"tracker": {"sigma_m": 1.5e-5, "sigma_m_per_m": 6e-6}},
+    "unknown_frame": {"design": {"frame": "tracker"}, "tracker": {"frame_turn": (0.1, -0.05, 0.8)}},
+    "outliers_1_percent": {"tracker": {"outliers": 0.01}},
+    "outliers_2_percent": {"tracker": {"outliers": 0.02}},
+    "outliers_5_percent": {"tracker": {"outliers": 0.05}},
+    "outliers_2_percent_far": {"tracker": {"outliers": 0.02, "outlier_sigmas": 30.0}},
+    "without_approach": {"design": {"covariates": ("time", "temperature")}},
+    "without_time_and_temperature": {"design": {"covariates": ("approach",)}},
+    "without_covariates": {"design": {"covariates": ()}},
+}
+_HARD_NULLS = tuple(name for name in SETTINGS if name != "usual" and not name.startswith("without"))
+# Effects that cannot be seen without what a setting leaves out.
+_UNSEEN = {
+    "without_approach": ("hysteresis",),
+    "without_time_and_temperature": ("frame_drift", "thermal_growth"),
+    "without_covariates": ("hysteresis", "frame_drift", "thermal_growth"),
+}
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case, from which its campaign and its truth follow.
+
+    Attributes
+    ----------
+    key : str
+        What it is; sealed.
+    group : {"none", "single", "pair", "outside", "setting"}
+    robot : str
+        Robot file in config/robots.
+    effects : tuple of str
+        Keys of `defects.KINDS`.
+    levels : tuple of float
+        Non-centrality of each effect alone, on the poses that are not held out, after the compliances have absorbed theirs.
+    setting : str
+        Key of `SETTINGS`.
+    seed : int
+    """
+
+    key: str
+    group: str
+    robot: str
+    effects: tuple
+    levels: tuple
+    setting: str
+    seed: int
+
+    @property
+    def name(self):
+        """Of its folder; tells nothing."""
+        return "case_" + hashlib.sha256(f"{self.seed}/{self.key}".encode()).hexdigest()[:12]
+
+
+@dataclass(frozen=True)
+class Counts:
+    """How many cases of each kind on each robot.
+
+    Attributes
+    ----------
+    none : int
+    single, outside : int
+        Of each effect at each of `levels`.
+    pair : int
+        Of drawn pairs at each of `pair_levels`.
+    setting : int
+        Without an effect, of each hard setting; with one at non-centrality 50, of each setting; and of effects that a setting
+        hides, each.
+    """
+
+    none: int
+    single: int
+    outside: int
+    pair: int
+    setting: int
+    levels: tuple = LEVELS
+    pair_levels: tuple = (50.0, 200.0)
+    robots: tuple = field(default=ROBOTS)
+
+
+SIZES = {
+    "smoke": Counts(none=2, single=0, outside=0, pair=1, setting=0, robots=("kuka",)),
+    "quick": Counts(none=20, single=1, outside=1, pair=5, setting=1, levels=(50.0, 200.0), robots=("fanuc", "abb")),
+    # Nulls on the two robots of the proof: 600, at a true rate of 5 % a 95 % interval of 3.4 to 7.1 %.
+    "full": Counts(none=300, single=20, outside=20, pair=75, setting=20),
+}
+
+
+def cases_of(counts, seed):
+    """All cases of a benchmark.
+
+    Parameters
+    ----------
+    counts : Counts
+    seed : int
+        Fresh seeds are fresh cases.
+
+    Returns
+    -------
+    list of Case
+        In the order of their names, that is in none.
+    """
+    found = []
+
+    def add(group, robot, effects, levels, setting, number):
+        words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number)]
+        key = "/".join(words)
+        digest = hashlib.sha256(f"blind/{seed}/{key}".encode()).digest()
+        found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little")))
+
+    for robot in counts.robots:
+        for number in range(counts.none):
+            add("none", robot, (), (), "usual", number)
+        for group, effects, count in (("single", NAMED, counts.single), ("outside", FOREIGN, counts.outside)):
+            for effect in effects:
+                for level in counts.levels:
+                    for number in range(count):
+                        add(group, robot, (effect,), (level,), "usual", number)
+        for level in counts.pair_levels:
+            for number in range(counts.pair):
+                add("pair", robot, _drawn_pair(seed, robot, level, number), (level, level), "usual", number)
+        for number in range(counts.setting):
+            for setting in _HARD_NULLS:
+                add("setting", robot, (), (), setting, number)
+                add("setting", robot, _drawn_pair(seed, robot, setting, number)[:1], (50.0,), setting, number)
+            for setting, effects in _UNSEEN.items():
+                for effect in effects:
+                    add("setting", robot, (effect,), (200.0,), setting, number)
+    return sorted(found, key=lambda case: case.name)
+
+
+def block_of(cases, number, of):
+    """Every `of`-th case from `number` on, both counted from 1 as people do: a share for one job of a cluster."""
+    return cases[number - 1 :: of]
+
+
+def design_of(case):
+    """How the campaign of a case is made."""
+    setting = SETTINGS[case.setting]
+    design = replace(Design(), **setting.get("design", {}))
+    if "declared_ratio" in setting:
+        tracker = replace(Tracker(), **setting.get("tracker", {}))
+        noise = tuple(setting["declared_ratio"] * sigma for sigma in (tracker.sigma_m, tracker.sigma_rad))
+        design = replace(design, repeats=1, declared_noise=noise)
+    return design
+
+
+def specimen_of(case, robots_folder):
+    """The robot of a case before anything is wrong with it; its tracker and its drives' repeatability are the setting's.
+
+    Parameters
+    ----------
+    case : Case
+    robots_folder : str or Path
+
+    Returns
+    -------
+    PhysicalRobot
+    """
+    robot, setting = specimen(arm_from_file(Path(robots_folder) / f"{case.robot}.yaml"), case.seed), SETTINGS[case.setting]
+    robot = replace(robot, tracker=replace(robot.tracker, **setting.get("tracker", {})))
+    if "joint_rad" in setting:
+        spread = setting["joint_rad"] * stream(case.seed, "repeatability").uniform(0.5, 1.5, robot.arm.joints)
+        robot = replace(robot, drives=(Repeatability(tuple(spread)),))
+    return robot
+
+
+def defects_of(case, robot, design):
+    """The defects of a case at the sizes that give their non-centralities.
+
+    Parameters
+    ----------
+    case : Case
+    robot : PhysicalRobot
+        Faultless.
+    design : Design
+
+    Returns
+    -------
+    list of (Defect, dict)
+        Each with what the truth says of its size: target, quantity, signal, which draw.
+
+    Notes
+    -----
+    Where a place has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is drawn; of
+    eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the raw
+    non-centrality is taken instead, and the truth says so: nothing can find that.
+    """
+    yardstick = Yardstick(robot, schedule_of(robot.arm, design, case.seed), free_frame=design.frame == "tracker")
+    found = []
+    for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
+        drawn = [drawn_defect(effect, robot.arm, case.seed + 1000 * order + draw) for draw in range(_DRAWS)]
+        sized = _first_plausible(yardstick, robot, drawn, level, "retained") or _first_plausible(
+            yardstick, robot, drawn, level, "raw"
+        )
+        if sized is None:
+            raise ValueError(f"{case.key}: no {effect} has a non-centrality of {level:g}")
+        found.append(sized)
+    return found
+
+
+def _first_plausible(yardstick, robot, drawn, level, quantity):
+    """The first of the drawn defects that needs no implausible size, or else the least implausible; None where none has any."""
+    least = None
+    for number, defect in enumerate(drawn, 1):
+
+        def robot_of_size(size, defect=defect):
+            return with_defects(robot, [replace(defect, size=size)])
+
+        try:
+            size, signal = size_for(yardstick, robot_of_size, defect.size, level, quantity, KINDS[defect.effect].largest)
+        except ValueError:
+            continue
+        share = size / KINDS[defect.effect].plausible
+        told = {"non_centrality": level, "of": quantity, "draw": number, "share_of_plausible": share, "signal": asdict(signal)}
+        if least is None or share < least[1]["share_of_plausible"]:
+            least = (replace(defect, size=size), told)
+        if share <= _IMPLAUSIBLE:
+            break
+    return least
+
+
+def make_case(case, blind_folder, sealed_folder, robots_folder):
+    """Make the campaign and the truth of a case.
+
+    Parameters
+    ----------
+    case : Case
+    blind_folder, sealed_folder : str or Path
+        The campaign goes to ``blind_folder/<name>/``, the truth to ``sealed_folder/<name>.json``.
+    robots_folder : str or Path
+
+    Returns
+    -------
+    str
+        SHA-256 of the truth.
+    """
+    robot, design = specimen_of(case, robots_folder), design_of(case)
+    sized = defects_of(case, robot, design)
+    bad = with_defects(robot, [defect for defect, _ in sized])
+    folder = Path(blind_folder) / case.name
+    made = write_blind_campaign(folder, case.name, case.robot, bad, design, schedule_of(robot.arm, design, case.seed))
+    truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | told for defect, told in sized]}
+    return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
+
+
+def make_follow_up(case, angles, wrench, blind_folder, robots_folder):
+    """Carry out a proposed experiment on the robot of a case, and write the campaign anew with what was read further.
+
+    Parameters
+    ----------
+    case : Case
+    angles : ndarray (E, n)
+        Of the model, rad, as in next_experiment.csv; equal rows that follow each other are one pose.
+    wrench : ndarray (E, 6)
+        N, N m.
+    blind_folder : str or Path
+        The campaign goes to ``blind_folder/<name>/``; its truth is that of the case.
+    robots_folder : str or Path
+    """
+    robot, design = specimen_of(case, robots_folder), design_of(case)
+    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
+    schedule = continued(schedule_of(robot.arm, design, case.seed), angles, wrench, design.seconds_per_state)
+    write_blind_campaign(Path(blind_folder) / case.name, case.name, case.robot, bad, design, schedule)
+
+
+def write_manifest(path, digests):
+    """Write the commitment that is published before any diagnosis: a line ``sha256  name`` for each truth.
+
+    Parameters
+    ----------
+    path : str or Path
+    digests : dict of str to str
+        By the name of the case.
+    """
+    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.writelines(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items()))
+
+
+def _drawn_pair(seed, robot, level, number):
+    """Two effects of different names, neither of which is an alias of the compliances."""
+    pairs = list(combinations([name for name in NAMED if name != "force_scale"], 2))
+    return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]

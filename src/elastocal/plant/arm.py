@@ -1,0 +1,182 @@
+"""An arm as its robot file describes it, read by a parser of its own.
+
+The file's chain is a product of elementary transforms, ``Tz(l1) Rz(q1) Tx(l2) [2DoF] ...``. Here it becomes a list of rigid
+stretches with a drive between each two of them, which is what a multibody model is built from.
+"""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from elastocal.errors import InputError
+
+_WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
+
+
+@dataclass(frozen=True)
+class Point:
+    """A measuring point on a stretch.
+
+    Attributes
+    ----------
+    name : str
+    position_m : ndarray (3,)
+        In the frame at the near end of the stretch.
+    rotation : ndarray (3, 3)
+    """
+
+    name: str
+    position_m: np.ndarray
+    rotation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """What is rigid between two drives.
+
+    Attributes
+    ----------
+    vector_m : ndarray (3,)
+        From its near to its far end, in the frame at its near end.
+    rotation : ndarray (3, 3)
+        Of the frame at its far end, in that at its near end.
+    points : tuple of Point
+    """
+
+    vector_m: np.ndarray
+    rotation: np.ndarray
+    points: tuple
+
+
+@dataclass(frozen=True)
+class Arm:
+    """An arm, all fixed rotations and lengths sorted into stretches.
+
+    Attributes
+    ----------
+    name : str
+    stretches : tuple of Stretch
+        n + 1 of them: the column, and one behind each drive.
+    axes : ndarray (n, 3)
+        Axis of each drive with its sense, in the frame at the far end of the stretch before it.
+    compliance : ndarray (n,)
+        rad/(N m), as the robot file states it; a plant's own may differ.
+    limits : ndarray (n, 2)
+        rad.
+    reported_matrix, reported_offset : ndarray (n, n), (n,)
+        Angles from what the controller shows: q = matrix @ shown + offset.
+    """
+
+    name: str
+    stretches: tuple
+    axes: np.ndarray
+    compliance: np.ndarray
+    limits: np.ndarray
+    reported_matrix: np.ndarray
+    reported_offset: np.ndarray
+
+    @property
+    def joints(self):
+        """Number of drives, n."""
+        return len(self.axes)
+
+    @property
+    def points(self):
+        """Names of all measuring points, the flange last."""
+        return tuple(point.name for stretch in self.stretches for point in stretch.points)
+
+    def shown_angles(self, angles):
+        """What the controller shows for angles (S, n), rad."""
+        return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
+
+
+def arm_from_file(path):
+    """Read a robot file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Arm
+    """
+    with open(path, encoding="utf-8") as file:
+        return arm_from_document(yaml.safe_load(file), Path(path).as_posix())
+
+
+def arm_from_document(document, source="robot"):
+    """Make an arm of the contents of a robot file.
+
+    Parameters
+    ----------
+    document : dict
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Arm
+
+    Raises
+    ------
+    InputError
+        A word of the chain that is none, or a chain that does not end in a measuring point.
+    """
+    lengths, stretches, axes = document.get("lengths_m", {}), [], []
+    position, rotation, points = np.zeros(3), np.eye(3), []
+    for word in document["chain"].split():
+        match = _WORD.fullmatch(word)
+        if match is None:
+            raise InputError(source, "chain", repr(word), "T or R of x, y, z, or a [POINT]")
+        kind, axis, minus, argument, point = match.groups()
+        if point:
+            points.append(Point(point, position, rotation))
+            continue
+        sign, direction = (-1.0 if minus else 1.0), np.eye(3)["xyz".index(axis)]
+        if kind == "T":
+            position = position + rotation @ (sign * float(lengths.get(argument, argument)) * direction)
+        elif argument.endswith("deg"):
+            rotation = rotation @ turned(np.radians(sign * float(argument[:-3])) * direction)
+        else:
+            stretches.append(Stretch(position, rotation, tuple(points)))
+            axes.append(sign * direction)
+            position, rotation, points = np.zeros(3), np.eye(3), []
+    if not points or not np.array_equal(points[-1].position_m, position):
+        raise InputError(source, "chain", "no measuring point at its end", "a chain that ends in one")
+    stretches.append(Stretch(position, rotation, tuple(points)))
+    n, shown = len(axes), document.get("reported_joints", {})
+    return Arm(
+        document["name"],
+        tuple(stretches),
+        np.array(axes),
+        1e-6 * np.array(document["compliance_urad_per_Nm"], float),
+        np.radians(np.array(document["joint_limits_deg"], float)),
+        np.array(shown.get("matrix", np.eye(n)), float),
+        np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
+    )
+
+
+def turned(vector):
+    """Rotation matrix of a rotation vector by Rodrigues' formula, R = I + sin a K + (1 - cos a) K^2.
+
+    Parameters
+    ----------
+    vector : ndarray (..., 3)
+        rad.
+
+    Returns
+    -------
+    ndarray (..., 3, 3)
+    """
+    vector = np.asarray(vector, float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vector, -1, 0)
+    zero = np.zeros_like(x)
+    skew = np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+    # sin(a)/a and (1 - cos a)/a^2 without a division by nothing.
+    first, second = np.sinc(angle / np.pi), 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    return np.eye(3) + first * skew + second * skew @ skew

@@ -1,0 +1,197 @@
+"""Campaigns of a physical robot: what is done with it, and the table of what is read."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.plant.physical_robot import Schedule, seen_poses
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.tracker import rotation_vector
+
+COVARIATES = ("approach", "time", "temperature")
+
+
+@dataclass(frozen=True)
+class Design:
+    """How a campaign is made, and what is written down of it.
+
+    Attributes
+    ----------
+    poses : int
+    held_out : int
+        The last poses, which no step of the analysis may see before its last.
+    force_N : float
+        Largest force; its direction is random in each pose.
+    ladder : tuple of float
+        Shares of it, 0 first: each is a load.
+    lever_m : tuple of float
+        From the flange to where the force acts, base axes.
+    repeats, repeated_poses : int
+        How often loads 0 and 1 of the first poses are read.
+    approach_each_load : bool
+        Whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
+    seconds_per_state : float
+    points : tuple of str
+        Measuring points with a target each; empty for all.
+    covariates : tuple of str
+        Which of `COVARIATES` are written down.
+    declared_noise : (float, float) or None
+        Standard deviations that the campaign claims, m and rad; right or wrong.
+    declared : tuple of str
+        Effects that the campaign says its model has.
+    measured : {"pose", "position"}
+    frame : {"base", "tracker"}
+    """
+
+    poses: int = 30
+    held_out: int = 9
+    force_N: float = 1000.0
+    ladder: tuple = (0.0, 1.0, 0.5, -0.5, -1.0)
+    lever_m: tuple = (0.0, 0.5, 0.0)
+    repeats: int = 4
+    repeated_poses: int = 10
+    approach_each_load: bool = True
+    seconds_per_state: float = 25.0
+    points: tuple = ()
+    covariates: tuple = COVARIATES
+    declared_noise: tuple | None = None
+    declared: tuple = ()
+    measured: str = "pose"
+    frame: str = "base"
+
+
+def schedule_of(arm, design, seed):
+    """Draw what is done.
+
+    Parameters
+    ----------
+    arm : Arm
+    design : Design
+    seed : int
+
+    Returns
+    -------
+    Schedule
+    """
+    draws = stream(seed, "schedule")
+    low, high = arm.limits.T
+    angles = low + (high - low) * draws.random((design.poses, arm.joints))
+    direction = draws.standard_normal((design.poses, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    states, approach, previous = [], [], []
+    for pose in range(design.poses):
+        for repeat in range(design.repeats if pose < design.repeated_poses else 1):
+            for load in range(len(design.ladder) if repeat == 0 else min(2, len(design.ladder))):
+                fresh = design.approach_each_load or load == 0
+                previous.append(-1 if fresh else len(states) - 1)
+                approach.append(approach[-1] + fresh if approach else 0)
+                states.append((pose, load, repeat))
+    pose, load, repeat = np.array(states).T
+    approach = np.array(approach)
+    # A repeat comes from the same side, so that it is one: what differs between repeats is then chance and not friction.
+    sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
+    sense = sense[pose, load if design.approach_each_load else 0 * load]
+    force = design.force_N * np.array(design.ladder)[load, None] * direction[pose]
+    lever = np.broadcast_to(np.array(design.lever_m), force.shape)
+    time = design.seconds_per_state * np.arange(1, len(states) + 1)
+    training = pose < design.poses - design.held_out
+    return Schedule(
+        angles[pose], force, lever, pose, load, repeat, approach, sense, np.array(previous), time, training, int(seed)
+    )
+
+
+def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
+    """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
+
+    Parameters
+    ----------
+    schedule : Schedule
+    angle : ndarray (E, n)
+        rad; equal rows that follow each other are one pose.
+    wrench : ndarray (E, 6)
+        As it shall be shown, N, N m at the flange, base axes; the moment is that of the force at a lever.
+    seconds_per_state, pause_s : float
+        Pace, and how long after the last state the first one comes.
+
+    Returns
+    -------
+    Schedule
+        Each further state is approached afresh and none is held out. Each new pose starts without a load, as load 0.
+    """
+    draws = stream(schedule.seed, f"continued after {len(schedule.pose)} states")
+    angle, wrench = np.asarray(angle, float), np.asarray(wrench, float)
+    new = np.concatenate([[True], (np.diff(angle, axis=0) != 0).any(axis=1)])
+    pose = int(schedule.pose.max()) + np.cumsum(new)
+    rows, load = [], []
+    for state, first in enumerate(new):
+        if first:
+            rows.append((state, 0.0))
+            load.append(0)
+        if wrench[state].any():
+            rows.append((state, 1.0))
+            load.append(load[-1] + 1)
+    state, share = np.array([row for row, _ in rows]), np.array([share for _, share in rows])[:, None]
+    force, moment = wrench[state, :3], wrench[state, 3:]
+    square = (force**2).sum(axis=1, keepdims=True)
+    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
+    count = np.arange(1, len(state) + 1)
+    further = {
+        "angle": angle[state],
+        "force": share * force,
+        "lever": lever,
+        "pose": pose[state],
+        "load": np.array(load),
+        "repeat": np.zeros(len(state), int),
+        "approach": schedule.approach.max() + count,
+        "sense": draws.choice([-1, 1], (len(state), angle.shape[1])),
+        "previous": np.full(len(state), -1),
+        "time_s": schedule.time_s[-1] + pause_s + seconds_per_state * count,
+        "training": np.ones(len(state), bool),
+    }
+    return replace(schedule, **{name: np.concatenate([getattr(schedule, name), more]) for name, more in further.items()})
+
+
+def measured_table(robot, design, schedule):
+    """Columns of the file of measurements.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    design : Design
+    schedule : Schedule
+
+    Returns
+    -------
+    table : dict of str to ndarray
+    outliers : list of (int, str)
+        State and target of every reading that is one.
+    """
+    position, rotation = seen_poses(robot, schedule)
+    position, rotation, outlier = robot.tracker.read(position, rotation, stream(schedule.seed, "readings"))
+    if design.frame == "tracker":
+        position, rotation = robot.tracker.in_own_frame(position, rotation)
+    arm, shown = robot.arm, robot.arm.shown_angles(schedule.angle)
+    joints, wrench = range(1, arm.joints + 1), schedule.shown_wrench
+    points = design.points or arm.points
+    common = {"pose": schedule.pose, "load": schedule.load, "repeat": schedule.repeat}
+    after = {f"q{j}": shown[:, j - 1] for j in joints} | dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench.T, strict=True))
+    covariates = {
+        "approach": {f"approach{j}": schedule.sense[:, j - 1].astype(float) for j in joints},
+        "time": {"time_s": schedule.time_s},
+        "temperature": {"temperature_c": robot.warmth.shown(schedule.time_s)},
+    }
+    parts = []
+    for name in points:
+        target = arm.points.index(name)
+        part = common | {"target": np.full(len(wrench), name)} | after | dict(zip("xyz", position[:, target].T, strict=True))
+        if design.measured == "pose":
+            part |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[:, target]).T, strict=True))
+        for covariate in design.covariates:
+            part |= covariates[covariate]
+        parts.append(part)
+    table = {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
+    # State by state, as a tracker goes round its targets.
+    order = np.argsort(np.tile(np.arange(len(wrench)), len(points)), kind="stable")
+    # Minus zeros are products of the ladder's zero and mean nothing.
+    table = {name: column[order] + 0.0 if column.dtype.kind == "f" else column[order] for name, column in table.items()}
+    return table, [(int(state), arm.points[target]) for state, target in np.argwhere(outlier) if arm.points[target] in points]

@@ -1,0 +1,489 @@
+"""Defects: all that can be wrong with a physical robot, named as in the catalogue, or ``outside:...`` where it is not there.
+
+A defect has one size, which scales it, and a seed, from which its other details (directions, phases, thresholds) are drawn;
+they do not change with the size. Laws are those of `gears`, `drives`, `structure`, `load_cell` and `tracker`: none is the
+catalogue's formula where a machine would do otherwise.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from elastocal.errors import InputError
+from elastocal.plant import drives, gears
+from elastocal.plant.arm import Arm
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.structure import Compensator, Mass, TaperedTube
+from elastocal.plant.tracker import Drift, EccentricNest
+
+OUTSIDE = "outside:"
+_AXES = "xyz"
+_SHORTEST_LINK_M = 0.1
+
+
+@dataclass(frozen=True)
+class Defect:
+    """One thing that is wrong with a robot.
+
+    Attributes
+    ----------
+    effect : str
+        A key of `KINDS`.
+    joints : tuple of int
+        From 1; empty where it belongs to none.
+    size : float
+        In the unit of its kind.
+    seed : int
+        Of its details.
+    """
+
+    effect: str
+    joints: tuple
+    size: float
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What all defects of one name have in common.
+
+    Attributes
+    ----------
+    unit : str
+        Of the size.
+    plausible : float
+        A size such as real robots have.
+    places : callable
+        Joints at which it can be on an arm: list of tuples.
+    apply : callable
+        ``apply(robot, joints, size, draws)`` gives the defective robot and those parameters that the catalogue's law of this
+        effect has in common with what was done, by the catalogue's names; exactly or to first order in the size.
+    needs : tuple of str
+        Covariates without which the catalogue cannot see it.
+    largest : float
+        Size beyond which the law means nothing.
+    """
+
+    unit: str
+    plausible: float
+    places: Callable
+    apply: Callable
+    needs: tuple = ()
+    largest: float = np.inf
+
+
+KINDS = {}
+
+
+def with_defects(robot, defects):
+    """A robot with defects, one after another.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    defects : sequence of Defect
+
+    Returns
+    -------
+    PhysicalRobot
+    """
+    for defect in defects:
+        robot = _applied(robot, defect)[0]
+    return robot
+
+
+def truth_of(robot, defect):
+    """What a truth document says of a defect: effect, joints, size, unit, the parameters that are comparable, seed."""
+    parameters = _applied(robot, defect)[1]
+    return {
+        "effect": defect.effect,
+        "joints": list(defect.joints),
+        "size": float(defect.size),
+        "unit": KINDS[defect.effect].unit,
+        "parameters": {name: float(value) for name, value in parameters.items()},
+        "seed": int(defect.seed),
+    }
+
+
+def drawn_defect(effect, arm, seed):
+    """A defect of plausible size at a place that is drawn.
+
+    Parameters
+    ----------
+    effect : str
+    arm : Arm
+    seed : int
+
+    Returns
+    -------
+    Defect
+    """
+    places = _kind(effect).places(arm)
+    return Defect(effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible, seed)
+
+
+def _kind(effect):
+    if effect not in KINDS:
+        raise InputError("defect", "effect", repr(effect), ", ".join(KINDS))
+    return KINDS[effect]
+
+
+def _applied(robot, defect):
+    kind = _kind(defect.effect)
+    if defect.joints not in kind.places(robot.arm):
+        allowed = ", ".join(map(str, kind.places(robot.arm)))
+        raise InputError("defect", f"joints of {defect.effect}", str(defect.joints), allowed)
+    if not 0.0 <= defect.size <= kind.largest:
+        raise InputError("defect", f"size of {defect.effect}", f"{defect.size:g}", f"0 to {kind.largest:g} {kind.unit}")
+    joints = [joint - 1 for joint in defect.joints]
+    return kind.apply(robot, joints, defect.size, stream(defect.seed, f"details of {defect.effect}"))
+
+
+def _nowhere(arm: Arm):
+    return [()]
+
+
+def _each_joint(arm):
+    return [(joint,) for joint in range(1, arm.joints + 1)]
+
+
+def _shoulder(arm):
+    return [(2,)]
+
+
+def _each_link(arm):
+    lengths = [np.linalg.norm(stretch.vector_m) for stretch in arm.stretches]
+    return [(link,) for link in range(1, arm.joints + 1) if lengths[link] > _SHORTEST_LINK_M]
+
+
+def _each_pair(arm):
+    return list(combinations(range(1, arm.joints + 1), 2))
+
+
+def _register(effect, unit, plausible, places, needs=(), largest=np.inf):
+    def keep(apply):
+        KINDS[effect] = Kind(unit, plausible, places, apply, needs, largest)
+        return apply
+
+    return keep
+
+
+def _direction(draws):
+    vector = draws.standard_normal(3)
+    return vector / np.linalg.norm(vector)
+
+
+def _named(start, vector):
+    return {f"{start}{axis}": value for axis, value in zip(_AXES, vector, strict=True)}
+
+
+def _with_gear(robot, law):
+    return replace(robot, gears=(*robot.gears, law))
+
+
+def _with_drive(robot, law):
+    return replace(robot, drives=(*robot.drives, law))
+
+
+def _with_structure(robot, **changes):
+    return replace(robot, structure=replace(robot.structure, **changes))
+
+
+def _usual_torque_Nm(robot, joint):  # noqa: N802 - units in names keep their case
+    """Torque on a joint that a kilonewton makes: by the arm's reach before the wrist, by the tool's half metre behind it."""
+    return 1500.0 if joint < robot.arm.joints - 3 else 450.0
+
+
+def _drawn_frame(robot, error, draws):
+    """In the flange's axes or not, beside the errors of the load cell that are so already."""
+    return (*robot.cell.in_flange, error) if draws.integers(2) else robot.cell.in_flange
+
+
+def _with_wrong_cell(robot, error, draws, **changes):
+    """The error in a frame that is drawn, of a cell at a place that is drawn."""
+    frame, mount = _drawn_frame(robot, error, draws), ("pull", "flange")[draws.integers(2)]
+    return replace(robot, cell=replace(robot.cell, in_flange=frame, mount=mount, **changes))
+
+
+def _if_at_flange(robot, parameters):
+    """The catalogue's laws leave the moment as stated; those of a cell in the pull are not comparable."""
+    return parameters if robot.cell.mount == "flange" else {}
+
+
+# Geometry
+
+
+@_register("joint_offset", "rad", 3e-4, _each_joint)
+def _joint_offset(robot, joints, size, draws):
+    size = size * draws.choice([-1.0, 1.0])
+    return _with_drive(robot, drives.ZeroOffset(joints[0], size)), {"offset": size}
+
+
+@_register("link_geometry", "m", 3e-4, _each_joint)
+def _link_geometry(robot, joints, size, draws):
+    """A wrong vector, and a wrong turn of as many milliradians as it has millimetres."""
+    stretch, vector, turn = joints[0] + 1, size * _direction(draws), size * _direction(draws)
+    structure = robot.structure
+    changed = _with_structure(
+        robot,
+        wrong_vectors_m=structure.wrong_vectors_m | {stretch: tuple(vector)},
+        wrong_turns=structure.wrong_turns | {stretch: tuple(turn)},
+    )
+    # The catalogue counts along the axes at the far end of the link.
+    return changed, _named("d", robot.arm.stretches[stretch].rotation.T @ vector) | _named("r", turn)
+
+
+# Gravity
+
+
+@_register("link_weight", "kg", 100.0, lambda arm: [(2,), (2, 3)])
+def _link_weight(robot, joints, size, draws):
+    """Weight of the upper arm (turns joint 2) or of the forearm (turns joints 2 and 3), beside the line of the link."""
+    along, aside = draws.uniform(0.25, 0.6), tuple(draws.uniform(-0.06, 0.06, 3))
+    return _with_structure(robot, masses=(*robot.structure.masses, Mass(joints[-1] + 1, size, along, aside))), {}
+
+
+@_register("payload", "kg", 10.0, _nowhere)
+def _payload(robot, joints, size, draws):
+    centre = 0.15 * _direction(draws)
+    return _with_structure(robot, payload=Mass(robot.arm.joints, size, 1.0, tuple(centre))), {"mass": size} | _named(
+        "moment_", size * centre
+    )
+
+
+@_register("compensator_torque", "N/m", 1e5, _shoulder)
+def _compensator_torque(robot, joints, size, draws):
+    """A coil spring whose pull the controller does not know."""
+    anchor = (-draws.uniform(0.25, 0.4), 0.0, -draws.uniform(0.1, 0.3))
+    crank = (draws.uniform(0.12, 0.22), 0.0, draws.uniform(-0.08, 0.08))
+    return _with_structure(robot, compensator=Compensator(anchor, crank, size, draws.uniform(0.2, 0.35))), {}
+
+
+# Transmission
+
+
+@_register("transmission_harmonic", "rad", 8e-5, _each_joint)
+def _transmission_harmonic(robot, joints, size, draws):
+    """An eccentric wheel: an order near 1 or 2 that is no integer, and half as much of its double."""
+    order, phases = draws.choice([1, 2]) * draws.uniform(0.9, 1.1), draws.uniform(0, 2 * np.pi, 2)
+    waves = ((order, size, phases[0]), (2 * order if order < 1.5 else order / 2, 0.5 * size, phases[1]))
+    return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
+
+
+@_register("transmission_ratio", "rad/rad", 3e-4, _each_joint)
+def _transmission_ratio(robot, joints, size, draws):
+    """Of the joint's own ratio, or what the joint before it turns along."""
+    joint = joints[0]
+    of = joint if joint == 0 else joint - draws.integers(2)
+    size = size * draws.choice([-1.0, 1.0])
+    return _with_drive(robot, drives.WrongRatio(joint, int(of), size)), {f"per_q{of + 1}": size}
+
+
+# Elasticity
+
+
+@_register("link_elasticity", "1/(N m^2)", 1e-7, _each_link)
+def _link_elasticity(robot, joints, size, draws):
+    """A tapered tube that also shears and stretches, as a thin-walled one of a quarter metre does."""
+    bending, gyration = 1.0 / size, 0.25**2 / 8.0
+    axial = bending / gyration
+    tube = TaperedTube(bending, 0.77 * bending, axial, 0.5 * axial / 2.6, draws.uniform(0.1, 0.35))
+    return _with_structure(robot, tubes=robot.structure.tubes | {joints[0] + 1: tube}), {}
+
+
+@_register("joint_tilt", "rad/(N m)", 2e-7, _each_joint)
+def _joint_tilt(robot, joints, size, draws):
+    values = size * draws.uniform(0.4, 1.0, 2)
+    across = [axis for axis, part in zip(_AXES, robot.arm.axes[joints[0]], strict=True) if abs(part) < 0.5]
+    tilt = robot.structure.tilt | {joints[0] + 1: tuple(values)}
+    return _with_structure(robot, tilt=tilt), {f"tilt_about_{axis}": v for axis, v in zip(across, values, strict=True)}
+
+
+@_register("base_compliance", "rad/(N m)", 6e-8, _nowhere)
+def _base_compliance(robot, joints, size, draws):
+    """Anchor bolts: the two tilts and the two shifts differ a little."""
+    uneven, horizontal, vertical = draws.uniform(0.85, 1.15, 4), 0.2 * size, 0.1 * size
+    base = (horizontal * uneven[0], horizontal * uneven[1], vertical, size * uneven[2], size * uneven[3], 0.0)
+    return _with_structure(robot, base=base), {"vertical": vertical}
+
+
+@_register("cross_compliance", "rad/(N m)", 8e-8, _each_pair)
+def _cross_compliance(robot, joints, size, draws):
+    size = size * draws.choice([-1.0, 1.0])
+    return _with_gear(robot, gears.Coupling(tuple(joints), size)), {"compliance": size}
+
+
+@_register("joint_dependent_stiffness", "1", 0.1, _each_joint, largest=0.8)
+def _joint_dependent_stiffness(robot, joints, size, draws):
+    """The stiffness, not the compliance, is a cosine."""
+    joint = joints[0]
+    law = gears.AngleDependentStiffness(joint, robot.compliance[joint], size, draws.uniform(0, 2 * np.pi), joint)
+    return _with_gear(robot, law), {}
+
+
+@_register("compensator_stiffness", "N/m", 3e6, _shoulder)
+def _compensator_stiffness(robot, joints, size, draws):
+    joint = joints[0]
+    anchor, crank, free = draws.uniform(0.3, 0.5), draws.uniform(0.15, 0.22), draws.uniform(0.15, 0.3)
+    zero = draws.uniform(-np.pi, np.pi)
+    return _with_gear(robot, gears.CompensatorStiffness(joint, robot.compliance[joint], size, anchor, crank, free, zero)), {}
+
+
+# Gearboxes
+
+
+@_register("stiffening", "1", 0.3, _each_joint, largest=0.95)
+def _stiffening(robot, joints, size, draws):
+    """The compliance falls by shares of `size` at three torques."""
+    joint = joints[0]
+    starts = _usual_torque_Nm(robot, joint) * np.sort(draws.uniform(0.1, 0.8, 3))
+    steps = tuple((start, size * robot.compliance[joint] / 3) for start in starts)
+    return _with_gear(robot, gears.StepwiseStiffening(joint, steps)), {}
+
+
+@_register("lost_motion", "rad", 7e-5, _each_joint)
+def _lost_motion(robot, joints, size, draws):
+    closing = _usual_torque_Nm(robot, joints[0]) * draws.uniform(0.02, 0.1)
+    return _with_gear(robot, gears.DeadBand(joints[0], size, closing)), {"half_play": size}
+
+
+@_register("hysteresis", "rad", 5e-5, _each_joint, ("approach",))
+def _hysteresis(robot, joints, size, draws):
+    """Under load part of the wound-up friction turns round, so that the mean half width is less than that at rest.
+
+    The catalogue's half width is counted along the approach, and friction is against it.
+    """
+    torque = _usual_torque_Nm(robot, joints[0]) * draws.uniform(2.0, 6.0)
+    return _with_gear(robot, gears.BoucWen(joints[0], size, torque)), {"half_width": -size}
+
+
+# Load
+
+
+@_register("force_scale", "1", 0.02, _nowhere)
+def _force_scale(robot, joints, size, draws):
+    return replace(robot, cell=replace(robot.cell, scale=1.0 / (1.0 + size) - 1.0)), {"scale": size}
+
+
+@_register("force_misalignment", "rad", 0.02, _nowhere)
+def _force_misalignment(robot, joints, size, draws):
+    turn = size * _direction(draws)
+    wrong = _with_wrong_cell(robot, "turn", draws, turn_rad=tuple(turn))
+    return wrong, _if_at_flange(wrong, _named("about_", turn))
+
+
+@_register("force_bias", "N", 20.0, _nowhere)
+def _force_bias(robot, joints, size, draws):
+    """What is felt beyond what is shown is minus the bias of the display."""
+    felt = size * _direction(draws)
+    wrong = _with_wrong_cell(robot, "bias", draws, bias_N=tuple(-felt))
+    return wrong, _if_at_flange(wrong, _named("along_", felt))
+
+
+@_register("application_point", "m", 0.02, _nowhere)
+def _application_point(robot, joints, size, draws):
+    shift, frame = size * _direction(draws), _drawn_frame(robot, "shift", draws)
+    return replace(robot, cell=replace(robot.cell, shift_m=tuple(shift), in_flange=frame)), _named("shift_", shift)
+
+
+# Drift
+
+
+@_register("frame_drift", "m/h", 1e-4, _nowhere, ("time",))
+def _frame_drift(robot, joints, size, draws):
+    """A stand that settles over hours, and so drifts less at the end than at the start."""
+    drift = Drift(tuple(size * _direction(draws)), tuple(0.5 * size * _direction(draws)), draws.uniform(3.0, 8.0))
+    return replace(robot, tracker=replace(robot.tracker, drift=drift)), {}
+
+
+@_register("thermal_growth", "1/K", 1.2e-5, _nowhere, ("temperature",))
+def _thermal_growth(robot, joints, size, draws):
+    """The castings follow the thermometer with a lag, which the catalogue's law by temperature does not know."""
+    return replace(robot, expansion_per_K=size), {}
+
+
+# Outside of the catalogue
+
+
+@_register(OUTSIDE + "cable_pull", "rad/rad^2", 1e-4, lambda arm: [(j,) for j in range(3, arm.joints)])
+def _cable_pull(robot, joints, size, draws):
+    """A hose wound by its joint and the one before pulls in proportion to the product of the two angles."""
+    joint = joints[0]
+    return _with_drive(robot, drives.CablePull(joint, (joint - 1, joint), size * draws.choice([-1.0, 1.0]))), {}
+
+
+@_register(OUTSIDE + "asymmetric_gear", "rad/(N m)^2", 1e-10, _each_joint)
+def _asymmetric_gear(robot, joints, size, draws):
+    return _with_gear(robot, gears.Asymmetric(joints[0], size * draws.choice([-1.0, 1.0]))), {}
+
+
+@_register(OUTSIDE + "slipping_zero", "rad", 5e-5, _each_joint)
+def _slipping_zero(robot, joints, size, draws):
+    return _with_drive(robot, drives.SlippingZero(joints[0], size)), {}
+
+
+@_register(OUTSIDE + "warm_softening", "1/K", 0.01, _each_joint)
+def _warm_softening(robot, joints, size, draws):
+    return _with_gear(robot, gears.WarmSoftening(joints[0], robot.compliance[joints[0]], size)), {}
+
+
+@_register(OUTSIDE + "foreign_angle_stiffness", "1", 0.15, lambda arm: [(2,), (3,)], largest=0.8)
+def _foreign_angle_stiffness(robot, joints, size, draws):
+    """A parallel rod: the stiffness of the shoulder depends on the angle of the elbow, or the other way round."""
+    joint, other = joints[0], {1: 2, 2: 1}[joints[0]]
+    law = gears.AngleDependentStiffness(joint, robot.compliance[joint], size, draws.uniform(0, 2 * np.pi), other)
+    return _with_gear(robot, law), {}
+
+
+@_register(OUTSIDE + "stiffening_link", "rad/(N m)^3", 1e-13, _each_link)
+def _stiffening_link(robot, joints, size, draws):
+    """A bolted link whose flanges open with the cube of the bending moment; without it the link is rigid."""
+    stretch = joints[0] + 1
+    rigid = TaperedTube(np.inf, np.inf)
+    changed = _with_structure(robot, tubes=robot.structure.tubes | {stretch: rigid})
+    pieces = robot.structure.segments
+    laws = tuple((f"link{stretch}_{piece}_bend", lambda moment: size * moment**3 / pieces) for piece in range(pieces))
+    return replace(changed, structure_laws=(*robot.structure_laws, *laws)), {}
+
+
+@_register(OUTSIDE + "foot_slip", "m", 8e-5, _nowhere)
+def _foot_slip(robot, joints, size, draws):
+    """A foot between its bolts: it shifts by a clearance as soon as the push exceeds friction, and no further."""
+    friction = draws.uniform(100.0, 300.0)
+    changed = _with_structure(robot, base=(0.0,) * 6)
+
+    def slip(push):
+        return size * np.sign(push) * np.clip((np.abs(push) - friction) / friction, 0.0, 1.0)
+
+    laws = (("base_x", slip), ("base_y", slip))
+    return replace(changed, structure_laws=(*robot.structure_laws, *laws)), {}
+
+
+@_register(OUTSIDE + "refraction", "1/m", 2e-6, _nowhere)
+def _refraction(robot, joints, size, draws):
+    return replace(robot, tracker=replace(robot.tracker, refraction_per_m=size)), {}
+
+
+@_register(OUTSIDE + "tracker_scale", "1", 2e-5, _nowhere)
+def _tracker_scale(robot, joints, size, draws):
+    return replace(robot, tracker=replace(robot.tracker, scale=size)), {}
+
+
+@_register(OUTSIDE + "eccentric_nest", "m", 1e-4, _nowhere)
+def _eccentric_nest(robot, joints, size, draws):
+    return replace(robot, nest=EccentricNest(size)), {}
+
+
+@_register(OUTSIDE + "cell_crosstalk", "1/N", 5e-5, _nowhere)
+def _cell_crosstalk(robot, joints, size, draws):
+    return replace(robot, cell=replace(robot.cell, crosstalk_per_N=size)), {}
+
+
+@_register(OUTSIDE + "short_waves", "rad", 8e-5, _each_joint)
+def _short_waves(robot, joints, size, draws):
+    """Teeth of a motor's pinion: of orders far above what the poses of a campaign can resolve."""
+    orders = draws.uniform(45.0, 120.0, 3)
+    waves = tuple((order, size / np.sqrt(3), phase) for order, phase in zip(orders, draws.uniform(0, 6.28, 3), strict=True))
+    return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}

@@ -1,0 +1,127 @@
+"""Where the drives really stand, against what the controller shows: errors of angle that no load is needed for."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Visits:
+    """What the drives went through, for S states of the arm.
+
+    Attributes
+    ----------
+    angle : ndarray (S, n)
+        As the controller believes, rad.
+    approach : ndarray of int (S,)
+        Number of the approach; states of one number were reached by the same move.
+    time_s : ndarray (S,)
+    seed : int
+        Of what is random about the drives.
+    """
+
+    angle: np.ndarray
+    approach: np.ndarray
+    time_s: np.ndarray
+    seed: int
+
+    def each_approach(self, draws, *shape):
+        """Standard normal numbers (S, ...), the same within one approach."""
+        return draws.standard_normal((int(self.approach.max()) + 1, *shape))[self.approach]
+
+
+@dataclass(frozen=True)
+class ZeroOffset:
+    """A drive that was mastered wrong by `offset_rad`; `joint` from 0."""
+
+    joint: int
+    offset_rad: float
+
+    def __call__(self, visits):
+        return _one(visits, self.joint, np.full(len(visits.angle), self.offset_rad))
+
+
+@dataclass(frozen=True)
+class TransmissionError:
+    """Teeth and eccentric wheels: the sum of a_k sin(k q + phase_k).
+
+    Attributes
+    ----------
+    joint : int
+    waves : tuple of (float, float, float)
+        (order k, which need be no integer; amplitude in rad; phase in rad).
+    """
+
+    joint: int
+    waves: tuple
+
+    def __call__(self, visits):
+        q = visits.angle[:, self.joint]
+        return _one(visits, self.joint, sum(size * np.sin(order * q + phase) for order, size, phase in self.waves))
+
+
+@dataclass(frozen=True)
+class WrongRatio:
+    """A drive that turns with another's angle, or with its own by a wrong ratio: e q_m, rad/rad."""
+
+    joint: int
+    of: int
+    per_rad: float
+
+    def __call__(self, visits):
+        return _one(visits, self.joint, self.per_rad * visits.angle[:, self.of])
+
+
+@dataclass(frozen=True)
+class CablePull:
+    """A hose that is wound by two joints at once and pulls at a third: e q_a q_b, rad/rad^2."""
+
+    joint: int
+    wound: tuple
+    per_rad2: float
+
+    def __call__(self, visits):
+        one, other = self.wound
+        return _one(visits, self.joint, self.per_rad2 * visits.angle[:, one] * visits.angle[:, other])
+
+
+@dataclass(frozen=True)
+class SlippingZero:
+    """A coupling that slips a little at some moves: a random walk from approach to approach.
+
+    Attributes
+    ----------
+    joint : int
+    step_rad : float
+        Standard deviation of a slip.
+    share : float
+        Of the moves at which it slips.
+    """
+
+    joint: int
+    step_rad: float
+    share: float = 0.3
+
+    def __call__(self, visits):
+        sizes, whether = (np.random.default_rng([visits.seed, 7, part]) for part in range(2))
+        # Approaches are numbered in the order of time.
+        number = int(visits.approach.max()) + 1
+        slips = self.step_rad * sizes.standard_normal(number) * (whether.random(number) < self.share)
+        return _one(visits, self.joint, np.cumsum(slips)[visits.approach])
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Each approach ends a little elsewhere; `sigma_rad` (n,). No defect: what every drive does."""
+
+    sigma_rad: tuple
+
+    def __call__(self, visits):
+        draws = np.random.default_rng([visits.seed, 11])
+        return np.array(self.sigma_rad) * visits.each_approach(draws, visits.angle.shape[1])
+
+
+def _one(visits, joint, turn):
+    found = np.zeros_like(visits.angle)
+    found[:, joint] = turn
+    return found

@@ -1,0 +1,222 @@
+"""The arm as a MuJoCo model: each drive a commanded hinge and, in series, a hinge that springs; links cut into segments.
+
+Structural springs (foot, bearings, link segments) are joints of the same tree. The springs' stiffnesses stand in the model too,
+so that MuJoCo's own inverse dynamics can judge an equilibrium that was found without them.
+"""
+
+from dataclasses import dataclass
+from xml.etree.ElementTree import Element, SubElement, tostring
+
+import mujoco
+import numpy as np
+
+from elastocal.errors import InputError
+from elastocal.plant.arm import turned
+from elastocal.plant.structure import STANDARD_GRAVITY
+
+# MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
+_NO_MASS, _NO_INERTIA = "1e-12", "1e-12 1e-12 1e-12"
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A compiled model and where in it what is.
+
+    Attributes
+    ----------
+    model : mujoco.MjModel
+    drive, gear : ndarray of int (n,)
+        Coordinates that are commanded, and those that spring behind them.
+    springs : dict of str to int
+        Structural coordinates by name, such as ``base_x``, ``tilt2_0``, ``link3_4_bend0``.
+    compliance : ndarray (coordinates,)
+        Of structural springs, m/N or rad/(N m); zero elsewhere.
+    sites : dict of str to int
+        Measuring points.
+    flange : str
+    compensator : structure.Compensator or None
+    xml : str
+    """
+
+    model: mujoco.MjModel
+    drive: np.ndarray
+    gear: np.ndarray
+    springs: dict
+    compliance: np.ndarray
+    sites: dict
+    flange: str
+    compensator: object
+    xml: str
+
+
+class _Tree:
+    """Bodies so far; the frame in which the next one is placed."""
+
+    def __init__(self, world):
+        self.body, self.position, self.rotation, self.compliance = world, np.zeros(3), np.eye(3), {}
+
+    def descend(self, name):
+        """New body at the current frame."""
+        self.body = SubElement(self.body, "body", name=name, pos=_text(self.position), quat=_quaternion(self.rotation))
+        # In front of all else in the body, as MuJoCo's schema has it.
+        SubElement(self.body, "inertial", pos="0 0 0", mass=_NO_MASS, diaginertia=_NO_INERTIA)
+        self.position, self.rotation = np.zeros(3), np.eye(3)
+
+    def joint(self, name, kind, axis, compliance=None):
+        """Joint of the current body; `compliance` None for one that is commanded."""
+        stiffness = {"stiffness": _text([1.0 / compliance])} if compliance else {}
+        SubElement(self.body, "joint", name=name, type=kind, axis=_text(axis), armature="1", **stiffness)
+        if compliance is not None:
+            self.compliance[name] = compliance
+
+    def weigh(self, mass, position):
+        """Put a mass on the current body; masses add up at their common centre."""
+        inertial = self.body.find("inertial")
+        old, where = float(inertial.get("mass")), np.array(inertial.get("pos").split(), float)
+        inertial.set("pos", _text((old * where + mass * np.asarray(position)) / (old + mass)))
+        inertial.set("mass", _text([old + mass]))
+
+
+def machine_of(arm, structure, gear_compliance=None):
+    """Build the model of an arm.
+
+    Parameters
+    ----------
+    arm : Arm
+    structure : Structure
+    gear_compliance : ndarray (n,), optional
+        rad/(N m), written into the model as the stiffness of the gears for checks by `mujoco.mj_inverse`.
+
+    Returns
+    -------
+    Machine
+    """
+    root = Element("mujoco", model="plant")
+    SubElement(root, "compiler", angle="radian", autolimits="false")
+    SubElement(root, "option", gravity=f"0 0 {-STANDARD_GRAVITY if structure.gravity else 0.0!r}")
+    tree = _Tree(SubElement(root, "worldbody"))
+    tree.descend("foot")
+    for number, name in enumerate(f"{kind}{axis}" for kind in ("base_", "base_r") for axis in "xyz"):
+        if structure.base is not None:
+            kind = "slide" if number < 3 else "hinge"
+            tree.joint(name, kind, np.eye(3)[number % 3], structure.base[number])
+    stiffness = np.zeros(arm.joints) if gear_compliance is None else gear_compliance
+    for number, stretch in enumerate(arm.stretches):
+        _add_stretch(tree, number, stretch, structure)
+        if number < arm.joints:
+            tree.descend(f"arm{number + 1}")
+            axis = arm.axes[number]
+            tree.joint(f"drive{number + 1}", "hinge", axis)
+            tree.joint(f"gear{number + 1}", "hinge", axis, stiffness[number])
+            across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
+            for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
+                tree.joint(f"tilt{number + 1}_{which}", "hinge", across[which], compliance)
+    if structure.payload is not None:
+        load = structure.payload
+        tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
+    if structure.compensator is not None:
+        _add_compensator(root, arm, structure)
+    xml = tostring(root, encoding="unicode")
+    return _indexed(arm, structure, tree, xml)
+
+
+def _indexed(arm, structure, tree, xml):
+    model = mujoco.MjModel.from_xml_string(xml)
+    place = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
+    compliance = np.zeros(model.nq)
+    for name, value in tree.compliance.items():
+        if not name.startswith("gear"):
+            compliance[place[name]] = value
+    numbers = range(1, arm.joints + 1)
+    return Machine(
+        model,
+        np.array([place[f"drive{j}"] for j in numbers]),
+        np.array([place[f"gear{j}"] for j in numbers]),
+        {name: index for name, index in place.items() if not name.startswith(("drive", "gear"))},
+        compliance,
+        {name: model.site(name).id for name in arm.points},
+        arm.points[-1],
+        structure.compensator,
+        xml,
+    )
+
+
+def _add_stretch(tree, number, stretch, structure):
+    """Walk from the near to the far end of a stretch and leave the tree there."""
+    vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, (0.0, 0.0, 0.0)))
+    turn = turned(np.array(structure.wrong_turns.get(number, (0.0, 0.0, 0.0))))
+    rotation = stretch.rotation @ turn
+    weights = [(mass.mass_kg, mass.along, np.array(mass.aside_m)) for mass in structure.masses if mass.stretch == number]
+    tube = structure.tubes.get(number)
+    if tube is None:
+        for mass, along, aside in weights:
+            tree.weigh(mass, tree.position + tree.rotation @ (along * vector + aside))
+        for point in stretch.points:
+            # What is wrong about a stretch is wrong at its far end.
+            at_end = np.allclose(point.position_m, stretch.vector_m, atol=1e-12)
+            where, facing = (vector, point.rotation @ turn) if at_end else (point.position_m, point.rotation)
+            _add_site(tree, point.name, tree.position + tree.rotation @ where, tree.rotation @ facing)
+        tree.position, tree.rotation = tree.position + tree.rotation @ vector, tree.rotation @ rotation
+        return
+    _add_segments(tree, number, vector, tube, structure.segments, weights)
+    for point in stretch.points:
+        if not np.allclose(point.position_m, stretch.vector_m, atol=1e-12):
+            raise InputError("structure", f"tubes[{number}]", f"[{point.name}] inside it", "points at the far end of a link")
+        _add_site(tree, point.name, tree.position, point.rotation @ turn)
+    tree.rotation = rotation
+
+
+def _add_segments(tree, number, vector, tube, count, weights):
+    """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
+    along = vector / np.linalg.norm(vector)
+    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    first /= np.linalg.norm(first)
+    across = (first, np.cross(along, first))
+    piece, step = np.linalg.norm(vector) / count, vector / count
+    tree.position = tree.position + tree.rotation @ (0.5 * step)
+    for segment in range(count):
+        tree.descend(f"link{number}_{segment}")
+        width = 1.0 - tube.taper * (segment + 0.5) / count
+        name = f"link{number}_{segment}_"
+        for which, axis in enumerate(across):
+            if np.isfinite(tube.shear_N):
+                tree.joint(f"{name}shear{which}", "slide", axis, piece / (tube.shear_N * width))
+        if np.isfinite(tube.axial_N):
+            tree.joint(f"{name}axial", "slide", along, piece / (tube.axial_N * width))
+        for which, axis in enumerate(across):
+            tree.joint(f"{name}bend{which}", "hinge", axis, piece / (tube.bending_Nm2 * width**3))
+        tree.joint(f"{name}twist", "hinge", along, piece / (tube.torsion_Nm2 * width**3))
+        for mass, share, aside in weights:
+            # On the segment that holds its place; the body's origin is the middle of the segment.
+            if min(int(share * count), count - 1) == segment:
+                tree.weigh(mass, (share - (segment + 0.5) / count) * vector + aside)
+        tree.position = step if segment < count - 1 else 0.5 * step
+
+
+def _add_site(tree, name, position, rotation):
+    """A measuring point, in the frame of the current body."""
+    SubElement(tree.body, "site", name=name, pos=_text(position), quat=_quaternion(rotation))
+
+
+def _add_compensator(root, arm, structure):
+    """Two sites and the tendon between them: from the body before the shoulder's drive to the body behind it."""
+    shoulder = {name: root.find(f".//body[@name='{name}']") for name in ("arm1", "arm2")}
+    spring, before = structure.compensator, arm.stretches[1]
+    anchor = before.vector_m + before.rotation @ np.array(spring.anchor_m)
+    for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", np.array(spring.crank_m))):
+        SubElement(shoulder[body], "site", name=name, pos=_text(place))
+    tendon = SubElement(root, "tendon")
+    size = {"stiffness": _text([spring.stiffness_N_per_m]), "springlength": _text([spring.free_length_m])}
+    path = SubElement(tendon, "spatial", name="compensator", **size)
+    for name in ("anchor", "crank"):
+        SubElement(path, "site", site=name)
+
+
+def _text(numbers):
+    return " ".join(repr(float(number)) for number in numbers)
+
+
+def _quaternion(rotation):
+    quaternion = np.empty(4)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
+    return _text(quaternion)

@@ -1,0 +1,178 @@
+"""A physical robot with its tracker and load cell: all that is true of it, and what a tracker without noise would read."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from elastocal.plant.arm import Arm
+from elastocal.plant.drives import Visits
+from elastocal.plant.gears import GearStates, LinearSprings
+from elastocal.plant.load_cell import LoadCell
+from elastocal.plant.multibody import machine_of
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.statics import Loading, equilibrium, generalized_forces
+from elastocal.plant.structure import Structure
+from elastocal.plant.tracker import EccentricNest, Tracker
+
+_REFERENCE_C = 20.0
+
+
+@dataclass(frozen=True)
+class Warmth:
+    """How the robot warms up: the thermometer on a motor first, the castings after it.
+
+    Attributes
+    ----------
+    rise_K : float
+    motor_s, lag_s : float
+        Time constant of the thermometer, dT_m = rise (1 - exp(-t / T_m)), and by which the castings follow it.
+    """
+
+    rise_K: float = 10.0
+    motor_s: float = 3000.0
+    lag_s: float = 1200.0
+
+    def shown(self, time_s):
+        """Temperature that is logged, °C."""
+        return _REFERENCE_C - self.rise_K * np.expm1(-time_s / self.motor_s)
+
+    def of_castings(self, time_s):
+        """Temperature of the links, °C: the logged one behind a first-order lag."""
+        fast, slow = self.lag_s, self.motor_s
+        rest = (slow * np.exp(-time_s / slow) - fast * np.exp(-time_s / fast)) / (slow - fast)
+        return _REFERENCE_C + self.rise_K * (1.0 - rest)
+
+
+@dataclass(frozen=True)
+class PhysicalRobot:
+    """All that is true of a robot and its instruments; the default is faultless.
+
+    Attributes
+    ----------
+    arm : Arm
+    compliance : ndarray (n,)
+        The gears' own, rad/(N m).
+    structure : Structure
+    gears : tuple of callable
+        Laws beside the linear springs; see `gears`.
+    drives : tuple of callable
+        Errors of angle; see `drives`.
+    structure_laws : tuple of (str, callable)
+        Laws of structural springs by the start of their names.
+    expansion_per_K : float
+    warmth : Warmth
+    cell : LoadCell
+    tracker : Tracker
+    nest : EccentricNest or None
+        Of the flange's target.
+    """
+
+    arm: Arm
+    compliance: np.ndarray
+    structure: Structure = field(default_factory=Structure)
+    gears: tuple = ()
+    drives: tuple = ()
+    structure_laws: tuple = ()
+    expansion_per_K: float = 0.0
+    warmth: Warmth = field(default_factory=Warmth)
+    cell: LoadCell = field(default_factory=LoadCell)
+    tracker: Tracker = field(default_factory=Tracker)
+    nest: EccentricNest | None = None
+
+
+def specimen(arm, seed, spread=0.15):
+    """One robot of a series: its gears are softer or stiffer than the robot file says, evenly up to a share of `spread`.
+
+    Parameters
+    ----------
+    arm : Arm
+    seed : int
+    spread : float
+
+    Returns
+    -------
+    PhysicalRobot
+        Faultless.
+    """
+    return PhysicalRobot(arm, arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints))
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What is done with a robot, S states in the order of time.
+
+    Attributes
+    ----------
+    angle : ndarray (S, n)
+        As the controller believes, rad.
+    force, lever : ndarray (S, 3)
+        As the load cell shall show it, N, and from the flange's origin to where it acts, m; base axes.
+    pose, load, repeat : ndarray of int (S,)
+    approach : ndarray of int (S,)
+        Number of the move that led there.
+    sense : ndarray of int (S, n)
+        In which each joint moved last.
+    previous : ndarray of int (S,)
+        State before, where only the load was changed; -1 after a move.
+    time_s : ndarray (S,)
+    training : ndarray of bool (S,)
+        Not held out for the test.
+    seed : int
+    """
+
+    angle: np.ndarray
+    force: np.ndarray
+    lever: np.ndarray
+    pose: np.ndarray
+    load: np.ndarray
+    repeat: np.ndarray
+    approach: np.ndarray
+    sense: np.ndarray
+    previous: np.ndarray
+    time_s: np.ndarray
+    training: np.ndarray
+    seed: int
+
+    @property
+    def shown_wrench(self):
+        """What the campaign says of the load, (S, 6), N, N m."""
+        return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
+
+
+def seen_poses(robot, schedule):
+    """Poses of all targets as a tracker without noise reads them.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    schedule : Schedule
+
+    Returns
+    -------
+    position : ndarray (S, targets, 3)
+        m, base frame; targets as in ``robot.arm.points``.
+    rotation : ndarray (S, targets, 3, 3)
+    """
+    machine = machine_of(robot.arm, robot.structure)
+    visits = Visits(schedule.angle, schedule.approach, schedule.time_s, schedule.seed)
+    drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))
+    warm = robot.warmth.of_castings(schedule.time_s)
+    growth = robot.expansion_per_K * (warm - _REFERENCE_C)
+    loading = Loading(drive, np.zeros((len(drive), 6)), growth)
+    facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
+    if robot.cell.in_flange:
+        coordinates = np.zeros((len(drive), machine.model.nq))
+        coordinates[:, machine.drive] = drive
+        facing = generalized_forces(machine, coordinates, loading)[2][:, -1]
+    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth)
+    laws = (LinearSprings(robot.compliance), *robot.gears)
+
+    def gear_deflection(torque, unloaded):
+        states = GearStates(torque, unloaded, schedule.angle, schedule.sense, warm, schedule.previous)
+        return sum(law(states) for law in laws)
+
+    rest = equilibrium(machine, loading, gear_deflection, robot.structure_laws)
+    position, rotation = rest.position, rest.rotation
+    if robot.nest is not None:
+        position[:, -1] = robot.nest.moved(position[:, -1], rotation[:, -1], schedule.angle[:, -1])
+    return robot.tracker.seen(position, rotation, schedule.time_s)

@@ -1,0 +1,104 @@
+"""What an arm is made of beside its drives: masses, tubes, bearings, foot, gravity compensator, and wrong dimensions."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class TaperedTube:
+    """An elastic link: a thin-walled tube that gets thinner towards its far end.
+
+    Attributes
+    ----------
+    bending_Nm2, torsion_Nm2 : float
+        E I and G J at its near end.
+    axial_N, shear_N : float
+        E A and k G A; inf where the link does not stretch or shear.
+    taper : float
+        Share of the diameter that is lost at the far end; E I and G J go with its third power, E A and k G A with itself.
+    """
+
+    bending_Nm2: float
+    torsion_Nm2: float
+    axial_N: float = np.inf
+    shear_N: float = np.inf
+    taper: float = 0.0
+
+
+@dataclass(frozen=True)
+class Mass:
+    """A weight on a stretch.
+
+    Attributes
+    ----------
+    stretch : int
+        0 is the column, n the flange.
+    mass_kg : float
+    along : float
+        Where on the stretch, 0 at its near end, 1 at its far end.
+    aside_m : tuple of float
+        And how far off the line, in the frame at the near end.
+    """
+
+    stretch: int
+    mass_kg: float
+    along: float = 0.5
+    aside_m: tuple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A coil spring from the carousel to the upper arm.
+
+    Attributes
+    ----------
+    anchor_m : tuple of float
+        Fixed end, from the shoulder, in the frame that turns with joint 1.
+    crank_m : tuple of float
+        Moving end, from the shoulder, in the frame of the upper arm.
+    stiffness_N_per_m, free_length_m : float
+        Pull = stiffness (length - free length).
+    """
+
+    anchor_m: tuple
+    crank_m: tuple
+    stiffness_N_per_m: float
+    free_length_m: float
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Everything of an arm that its robot file does not tell. The default is an arm of drives alone.
+
+    Attributes
+    ----------
+    base : tuple of float or None
+        Compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)).
+    tilt : dict of int to (float, float)
+        Of a joint, from 1: compliances across its axis, rad/(N m), in the order of the remaining axes.
+    tubes : dict of int to TaperedTube
+        Elastic stretches.
+    segments : int
+        Into how many rigid pieces an elastic stretch is cut.
+    masses : tuple of Mass
+    payload : Mass or None
+        Its place counts from the flange: ``aside_m`` in the flange's frame.
+    compensator : Compensator or None
+    wrong_vectors_m, wrong_turns : dict of int to tuple
+        Of a stretch: by how much its vector and its far end's rotation vector (rad) differ from the robot file.
+    gravity : bool
+    """
+
+    base: tuple | None = None
+    tilt: dict = field(default_factory=dict)
+    tubes: dict = field(default_factory=dict)
+    segments: int = 6
+    masses: tuple = ()
+    payload: Mass | None = None
+    compensator: Compensator | None = None
+    wrong_vectors_m: dict = field(default_factory=dict)
+    wrong_turns: dict = field(default_factory=dict)
+    gravity: bool = True

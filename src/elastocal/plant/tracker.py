@@ -1,0 +1,169 @@
+"""What a laser tracker reads of the targets, with all that it does wrong."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.plant.arm import turned
+
+_HOUR_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Drift:
+    """A stand that creeps: motion (d, r) after t hours is rate * u, u = T (1 - exp(-t / T)), so that it slows down.
+
+    Attributes
+    ----------
+    rate_m_per_h, rate_rad_per_h : tuple of float
+        At the start; along and about the base axes, seen as a motion of the readings.
+    settling_h : float
+        T; inf for a steady drift.
+    """
+
+    rate_m_per_h: tuple
+    rate_rad_per_h: tuple
+    settling_h: float = np.inf
+
+    def moved(self, time_s):
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the readings."""
+        hours = np.asarray(time_s) / _HOUR_S
+        if np.isfinite(self.settling_h):
+            hours = -self.settling_h * np.expm1(-hours / self.settling_h)
+        return hours[:, None] * np.array(self.rate_m_per_h), turned(hours[:, None] * np.array(self.rate_rad_per_h))
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """A laser tracker; the default only has noise.
+
+    Attributes
+    ----------
+    sigma_m, sigma_m_per_m : float
+        Standard deviation of a coordinate is sigma_m + sigma_m_per_m * range.
+    sigma_rad : float
+    stand_m : tuple of float
+        Where it stands, base frame.
+    frame_turn : tuple of float
+        Rotation vector of its own axes in the base's; readings are in the base frame unless the design says otherwise.
+    drift : Drift or None
+    refraction_per_m : float
+        Bent light: a target at range r is read at r + k r^2.
+    scale : float
+        A wrong wavelength: at (1 + s) r.
+    outliers : float
+        Share of the readings that are off by far.
+    outlier_sigmas : float
+        Of how many standard deviations these are.
+    """
+
+    sigma_m: float = 60e-6
+    sigma_m_per_m: float = 0.0
+    sigma_rad: float = 60e-6
+    stand_m: tuple = (6.0, -2.0, 1.5)
+    frame_turn: tuple = (0.0, 0.0, 0.0)
+    drift: Drift | None = None
+    refraction_per_m: float = 0.0
+    scale: float = 0.0
+    outliers: float = 0.0
+    outlier_sigmas: float = 8.0
+
+    def seen(self, position, rotation, time_s):
+        """Poses as read without noise, base frame.
+
+        Parameters
+        ----------
+        position : ndarray (S, targets, 3)
+            m, base frame.
+        rotation : ndarray (S, targets, 3, 3)
+        time_s : ndarray (S,)
+
+        Returns
+        -------
+        position, rotation : ndarray
+        """
+        sight = position - np.array(self.stand_m)
+        far = np.linalg.norm(sight, axis=-1, keepdims=True)
+        position = position + (self.scale + self.refraction_per_m * far) * sight
+        if self.drift is not None:
+            shift, turn = self.drift.moved(time_s)
+            position = np.einsum("sij,stj->sti", turn, position) + shift[:, None]
+            rotation = turn[:, None] @ rotation
+        return position, rotation
+
+    def read(self, position, rotation, draws):
+        """Add noise, and outliers, to poses as seen.
+
+        Parameters
+        ----------
+        position, rotation : ndarray (S, targets, 3), (S, targets, 3, 3)
+        draws : numpy.random.Generator
+
+        Returns
+        -------
+        position, rotation, outlier
+            The last one bool (S, targets).
+        """
+        # A generator each, so that readings that come later change none that are there.
+        chance, metres, radians = draws.spawn(3)
+        sigma = self.sigma_at(position)[..., None]
+        outlier = chance.random(position.shape[:2]) < self.outliers
+        large = np.where(outlier, self.outlier_sigmas, 1.0)[..., None]
+        position = position + large * sigma * metres.standard_normal(position.shape)
+        turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
+        return position, turn @ rotation, outlier
+
+    def sigma_at(self, position):
+        """Standard deviation of a coordinate at positions (..., 3), m."""
+        return self.sigma_m + self.sigma_m_per_m * np.linalg.norm(position - np.array(self.stand_m), axis=-1)
+
+    def in_own_frame(self, position, rotation):
+        """Poses of the base frame in the tracker's."""
+        own = turned(np.array(self.frame_turn))
+        return (position - np.array(self.stand_m)) @ own, own.T @ rotation
+
+
+@dataclass(frozen=True)
+class EccentricNest:
+    """A nest of the flange's target whose centre circles twice a turn of the tool: e (0, cos 2 q_n, sin 2 q_n) in its frame."""
+
+    radius_m: float
+
+    def moved(self, position, rotation, tool_angle):
+        """Positions (S, 3) of the target with rotations (S, 3, 3) at tool angles (S,)."""
+        wobble = np.stack([np.zeros_like(tool_angle), np.cos(2 * tool_angle), np.sin(2 * tool_angle)], axis=-1)
+        return position + self.radius_m * np.einsum("sij,sj->si", rotation, wobble)
+
+
+def rotation_vector(rotation):
+    """Rotation vectors of rotation matrices by way of quaternions, rad; angles up to and at a half turn.
+
+    Parameters
+    ----------
+    rotation : ndarray (..., 3, 3)
+
+    Returns
+    -------
+    ndarray (..., 3)
+    """
+    r = rotation
+    trace = np.trace(r, axis1=-2, axis2=-1)
+    # Shepperd: of the four quaternion components the largest is found by a root, the others by division.
+    squares = np.stack([trace, r[..., 0, 0], r[..., 1, 1], r[..., 2, 2]], axis=-1)
+    largest = np.argmax(squares, axis=-1)
+    w = np.stack([1 + trace, r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], -1)
+    rows = [w]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        row = np.empty_like(w)
+        row[..., 0] = r[..., k, j] - r[..., j, k]
+        row[..., 1 + i] = 1 + 2 * r[..., i, i] - trace
+        row[..., 1 + j] = r[..., i, j] + r[..., j, i]
+        row[..., 1 + k] = r[..., i, k] + r[..., k, i]
+        rows.append(row)
+    quaternion = np.take_along_axis(np.stack(rows, axis=-2), largest[..., None, None], axis=-2)[..., 0, :]
+    quaternion /= np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    quaternion *= np.where(quaternion[..., :1] < 0, -1.0, 1.0)
+    sine = np.linalg.norm(quaternion[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(sine, quaternion[..., :1])
+    return quaternion[..., 1:] * np.divide(angle, sine, out=np.full_like(sine, 2.0), where=sine > 0)

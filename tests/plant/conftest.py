@@ -1,0 +1,52 @@
+"""Robots and campaigns for the plant's tests, which need MuJoCo: the extra `blind`, not among the pins of other tests."""
+
+from importlib import import_module
+
+import numpy as np
+import pytest
+from analysed_robots import ROBOTS
+
+try:
+    import mujoco  # noqa: F401 - only whether it is there
+except ImportError:
+    collect_ignore_glob = ["test_*.py"]
+else:
+    # By name, for without MuJoCo not even the names could be had.
+    arms, campaigns, robots = (import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot"))
+
+
+@pytest.fixture(scope="session", params=["kuka", "fanuc", "abb"])
+def name(request):
+    """Each robot of the blind proof in turn."""
+    return request.param
+
+
+@pytest.fixture(scope="session")
+def arm(name):
+    return arms.arm_from_file(ROBOTS / f"{name}.yaml")
+
+
+@pytest.fixture(scope="session")
+def fanuc_arm():
+    return arms.arm_from_file(ROBOTS / "fanuc.yaml")
+
+
+@pytest.fixture(scope="session")
+def fanuc_specimen(fanuc_arm):
+    return robots.specimen(fanuc_arm, 4)
+
+
+@pytest.fixture(scope="session")
+def small():
+    """A short campaign."""
+    return campaigns.Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
+
+
+@pytest.fixture(scope="session")
+def schedule(fanuc_arm, small):
+    return campaigns.schedule_of(fanuc_arm, small, 2)
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(1)

@@ -1,0 +1,247 @@
+"""The faultless plant against the analysis' own model, pinocchio and MuJoCo's inverse dynamics, which share no line with it."""
+
+import time
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from analysed_robots import ROBOTS, analysed
+from support import OTHER_CHAINS, robot_of
+
+from elastocal.elastostatics import generalized_forces as joint_torques
+from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.links import extended_chain, spring_compliance
+from elastocal.plant.arm import arm_from_document, arm_from_file
+from elastocal.plant.multibody import machine_of
+from elastocal.plant.statics import Loading, equilibrium, generalized_forces
+from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal.robot import Link, Tube, stretches
+
+STATES = 100
+
+
+def angles_and_wrenches(arm, force=1000.0, seed=0):
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(*arm.limits.T, (STATES, arm.joints))
+    push = rng.standard_normal((STATES, 3))
+    push *= force / np.linalg.norm(push, axis=1, keepdims=True)
+    return angles, np.hstack([push, np.cross([0.0, 0.5, 0.0], push)])
+
+
+def at_rest(arm, angles, wrench, structure=None, compliance=None):
+    compliance = arm.compliance if compliance is None else compliance
+    machine = machine_of(arm, structure or Structure(), compliance)
+    loading = Loading(angles, wrench, np.zeros(len(angles)))
+    return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
+
+
+def deflections(arm, angles, wrench, **more):
+    """Of each measuring point, m and rad, ndarray (points, S, 6)."""
+    machine, bent = at_rest(arm, angles, wrench, **more)
+    _, position, rotation = generalized_forces(
+        machine, np.where(np.isin(np.arange(machine.model.nq), machine.drive), bent.coordinates, 0.0), loading_of(angles)
+    )
+    points = range(position.shape[1])
+    return np.array(
+        [pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p]) for p in points]
+    )
+
+
+def loading_of(angles):
+    return Loading(angles, np.zeros((len(angles), 6)), np.zeros(len(angles)))
+
+
+def linear_deflections(chain, coordinates, wrench, compliance):
+    """J C J^T w of each measuring point, ndarray (points, S, 6)."""
+    torque = joint_torques(poses_and_jacobians(chain, coordinates, chain.end_effector)[2], wrench)
+    turn = torque @ compliance
+    return np.array([np.einsum("sij,sj->si", poses_and_jacobians(chain, coordinates, p)[2], turn) for p in chain.points])
+
+
+@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10"])
+def test_poses_without_load_are_those_of_the_kinematics(key):
+    arm, robot = arm_from_file(ROBOTS / f"{key}.yaml"), analysed(key)
+    angles, wrench = angles_and_wrenches(arm)
+    _, rest = at_rest(arm, angles, 0.0 * wrench)
+    for number, point in enumerate(robot.chain.points):
+        position, rotation = poses(robot.chain, angles, point)
+        np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
+        np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+
+
+@pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
+def test_joints_that_turn_backwards_fixed_rotations_and_points_inside_links_are_read_alike(name_of_chain):
+    """Poses and deflections of chains of three to seven joints."""
+    text = OTHER_CHAINS[name_of_chain]
+    robot = robot_of(text)
+    n = robot.joints
+    document = {
+        "name": "test",
+        "chain": text,
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+        "joint_limits_deg": [[-180, 180]] * n,
+    }
+    arm = arm_from_document(document)
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    _, rest = at_rest(arm, angles, 0.0 * wrench)
+    for number, point in enumerate(robot.chain.points):
+        position, rotation = poses(robot.chain, angles, point)
+        np.testing.assert_allclose(rest.position[:, number], position, atol=1e-12)
+        np.testing.assert_allclose(rest.rotation[:, number], rotation, atol=1e-12)
+    wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
+    np.testing.assert_allclose(deflections(arm, angles, wrench), wanted, atol=2e-8)
+
+
+def test_joint_springs_deflect_all_points_as_the_reduced_model_to_second_order(arm, name):
+    robot = analysed(name)
+    angles, wrench = angles_and_wrenches(arm)
+    linear = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
+    rest = deflections(arm, angles, wrench) - linear
+    metres = np.linalg.norm(rest[..., :3], axis=-1)
+    # Second order: theta F L / K, a thousandth of millimetres. The FANUC's first joint is the softest of them.
+    assert np.sqrt((metres**2).mean(axis=1)).max() < 6e-6
+    assert metres.max() < 2.5e-3 * np.linalg.norm(linear[..., :3], axis=-1).max() + 1e-9
+    halved = deflections(arm, angles, 0.5 * wrench) - 0.5 * linear
+    # And nothing of first order: a quarter of it remains at half the force.
+    np.testing.assert_allclose(halved[..., :3], 0.25 * rest[..., :3], atol=2e-8)
+
+
+def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
+    arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
+    tube = Tube(0.25, 0.02, 70e9, 26e9)
+    robot = replace(robot, links=tuple(Link(after, vector, tube) for after, vector in stretches(robot.chain)))
+    inner = tube.outer_diameter_m - 2 * tube.wall_m
+    second = np.pi * (tube.outer_diameter_m**4 - inner**4) / 64
+    area = np.pi * (tube.outer_diameter_m**2 - inner**2) / 4
+    mine = TaperedTube(70e9 * second, 2 * 26e9 * second, 70e9 * area)
+    long = {number: mine for number, stretch in enumerate(arm.stretches) if stretch.vector_m.any()}
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    chain = extended_chain(robot)
+    coordinates = np.zeros((STATES, chain.coordinates))
+    coordinates[:, : arm.joints] = angles
+    wanted = linear_deflections(chain, coordinates, wrench, spring_compliance(robot))
+    worst = []
+    for segments in (2, 4, 8):
+        found = deflections(arm, angles, wrench, structure=Structure(tubes=long, segments=segments))
+        off = np.linalg.norm((found - wanted)[..., :3], axis=-1)
+        worst.append(np.sqrt((off**2).mean() / (np.linalg.norm(wanted[..., :3], axis=-1) ** 2).mean()))
+    # The midpoint rule misses l^3 / 12 n^2 EI of l^3 / 3 EI.
+    assert worst[2] < 5e-4
+    assert worst[0] / worst[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_base_springs_and_bearing_tilt_deflect_as_springs_of_the_chain():
+    arm, robot = arm_from_file(ROBOTS / "kuka.yaml"), analysed("kuka")
+    angles, wrench = angles_and_wrenches(arm, force=10.0)
+    base, tilt = np.array([3e-8, 2e-8, 1e-8, 4e-8, 5e-8, 2e-8]), (2e-7, 3e-7)
+    found = deflections(arm, angles, wrench, structure=Structure(base=tuple(base), tilt={2: tilt}))
+    wanted = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
+    flange = poses(robot.chain, angles, robot.chain.end_effector)[0]
+    shoulder = poses(robot.chain, angles, replace(robot.chain.end_effector, after=3))
+    force, moment = wrench[:, :3], wrench[:, 3:]
+    foot_turn = base[3:] * (moment + np.cross(flange, force))
+    at_shoulder = moment + np.cross(flange - shoulder[0], force)
+    # Behind joint 2, which turns about y, axes x and z of the frame that it carries.
+    arm_frame = poses(robot.chain, angles, replace(robot.chain.end_effector, after=4))[1]
+    across = ((tilt[0], arm_frame[..., 0]), (tilt[1], arm_frame[..., 2]))
+    tilted = sum(c * (at_shoulder * axis).sum(axis=1)[:, None] * axis for c, axis in across)
+    for number, point in enumerate(robot.chain.points):
+        position = poses(robot.chain, angles, point)[0]
+        moved = base[:3] * force + np.cross(foot_turn, position) + np.cross(tilted, position - shoulder[0])
+        off = found[number] - wanted[number] - np.hstack([moved, foot_turn + tilted])
+        assert np.abs(off).max() < 3e-9
+
+
+def test_weight_turns_the_joints_as_pinocchio_says(arm):
+    masses = (
+        Mass(1, 300.0, 0.4),
+        Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)),
+        Mass(2, 90.0, 0.9),
+        Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)),
+        Mass(arm.joints, 30.0, 0.5),
+    )
+    load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
+    machine = machine_of(arm, Structure(masses=masses, payload=load))
+    angles, _ = angles_and_wrenches(arm)
+    coordinates = np.zeros((STATES, machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
+    model, parent = pin.Model(), 0
+    for number, axis in enumerate(arm.axes):
+        place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
+        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}")
+        stretch = arm.stretches[number + 1]
+        for mass in masses:
+            if mass.stretch == number + 1:
+                centre = mass.along * stretch.vector_m + np.array(mass.aside_m)
+                model.appendBodyToJoint(parent, pin.Inertia(mass.mass_kg, centre, np.eye(3)), pin.SE3.Identity())
+        if number == arm.joints - 1:
+            centre = stretch.vector_m + stretch.rotation @ np.array(load.aside_m)
+            model.appendBodyToJoint(parent, pin.Inertia(load.mass_kg, centre, np.eye(3)), pin.SE3.Identity())
+    model.gravity.linear = np.array([0.0, 0.0, -9.80665])
+    data = model.createData()
+    wanted = -np.array([pin.computeGeneralizedGravity(model, data, row) for row in angles])
+    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+def everything(arm):
+    tubes = {k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3)}
+    return Structure(
+        base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
+        tilt={1: (1e-7, 1e-7), 4: (2e-7, 2e-7)},
+        tubes=tubes,
+        masses=(Mass(2, 300.0), Mass(3, 200.0, 0.4, (0.0, 0.0, 0.1))),
+        payload=Mass(arm.joints, 100.0, 1.0, (0.1, 0.0, 0.1)),
+        compensator=Compensator((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
+    )
+
+
+def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(arm):
+    """It takes the springs and the compensator from the model's own stiffnesses and tendon, none of which the solver uses."""
+    angles, wrench = angles_and_wrenches(arm)
+    machine, rest = at_rest(arm, angles, wrench, structure=everything(arm))
+    model, data = machine.model, mujoco.MjData(machine.model)
+    site = machine.sites[machine.flange]
+    free = np.setdiff1d(np.arange(model.nv), machine.drive)
+    for row, push in zip(rest.coordinates[:20], wrench[:20], strict=True):
+        data.qpos[:], data.qvel[:], data.qacc[:] = row, 0.0, 0.0
+        mujoco.mj_inverse(model, data)
+        force = np.zeros(model.nv)
+        mujoco.mj_applyFT(model, data, push[:3], push[3:], data.site_xpos[site], model.site_bodyid[site], force)
+        left = (data.qfrc_inverse - force)[free]
+        assert np.abs(left).max() < 1e-9 * np.abs(force).max()
+
+
+def test_a_state_takes_less_than_a_millisecond(arm):
+    angles, wrench = angles_and_wrenches(arm)
+    best = np.inf
+    for _ in range(5):
+        start = time.process_time()
+        at_rest(arm, angles, wrench)
+        best = min(best, time.process_time() - start)
+    assert best / STATES < 1e-3
+
+
+def test_a_compensator_pulls_by_the_derivative_of_its_energy(arm):
+    spring = Compensator((-0.3, 0.1, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3)
+    machine = machine_of(arm, Structure(compensator=spring))
+    angles, _ = angles_and_wrenches(arm)
+    before, sense = arm.stretches[1], arm.axes[1]
+
+    def energy(turn):
+        rotation = np.array([pin.exp3(q * sense) for q in turn])
+        length = np.linalg.norm(
+            before.rotation @ rotation @ np.array(spring.crank_m) - before.rotation @ spring.anchor_m, axis=1
+        )
+        return 0.5 * spring.stiffness_N_per_m * (length - spring.free_length_m) ** 2
+
+    # The anchor is stated in the frame before the shoulder's fixed rotation; none of these arms has one.
+    step = 1e-5
+    wanted = -(energy(angles[:, 1] + step) - energy(angles[:, 1] - step)) / (2 * step)
+    coordinates = np.zeros((STATES, machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
+    np.testing.assert_allclose(found[:, 1], wanted, atol=1e-4)
+    assert np.abs(np.delete(found, 1, axis=1)).max() < 1e-9

@@ -1,0 +1,165 @@
+"""Defects as a whole: each kind changes the readings as its size says, by its seed, where it is put and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from analysed_robots import analysed
+
+from elastocal.effects.catalogue import effects
+from elastocal.effects.protocol import circumstances_of
+from elastocal.errors import InputError
+from elastocal.kinematics import poses_and_jacobians
+from elastocal.observations import States
+from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
+from elastocal.plant.physical_robot import seen_poses
+from elastocal.plant.sizing import Yardstick, size_for
+from elastocal.plant.tracker import rotation_vector
+from elastocal.sites import sites_of
+
+NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
+FOREIGN = sorted(set(KINDS) - set(NAMED))
+# Their first order is what the catalogue's law says it is, to so much of its root mean square.
+COMPARABLE = {
+    "joint_offset": 0.02,
+    "link_geometry": 0.02,
+    "payload": 0.02,
+    "transmission_ratio": 0.02,
+    "joint_tilt": 0.02,
+    "cross_compliance": 0.02,
+    # A dead band with edges is not a tanh where the torque is small.
+    "lost_motion": 0.3,
+    "force_scale": 0.02,
+    "force_misalignment": 0.05,
+    "force_bias": 0.05,
+    "application_point": 0.02,
+}
+
+
+@pytest.fixture(scope="module")
+def yardstick(fanuc_specimen, schedule):
+    return Yardstick(fanuc_specimen, schedule)
+
+
+def test_every_effect_of_the_catalogue_can_be_a_defect():
+    assert set(NAMED) == set(effects())
+
+
+def test_at_least_eight_kinds_are_outside_of_the_catalogue():
+    assert len(FOREIGN) >= 8
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does_not(yardstick, fanuc_specimen, kind):
+    defect = drawn_defect(kind, fanuc_specimen.arm, 3)
+    tiny = replace(defect, size=1e-9 * defect.size)
+    assert yardstick.signal(with_defects(fanuc_specimen, [tiny])).rms_m < 1e-9
+    signal = yardstick.signal(with_defects(fanuc_specimen, [defect]))
+    assert signal.raw > 0.1
+    assert 0 <= signal.retained <= signal.raw * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_a_defects_readings_depend_on_its_seed_and_on_nothing_else(fanuc_specimen, schedule, kind):
+    defect = drawn_defect(kind, fanuc_specimen.arm, 8)
+    first, second = (seen_poses(with_defects(fanuc_specimen, [defect]), schedule) for _ in range(2))
+    np.testing.assert_array_equal(first[0], second[0])
+    np.testing.assert_array_equal(first[1], second[1])
+    assert truth_of(fanuc_specimen, defect) == truth_of(fanuc_specimen, drawn_defect(kind, fanuc_specimen.arm, 8))
+
+
+@pytest.mark.parametrize("kind", NAMED)
+def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(fanuc_specimen, schedule, kind):
+    """Class A of the catalogue at load zero; the elastic, the gearbox but for hysteresis, and the load not."""
+    defect = drawn_defect(kind, fanuc_specimen.arm, 3)
+    unloaded = schedule.load == 0
+    change = np.abs(
+        seen_poses(with_defects(fanuc_specimen, [defect]), schedule)[0] - seen_poses(fanuc_specimen, schedule)[0]
+    ).max(axis=(1, 2))[unloaded]
+    family = effects()[kind].FAMILY
+    without_load = family in ("geometry", "gravity", "transmission", "drift") or kind == "hysteresis"
+    assert (change.max() > 1e-9) == without_load or (kind == "transmission_ratio" and defect.joints == (6,))
+
+
+@pytest.mark.parametrize("kind", sorted(COMPARABLE))
+def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(fanuc_specimen, schedule, kind):
+    """The catalogue's law with the truth's parameters foretells what the plant does, to first order."""
+    # A load cell in the pull has nothing comparable: the first seed that has.
+    defects = (drawn_defect(kind, fanuc_specimen.arm, seed) for seed in range(3, 20))
+    defect = next(defect for defect in defects if truth_of(fanuc_specimen, defect)["parameters"])
+    parameters = truth_of(fanuc_specimen, defect)["parameters"]
+    states = States(
+        session=0 * schedule.pose,
+        pose=schedule.pose,
+        load=schedule.load,
+        joint_angles=schedule.angle,
+        wrench=schedule.shown_wrench,
+        repeats=1 + 0 * schedule.pose,
+    )
+    sites = sites_of(analysed("fanuc").chain)
+    given = circumstances_of(sites, fanuc_specimen.compliance, states)
+    change = seen_poses(with_defects(fanuc_specimen, [defect]), schedule)
+    nominal = seen_poses(fanuc_specimen, schedule)
+    found = np.concatenate([change[0] - nominal[0], rotation_vector(change[1] @ np.swapaxes(nominal[1], -1, -2))], axis=-1)
+    coordinates = np.zeros((len(schedule.pose), sites.chain.coordinates))
+    coordinates[:, : sites.joints] = schedule.angle
+    best = np.inf
+    # In which frame a load's error is fixed the truth does not say: one of the variants must fit.
+    for candidate in effects()[kind].candidates(sites):
+        if candidate.joints != defect.joints:
+            continue
+        shapes = [60.0] * len(candidate.shapes)
+        turn = np.zeros_like(coordinates)
+        for parameter, columns in zip(candidate.parameters, candidate.displacement(given, *shapes), strict=True):
+            for coordinate, column in columns.items():
+                turn[:, coordinate] += parameters[parameter.name] * column
+        jacobians = [poses_and_jacobians(sites.chain, coordinates, point)[2] for point in sites.chain.points]
+        wanted = np.stack([np.einsum("sij,sj->si", jacobian, turn) for jacobian in jacobians], axis=1)
+        best = min(best, np.linalg.norm(found - wanted) / np.linalg.norm(wanted))
+    assert best < COMPARABLE[kind]
+
+
+def test_a_defect_is_refused_where_it_cannot_be_or_is_too_large(fanuc_specimen):
+    for wrong in (Defect("joint_offset", (7,), 1e-3), Defect("nonsense", (), 1.0), Defect("stiffening", (1,), 1.5)):
+        with pytest.raises(InputError):
+            with_defects(fanuc_specimen, [wrong])
+
+
+def test_two_defects_add_up(yardstick, fanuc_specimen):
+    pair = [drawn_defect("joint_offset", fanuc_specimen.arm, 1), drawn_defect("lost_motion", fanuc_specimen.arm, 2)]
+    alone = [yardstick.change(with_defects(fanuc_specimen, [one])) for one in pair]
+    together = yardstick.change(with_defects(fanuc_specimen, pair))
+    np.testing.assert_allclose(together, alone[0] + alone[1], atol=0.01 * np.abs(together).max())
+
+
+@pytest.mark.parametrize("target", [10.0, 200.0])
+@pytest.mark.parametrize("quantity", ["raw", "retained"])
+@pytest.mark.parametrize("kind", ["joint_offset", "stiffening", "link_elasticity", "outside:foot_slip"])
+def test_a_defect_is_sized_to_its_non_centrality(yardstick, fanuc_specimen, kind, quantity, target):
+    defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), joints={"stiffening": (2,)}.get(kind, (2,)))
+    defect = replace(defect, joints=defect.joints if defect.joints in KINDS[kind].places(fanuc_specimen.arm) else ())
+
+    def robot_of_size(size):
+        return with_defects(fanuc_specimen, [replace(defect, size=size)])
+
+    size, signal = size_for(yardstick, robot_of_size, defect.size, target, quantity, KINDS[kind].largest)
+    assert getattr(signal, quantity) == pytest.approx(target, rel=0.011)
+    assert getattr(yardstick.signal(robot_of_size(size)), quantity) == pytest.approx(target, rel=0.011)
+
+
+def test_a_wrong_force_scale_is_absorbed_at_any_size(yardstick, fanuc_specimen):
+    with pytest.raises(ValueError, match="no size found"):
+        size_for(yardstick, lambda size: with_defects(fanuc_specimen, [Defect("force_scale", (), size)]), 0.02, 50.0)
+
+
+def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_specimen, schedule):
+    """By a least-squares fit of the plant's own compliances to the defective readings."""
+    defect = Defect("lost_motion", (2,), 7e-5, 3)
+    yardstick = Yardstick(fanuc_specimen, schedule)
+    bad = with_defects(fanuc_specimen, [defect])
+    seen, columns = yardstick.change(bad)[schedule.training].ravel(), []
+    for joint in range(6):
+        softer = fanuc_specimen.compliance * (1 + 0.01 * (np.arange(6) == joint))
+        columns.append(yardstick.change(replace(fanuc_specimen, compliance=softer))[schedule.training].ravel())
+    left = seen - np.array(columns).T @ np.linalg.lstsq(np.array(columns).T, seen, rcond=None)[0]
+    assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)

@@ -1,0 +1,86 @@
+"""What the tracker does to poses: drift, bent light, noise, outliers."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from elastocal.plant.arm import turned
+from elastocal.plant.tracker import Drift, EccentricNest, Tracker, rotation_vector
+
+
+@pytest.fixture
+def targets(rng):
+    """Poses of four targets in many states, one an hour."""
+    position = rng.uniform(-2, 2, (500, 4, 3))
+    rotation = turned(rng.uniform(-2, 2, (500, 4, 3)))
+    return position, rotation, 3600.0 * np.arange(500)
+
+
+def test_a_perfect_tracker_sees_what_is_there(targets):
+    position, rotation = Tracker().seen(*targets)
+    np.testing.assert_array_equal(position, targets[0])
+    np.testing.assert_array_equal(rotation, targets[1])
+
+
+def test_noise_has_the_stated_deviation_and_grows_with_range(targets, rng):
+    tracker = Tracker(sigma_m=2e-5, sigma_m_per_m=1e-5, sigma_rad=5e-5)
+    position, rotation, outlier = tracker.read(*targets[:2], rng)
+    off = position - targets[0]
+    far = np.linalg.norm(targets[0] - np.array(tracker.stand_m), axis=-1)
+    np.testing.assert_allclose((off / (2e-5 + 1e-5 * far)[..., None]).std(), 1.0, rtol=0.03)
+    turn = rotation_vector(rotation @ np.swapaxes(targets[1], -1, -2))
+    np.testing.assert_allclose(turn.std(axis=(0, 1)), 5e-5, rtol=0.05)
+    assert not outlier.any()
+
+
+def test_outliers_are_as_many_and_as_large_as_stated_and_said_to_be_so(targets, rng):
+    position, _, outlier = Tracker(outliers=0.1, outlier_sigmas=20.0).read(*targets[:2], rng)
+    off = np.abs(position - targets[0]) / 60e-6
+    assert outlier.mean() == pytest.approx(0.1, abs=0.03)
+    assert off[~outlier].max() < 5.0
+    assert off[outlier].std() == pytest.approx(12.0, rel=0.2)
+
+
+def test_a_stand_that_settles_drifts_ever_more_slowly():
+    shift, turn = Drift((1e-4, 0, 0), (0, 0, 2e-5), settling_h=2.0).moved(np.array([0.0, 36.0, 3600.0 * 100]))
+    np.testing.assert_allclose(shift[:, 0], [0.0, 1e-6, 2e-4], rtol=6e-3, atol=1e-12)
+    np.testing.assert_allclose(rotation_vector(turn)[2], [0, 0, 4e-5], atol=1e-12)
+
+
+def test_a_steady_drift_moves_all_targets_as_one_body(targets):
+    position, rotation, hours = targets[0], targets[1], np.arange(500)
+    moved, turned_too = Tracker(drift=Drift((1e-4, 2e-4, 0), (1e-5, 0, 0))).seen(*targets)
+    turn = np.array([pin.exp3(np.array([1e-5, 0, 0]) * hour) for hour in hours])
+    wanted = np.einsum("sij,stj->sti", turn, position) + (hours[:, None] * [1e-4, 2e-4, 0])[:, None]
+    np.testing.assert_allclose(moved, wanted, atol=1e-12)
+    np.testing.assert_allclose(turned_too, turn[:, None] @ rotation, atol=1e-12)
+
+
+def test_bent_light_and_a_wrong_wavelength_err_along_the_line_of_sight(targets):
+    tracker = Tracker(refraction_per_m=1e-6, scale=2e-6)
+    sight = targets[0] - np.array(tracker.stand_m)
+    far = np.linalg.norm(sight, axis=-1, keepdims=True)
+    np.testing.assert_allclose(tracker.seen(*targets)[0] - targets[0], (2e-6 * far + 1e-6 * far**2) * sight / far, atol=1e-14)
+
+
+def test_an_eccentric_nest_circles_twice_a_turn_of_the_tool():
+    angle = np.array([0.0, np.pi / 4, np.pi / 2, np.pi])
+    moved = EccentricNest(1e-4).moved(np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)), angle)
+    np.testing.assert_allclose(moved, 1e-4 * np.array([[0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 1, 0]]), atol=1e-18)
+
+
+def test_the_trackers_own_frame_keeps_distances_and_turns_all_alike(targets):
+    tracker = Tracker(frame_turn=(0.3, -0.2, 1.1))
+    position, rotation = tracker.in_own_frame(*targets[:2])
+    own = pin.exp3(np.array(tracker.frame_turn))
+    np.testing.assert_allclose(position @ own.T + np.array(tracker.stand_m), targets[0], atol=1e-12)
+    np.testing.assert_allclose(own @ rotation, targets[1], atol=1e-12)
+
+
+def test_rotation_vectors_survive_the_way_there_and_back_up_to_a_half_turn(rng):
+    axis = rng.standard_normal((200, 3))
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    angle = np.concatenate([rng.uniform(0, np.pi, 150), np.geomspace(1e-12, 1e-3, 25), np.pi - np.geomspace(1e-9, 1e-3, 25)])
+    vector = angle[:, None] * axis
+    np.testing.assert_allclose(rotation_vector(turned(vector)), vector, atol=1e-9)
+    np.testing.assert_allclose(turned(vector), [pin.exp3(v) for v in vector], atol=1e-12)
