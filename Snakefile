@@ -13,6 +13,7 @@ include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
 include: "workflow/rules/loop.smk"
 include: "workflow/rules/loop_report.smk"
+include: "workflow/rules/blind.smk"
 
 
 rule study:

@@ -65,7 +65,7 @@ def attribution(case, key, *alternatives, angles=()):
 
 def said(case, fits, attributions=(), faults=(), warnings=(), noise=NOISE, looks=LOOKS):
     facts = {"noise": noise_facts(noise), "warnings": ["of the noise"]}
-    verdict = concluded(case, facts, *fits, attributions, looks, ROWS, {"poses": 4}, faults, list(warnings))
+    verdict = concluded(case, facts, *fits, attributions, looks, ROWS, {"poses": 4}, faults, list(warnings), (0.5, 0.1))
     return json.loads(json.dumps(verdict, allow_nan=False))
 
 

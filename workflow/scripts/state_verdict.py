@@ -4,6 +4,7 @@ import json
 
 import pandas as pd
 
+from elastocal.explainable import explainable_share
 from elastocal.frames import write_text
 from elastocal.loop.conclude import attributions_from, candidate_columns, concluded
 from elastocal.loop.opened import opened_case, opened_fit, opened_json
@@ -33,6 +34,7 @@ def state_verdict(job):
         errors["heldout"],
         opened_json(job.input.faults),
         errors["warnings"],
+        [explainable_share(fitted, case.observations) for fitted in (declared, final)],
     )
     write_table(job.output.candidates, CANDIDATES, [candidate_columns(looks, rivals)], provenance({}, **job.wildcards))
     write_text(job.output.verdict, json.dumps(verdict, indent=1, allow_nan=False) + "\n")

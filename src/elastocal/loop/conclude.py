@@ -3,7 +3,6 @@
 import numpy as np
 
 from elastocal.attribution import Attribution, by_effect
-from elastocal.explainable import explainable_share
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
 from elastocal.selection import parameter_slice
@@ -55,7 +54,7 @@ def candidate_columns(looks, rivals):
     return columns
 
 
-def concluded(case, noise_facts, declared, final, attributions, looks, rows, heldout, faults, warnings):
+def concluded(case, noise_facts, declared, final, attributions, looks, rows, heldout, faults, warnings, foreseen):
     """The contents of verdict.json.
 
     Parameters
@@ -73,6 +72,8 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
     faults : sequence of dict
         Faults of the data.
     warnings : list of str
+    foreseen : pair of float or None
+        Shares of the residual that a forest predicts, before and after; see `explainable`.
 
     Returns
     -------
@@ -84,7 +85,6 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
     missing = declared.discrepancy_m, final.discrepancy_m
     evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive))
     said = word(evidence)
-    foreseen = [explainable_share(fitted, case.observations) for fitted in (declared, final)]
     gains = _gains(rows)
     return {
         "campaign": case.campaign.name,

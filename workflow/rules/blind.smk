@@ -1,0 +1,83 @@
+"""The blind proof: sealed cases on an independent plant, diagnosed without their truths, scored with them.
+
+`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole. Writes data/blind/, data/sealed/ and reports/blind/. Only
+seal_cases and score_cases read what is sealed.
+"""
+
+BLIND_BLOCKS = {"smoke": 1, "quick": 10, "full": 400}[config["blind"]]
+BLIND = [f"{config['blind']}_{number}" for number in range(1, BLIND_BLOCKS + 1)]
+
+
+rule make_cases:
+    input:
+        robots=expand("config/robots/{robot}.yaml", robot=["kuka", "fanuc", "abb"]),
+        sources=sources("make_cases.py"),
+    output:
+        blind=directory("data/blind/{block}"),
+        sealed=directory("data/sealed/{block}"),
+    log:
+        "results/logs/make_cases/{block}.log",
+    benchmark:
+        "results/timings/make_cases/{block}.tsv"
+    params:
+        size=config["blind"],
+        number=lambda wildcards: int(wildcards.block.rsplit("_", 1)[1]),
+        blocks=BLIND_BLOCKS,
+        seed=config["seed"],
+    script:
+        "../scripts/make_cases.py"
+
+
+rule seal_cases:
+    input:
+        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
+        sources=sources("seal_cases.py"),
+    output:
+        manifest="reports/blind/manifest.sha256",
+    log:
+        "results/logs/seal_cases.log",
+    benchmark:
+        "results/timings/seal_cases.tsv"
+    script:
+        "../scripts/seal_cases.py"
+
+
+rule diagnose_cases:
+    input:
+        blind=rules.make_cases.output.blind,
+        manifest=rules.seal_cases.output.manifest,
+        sources=sources("diagnose_cases.py"),
+    output:
+        verdicts="results/blind/{block}.json",
+    log:
+        "results/logs/diagnose_cases/{block}.log",
+    benchmark:
+        "results/timings/diagnose_cases/{block}.tsv"
+    params:
+        replicates=config["loop"]["replicates"],
+        seed=config["seed"],
+    script:
+        "../scripts/diagnose_cases.py"
+
+
+rule score_cases:
+    input:
+        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
+        manifest=rules.seal_cases.output.manifest,
+        verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
+        sources=sources("score_cases.py"),
+    output:
+        cases="reports/blind/cases.csv",
+        summary="reports/blind/summary.csv",
+        confusion="reports/blind/confusion.csv",
+    log:
+        "results/logs/score_cases.log",
+    benchmark:
+        "results/timings/score_cases.tsv"
+    script:
+        "../scripts/score_cases.py"
+
+
+rule blind:
+    input:
+        rules.score_cases.output,

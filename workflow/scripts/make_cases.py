@@ -1,0 +1,18 @@
+"""A block of blind cases: campaigns for the analyst, and their truths, sealed."""
+
+from pathlib import Path
+
+from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
+
+from job import run
+
+
+def make_cases(job):
+    settings = job.params
+    for folder in (job.output.blind, job.output.sealed):
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    for case in block_of(cases_of(SIZES[settings.size], settings.seed), settings.number, settings.blocks):
+        make_case(case, job.output.blind, job.output.sealed, "config/robots")
+
+
+run(make_cases, snakemake)

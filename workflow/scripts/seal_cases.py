@@ -1,0 +1,16 @@
+"""The commitment: SHA-256 of every truth, before any diagnosis."""
+
+import hashlib
+from pathlib import Path
+
+from elastocal.blind.cases import write_manifest
+
+from job import run
+
+
+def seal_cases(job):
+    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    write_manifest(job.output.manifest, {file.stem: hashlib.sha256(file.read_bytes()).hexdigest() for file in files})
+
+
+run(seal_cases, snakemake)
