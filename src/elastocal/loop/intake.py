@@ -1,6 +1,6 @@
 """Step 1: a campaign's folder to descriptions and readings, those to fit apart from those to test."""
 
-from elastocal.campaign import DOCUMENT, held_out_campaign, read_campaign, read_descriptions, split
+from elastocal.campaign import DEFAULT_HOLDOUT, DOCUMENT, held_out_campaign, read_campaign, read_descriptions, split
 from elastocal.documents import read_document
 from elastocal.effects.catalogue import effects
 
@@ -35,4 +35,6 @@ def taken_in(folder, robots_folder):
 
 def _descriptions(folder, robots_folder):
     document, robot_path = read_descriptions(folder, robots_folder)
-    return {"source": f"{folder}/{DOCUMENT}", "campaign": document, "robot": read_document(robot_path)}
+    # What a campaign may leave out is said here, so that no later step has to know what its absence means.
+    said = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
+    return {"source": f"{folder}/{DOCUMENT}", "campaign": said, "robot": read_document(robot_path)}
