@@ -15,7 +15,7 @@ UNKNOWN = LackOfFit(np.nan, np.nan, 100, 0)
 def attribution(*alternatives):
     """One effect found, with rivals that these data cannot tell from it."""
     count = len(alternatives)
-    return Attribution("e", (), 0.01, alternatives, np.full(count, 90.0), np.zeros(count), np.ones(count, int), 1)
+    return Attribution("e", (), 0.01, alternatives, np.full(count, 10.0), np.zeros(count), np.ones(count, int), 1)
 
 
 def evidence(tested=5, before=FITS_NOT, after=FITS, missing=(1e-4, 0.0), attributions=(), faults=()):

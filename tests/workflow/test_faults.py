@@ -35,8 +35,8 @@ FAULTS = {
         ["config.yaml: strategies", "'3+6DoF-com'", "allowed: a file of config/strategies: '3+6DoF-comb'?"],
     ),
     "unknown robot": (
-        lambda study: study.configure({"robots": ["kuka", "abb"]}),
-        ["config.yaml: robots", "'abb'", "allowed: a file of config/robots: fanuc, ", "kuka, kuka_extended"],
+        lambda study: study.configure({"robots": ["kuka", "staubli"]}),
+        ["config.yaml: robots", "'staubli'", "allowed: a file of config/robots: ", "kuka, kuka_extended"],
     ),
     "negative noise level": (
         lambda study: study.configure({"noise_um": [200, -50]}),
