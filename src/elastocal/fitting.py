@@ -13,10 +13,10 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.model import circumstances, linearize, parameter_values, parameters, residuals, stepped
+from elastocal.model import circumstances, joint_compliances, linearize, parameter_values, parameters, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.registration import registered
-from elastocal.whitening import Whitening, whitening
+from elastocal.whitening import Whitening, spectrum, whitening
 
 _STEPS = 30
 # Largest step that remains, in standard errors.
@@ -48,6 +48,10 @@ class Fit:
     whitener : Whitening
     residual : ndarray (M, rows)
         m and rad, base axes.
+    joint_jacobian : ndarray (M, rows, n)
+        Of each target with respect to the joints.
+    circumstances : Circumstances
+        Of the states fitted.
     """
 
     model: object
@@ -59,6 +63,8 @@ class Fit:
     weights: np.ndarray
     whitener: Whitening
     residual: np.ndarray
+    joint_jacobian: np.ndarray
+    circumstances: object
 
     @property
     def parameters(self):
@@ -96,15 +102,16 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     Fit
     """
     start = registered(model, observations) if start is None else start
+    around = circumstances(model, start, observations.states)
     if discrepancy_m is not None:
-        return _robustly(model, observations, noise, start, discrepancy_m)
+        return _robustly(model, observations, around, noise, start, discrepancy_m)
     discrepancy = likely_discrepancy_m
-    found = _robustly(model, observations, noise, start, discrepancy)
+    found = _robustly(model, observations, around, noise, start, discrepancy)
     for _ in range(_DISCREPANCY_ROUNDS):
         before, discrepancy = discrepancy, _discrepancy(found, observations)
         if abs(discrepancy - before) <= 0.01 * max(discrepancy, before):
             break
-        found = _robustly(model, observations, noise, found.estimate, discrepancy)
+        found = _robustly(model, observations, around, noise, found.estimate, discrepancy)
     return found
 
 
@@ -126,10 +133,11 @@ def fit_frames(fitted, model, observations, noise):
     start = registered(model, observations)
     start = replace(start, coefficients=fitted.estimate.coefficients, shapes=fitted.estimate.shapes)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
-    return _robustly(model, observations, noise, start, fitted.discrepancy_m, frozen).estimate
+    around = circumstances(model, start, observations.states)
+    return _robustly(model, observations, around, noise, start, fitted.discrepancy_m, frozen).estimate
 
 
-def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
+def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=False):
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
@@ -138,9 +146,10 @@ def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
     for step_number in range(_STEPS):
-        around = circumstances(model, estimate, observations.states)
+        around = replace(around, compliance=joint_compliances(model, estimate))
         line = linearize(model, estimate, observations, around)
-        whitener = whitening(observations, line.coordinate_jacobian[..., : model.sites.joints], noise, discrepancy)
+        jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+        whitener = whitening(observations, jacobian, noise, discrepancy)
         if step_number:
             distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
             weights = norm.weights(distance / max(np.median(distance) / typical, 1.0))
@@ -152,8 +161,9 @@ def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
         deviation = np.sqrt(np.diag(covariance))
         if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
             break
-    residual = residuals(model, estimate, observations, circumstances(model, estimate, observations.states))
-    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual)
+    around = replace(around, compliance=joint_compliances(model, estimate))
+    residual = residuals(model, estimate, observations, around)
+    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around)
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0):
@@ -233,17 +243,12 @@ def identifiable(gram, frozen):
 
 def _discrepancy(found, observations):
     """Standard deviation that brings the mean square of the whitened residual to one."""
-    around = circumstances(found.model, found.estimate, observations.states)
-    joints = found.model.sites.joints
-    jacobian = linearize(
-        replace(found.model, effects=()), replace(found.estimate, coefficients=(), shapes=()), observations, around
-    ).coordinate_jacobian[..., :joints]
     weighted = found.residual * np.sqrt(found.weights)[:, None]
     freedom = found.degrees_of_freedom
+    variances, squares = spectrum(observations, found.joint_jacobian, found.noise, weighted)
 
     def excess(discrepancy):
-        whitened = whitening(observations, jacobian, found.noise, discrepancy).apply(weighted)
-        return (whitened**2).sum() / freedom - 1.0
+        return (squares / (variances + discrepancy**2)).sum() / freedom - 1.0
 
     if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
         return 0.0

@@ -75,8 +75,9 @@ def noise_from_repeats(model, estimate, readings):
     if total < FEWEST:
         return None
     rows, joints = model.rows, model.sites.joints
-    position = np.concatenate([part.reshape(-1, rows)[:, :3].ravel() for part in contrasts]).std()
-    orientation = np.concatenate([part.reshape(-1, rows)[:, 3:].ravel() for part in contrasts]).std() if rows == 6 else position
+    every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
+    position = np.sqrt((every[:, :3] ** 2).mean())
+    orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor
@@ -84,9 +85,9 @@ def noise_from_repeats(model, estimate, readings):
     both = [np.log(position), np.log(orientation)][: rows // 3]
     start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
     bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
-    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", bounds=bounds)
+    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", jac=True, bounds=bounds)
     # Akaike: the joints' part must be worth its parameters.
-    if fitted.fun + joints > minimize(lambda logs: _negative_log_likelihood([*logs, *nothing], *data), both).fun:
+    if fitted.fun + joints > _negative_log_likelihood(np.concatenate([both, nothing]), *data)[0]:
         return sensor
     values = np.exp(fitted.x)
     # Each approach draws a joint once, however many targets are read.
@@ -168,11 +169,20 @@ def _contrasts(model, estimate, readings):
 
 
 def _negative_log_likelihood(logs, contrasts, jacobians, rows):
+    """Half of minus twice the logarithm of the likelihood, and its derivatives by the logarithms of the deviations."""
     values = np.exp(logs)
-    noise = Noise("", values[0], values[rows // 3 - 1], values[rows // 3 :])
-    total = 0.0
+    sensors = rows // 3
+    noise = Noise("", values[0], values[sensors - 1], values[sensors:])
+    total, slope = 0.0, np.zeros(len(values))
     for vectors, jacobian in zip(contrasts, jacobians, strict=True):
-        covariance = reading_covariances(noise, jacobian, rows)
-        total += 0.5 * np.linalg.slogdet(covariance)[1].sum()
-        total += 0.5 * (vectors * np.linalg.solve(covariance, vectors[..., None])[..., 0]).sum()
-    return total
+        groups, targets = jacobian.shape[:2]
+        inverse = np.linalg.inv(reading_covariances(noise, jacobian, rows))
+        told = (inverse @ vectors[..., None])[..., 0]
+        total += 0.5 * ((vectors * told).sum() - np.linalg.slogdet(inverse)[1].sum())
+        # By an element of the covariance: half of (inverse - told told^T).
+        sensor = (np.diagonal(inverse, axis1=1, axis2=2) - told**2).reshape(groups, targets, sensors, 3).sum(axis=(0, 1, 3))
+        slope[:sensors] += values[:sensors] ** 2 * sensor
+        stacked = jacobian.reshape(groups, targets * rows, -1)
+        joint = (stacked * (inverse @ stacked)).sum(axis=1) - (told[:, None] @ stacked)[:, 0] ** 2
+        slope[sensors:] += values[sensors:] ** 2 * joint.sum(axis=0)
+    return total, slope

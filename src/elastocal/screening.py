@@ -13,7 +13,7 @@ from scipy.linalg import cho_solve
 from scipy.sparse import csr_matrix
 from scipy.stats import f as f_distribution
 
-from elastocal.model import circumstances, effect_columns, linearize
+from elastocal.model import effect_columns, linearize
 
 # A candidate whose sensitivities keep less than this share off the model's own cannot be told.
 LEAST_RETAINED = 0.01
@@ -101,8 +101,7 @@ def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, 
     -------
     Directions
     """
-    around = circumstances(fitted.model, fitted.estimate, observations.states)
-    line = linearize(fitted.model, fitted.estimate, observations, around)
+    line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
     rows = fitted.residual.size
     scale = np.array([parameter.plausible for _, parameter in fitted.parameters])
     known = fitted.whitened(line.sensitivities[..., ~fitted.held] * scale[~fitted.held]).reshape(rows, -1)
@@ -117,7 +116,7 @@ def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, 
             continue
         plausible = np.array([parameter.plausible for parameter in candidate.parameters])
         for shapes in _shapes_tried(candidate):
-            made = effect_columns([(candidate, shapes)], around, line.coordinate_jacobian, observations.state)
+            made = effect_columns([(candidate, shapes)], fitted.circumstances, line.coordinate_jacobian, observations.state)
             made = fitted.whitened(made * plausible).reshape(rows, -1)
             off = made - basis @ (basis.T @ made)
             # Twice is enough: the second pass removes the rounding of the first.
