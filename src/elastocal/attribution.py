@@ -129,7 +129,10 @@ def _attribution(name, members, final, others_found, p_values, observations, can
     others = without(final, keys, observations)
     taken = {candidate.key for candidate in others_found}
     mine = directions(others, observations, members, 0.0, 0.0)
-    seen = directions(others, observations, [c for c in candidates if c.key not in taken | keys])
+    # Another form of the same effect at the same joints goes by the same name.
+    forms = {(member.effect, member.joints) for member in members}
+    rivals = [c for c in candidates if c.key not in taken and (c.effect, c.joints) not in forms]
+    seen = directions(others, observations, rivals)
     basis = np.linalg.qr(np.concatenate(mine.columns, axis=1))[0]
     explained = basis @ (basis.T @ seen.residual)
     rows, total = len(seen.residual), seen.residual @ seen.residual

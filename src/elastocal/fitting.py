@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.model import circumstances, joint_compliances, linearize, parameter_values, parameters, residuals, stepped
+from elastocal.model import bends, circumstances, joint_compliances, linearize, parameter_values, parameters, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.registration import registered
 from elastocal.whitening import Whitening, spectrum, whitening
@@ -23,6 +23,8 @@ _STEPS = 30
 _SETTLED = 1e-3
 # Observations beyond this quantile of their distance lose weight.
 _HUBER_QUANTILE = 0.99
+# Correlation beyond which a parameter cannot be told because of a shape.
+_BOUND_TO_SHAPE = 0.5
 _DISCREPANCY_ROUNDS = 6
 # Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
 _ABOVE_NOISE = 1.02
@@ -143,6 +145,7 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
     plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
+    bending = bends(model, estimate)
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
     for step_number in range(_STEPS):
@@ -156,7 +159,8 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
         root = np.sqrt(weights)
         right = whitener.apply(line.residual * root[:, None]).reshape(-1)
         left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
-        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, parameter_values(model, estimate))
+        present = parameter_values(model, estimate)
+        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, present, bending)
         estimate = stepped(model, estimate, step)
         deviation = np.sqrt(np.diag(covariance))
         if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
@@ -166,7 +170,7 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
     return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around)
 
 
-def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0):
+def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
     """Least squares over the parameters that the data can tell.
 
     Parameters
@@ -183,6 +187,8 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
         One over the variance of the prior about zero; 0 for none.
     present : float or ndarray (P,)
         Values from which the step is taken.
+    bending : bool or ndarray of bool (P,)
+        As in `identifiable`.
 
     Returns
     -------
@@ -194,7 +200,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     scaled = left * plausible
     gram = scaled.T @ scaled + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = scaled.T @ right - plausible * np.broadcast_to(penalty * present, len(plausible))
-    held = ~identifiable(gram, np.broadcast_to(frozen, len(plausible)))
+    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, bending)))
     free = np.flatnonzero(~held)
     step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
     if len(free):
@@ -204,7 +210,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     return step, covariance, held
 
 
-def identifiable(gram, frozen):
+def identifiable(gram, frozen, bending):
     """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
 
     Parameters
@@ -213,6 +219,8 @@ def identifiable(gram, frozen):
         Information on the parameters, each in units of its plausible size.
     frozen : ndarray of bool (P,)
         Left out from the start.
+    bending : ndarray of bool (P,)
+        Shapes: given up before a parameter that they are bound to, as that of their law is where it is nearly a straight line.
 
     Returns
     -------
@@ -231,11 +239,14 @@ def identifiable(gram, frozen):
             kept.append(number)
     # Parameters that came later may have taken from what their predecessors could be told by.
     while kept:
-        deviation = np.sqrt(np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])))
+        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+        deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
             break
-        kept.pop(worst)
+        correlation = np.where(bending[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
+        shape = int(np.argmax(correlation))
+        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask

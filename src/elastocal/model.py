@@ -193,6 +193,12 @@ def parameters(model, estimate):
     return found
 
 
+def bends(model, estimate):
+    """Which of the `parameters` are shapes, ndarray of bool (P,)."""
+    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
+    return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
+
+
 def parameter_values(model, estimate):
     """Present values of all that is fitted, in the order of `parameters`.
 

@@ -1,7 +1,10 @@
 """The effects found against everything else that could have made the residual, and what to measure to tell them apart."""
 
+import json
+
 from elastocal.attribution import attribute
-from elastocal.frames import write_csv
+from elastocal.frames import write_csv, write_text
+from elastocal.law_check import doubts
 from elastocal.loop.experiment import proposal_frame
 from elastocal.loop.opened import opened_case, opened_fit
 from elastocal.loop.schemas import FOUND, RIVALS
@@ -20,6 +23,9 @@ def weigh_rivals(job):
     p_values = dict(zip(table["candidate"], table["p_family"], strict=True))
     attributions = attribute(final, found, p_values, case.observations, list(case.candidates.values()))
     write_table(job.output.rivals, RIVALS, rival_blocks(attributions), provenance({}, **job.wildcards))
+    draws = stream(job.params.seed, case.campaign.name, "laws", 0)
+    departures = doubts(final, found, case.observations, job.params.replicates, draws)
+    write_text(job.output.doubts, json.dumps([vars(doubt) for doubt in departures], indent=1) + "\n")
     draws = stream(job.params.seed, case.campaign.name, "next experiment", 0)
     write_csv(job.output.experiment, proposal_frame(case, final, attributions, job.params.states, draws))
 
