@@ -37,8 +37,7 @@ def write_campaign(static_path, cpa_path, folder, robots_folder, name="fanuc_joi
     for session, (source, path) in enumerate(((fanuc_static, static_path), (fanuc_cpa, cpa_path))):
         reported, positions = source.read(path)
         robot = read_robot(Path(robots_folder) / f"{source.ROBOT}.yaml")
-        angles = reported @ robot.reported_matrix.T + robot.reported_offset
-        tables.append(reflector_table(*pose_and_repeat(reported), angles, positions, session))
+        tables.append(reflector_table(*pose_and_repeat(reported), robot.model_angles(reported), positions, session))
     table = {column: np.concatenate([part[column] for part in tables]) for column in tables[0]}
     targets = (*fanuc_static.TARGETS, *fanuc_cpa.TARGETS)
     write_folder(folder, reflector_document(name, ROBOT, targets, holdout), table, robot.joints)
