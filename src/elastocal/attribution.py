@@ -11,7 +11,7 @@ from elastocal.selection import without
 # larger one: no law of the catalogue is so exact that the small part in which near relatives differ is to be trusted.
 CONFOUNDED_BIC = 6.0
 CONFOUNDED_DEG = 20.0
-CONFOUNDED_BIC_NEAR = 20.0
+CONFOUNDED_BIC_NEAR = 10.0
 # Beyond this angle a candidate makes less than a quarter of what was found: it may be missing too, but does not stand for it.
 UNRELATED_DEG = 60.0
 

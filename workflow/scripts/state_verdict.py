@@ -27,7 +27,7 @@ def state_verdict(job):
         declared,
         final,
         attributions_from(rivals, found, p_values),
-        opened_json(job.input.doubts),
+        read_json(job.input.doubts),
         looks,
         pd.read_csv(job.input.before_after).to_dict("records"),
         errors["heldout"],

@@ -1,9 +1,8 @@
 """The effects found against everything else that could have made the residual, and what to measure to tell them apart."""
 
-import json
-
 from elastocal.attribution import attribute
-from elastocal.frames import write_csv, write_text
+from elastocal.frames import write_csv
+from elastocal.json_files import write_json
 from elastocal.law_check import doubts
 from elastocal.loop.experiment import proposal_frame
 from elastocal.loop.opened import opened_case, opened_fit
@@ -25,7 +24,7 @@ def weigh_rivals(job):
     write_table(job.output.rivals, RIVALS, rival_blocks(attributions), provenance({}, **job.wildcards))
     draws = stream(job.params.seed, case.campaign.name, "laws", 0)
     departures = doubts(final, found, case.observations, job.params.replicates, draws)
-    write_text(job.output.doubts, json.dumps([vars(doubt) for doubt in departures], indent=1) + "\n")
+    write_json(job.output.doubts, [vars(doubt) for doubt in departures])
     draws = stream(job.params.seed, case.campaign.name, "next experiment", 0)
     write_csv(job.output.experiment, proposal_frame(case, final, attributions, job.params.states, draws))
 
