@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.kinematics import jacobians
 
 # So many models at a time keep their errors at 500 test configurations in a second-level cache.
 MODELS_AT_A_TIME = 400
@@ -55,7 +55,7 @@ def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
     point = robot.chain.end_effector
     at = loaded_point(robot.chain, point, wrench_at)
     torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, at)
-    jacobian = poses_and_jacobians(robot.chain, experiments.joint_angles, point)[2]
+    jacobian = jacobians(robot.chain, experiments.joint_angles, point)
     slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
     predicted = exact_deflections(robot.chain, experiments.joint_angles, robot.compliance * torques, point)
     offset = (predicted - true_deflection)[..., :3].reshape(-1, 3, 1)
