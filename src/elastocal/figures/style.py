@@ -55,6 +55,8 @@ def line_style(index):
 def save(figure, pdf, png):
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
 
+    Both have the same layout; it is worked out once, since that takes as long as drawing.
+
     Parameters
     ----------
     figure : matplotlib.figure.Figure
@@ -64,3 +66,4 @@ def save(figure, pdf, png):
     for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
         with appearing_whole(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+        figure.set_layout_engine("none")
