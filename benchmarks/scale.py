@@ -13,6 +13,7 @@ STEPS = {
     "simulate": ("data/simulated/kuka/ideal.parquet", "kuka"),
     "measure": (f"data/simulated/{CELL}/measured.parquet", CELL),
     "identify": (f"results/identified/{CELL}/{STRATEGY}.parquet", f"{CELL}/{STRATEGY}"),
+    "draw_weights": ("results/weights/kuka.parquet", "kuka"),
     "evaluate": (f"results/metrics/{CELL}/{STRATEGY}.parquet", f"{CELL}/{STRATEGY}"),
     "bound": ("results/bounds/kuka.parquet", "kuka"),
 }

@@ -126,6 +126,9 @@ def test_columns_of_the_regressor_are_those_of_equation_10(kuka):
     loads = random_loads(kuka, 1, 3)
     jacobian = poses_and_jacobians(kuka.chain, loads.joint_angles, kuka.chain.end_effector)[2]
     matrix = regressor(jacobian, generalized_forces(jacobian, loads.wrench))
+    inside = jacobian.copy()
+    assert regressor(inside, generalized_forces(inside, loads.wrench), out=inside) is inside
+    np.testing.assert_array_equal(inside, matrix)
     for index in np.ndindex(1, 3):
         columns = [np.outer(column, column) @ loads.wrench[index] for column in jacobian[index].T]
         np.testing.assert_allclose(matrix[index], np.column_stack(columns), rtol=1e-12, atol=1e-9)

@@ -11,6 +11,7 @@ from support import OTHER_CHAINS, PinocchioPoint, chain_of, homogeneous, random_
 
 from elastocal import kinematics
 from elastocal.kinematics import (
+    jacobians,
     pose_differences,
     poses,
     poses_and_jacobians,
@@ -26,6 +27,7 @@ ROUNDING = 2e-14
 
 def assert_agrees_with_pinocchio(chain, point, angles):
     position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+    np.testing.assert_array_equal(jacobians(chain, angles, point), jacobian)
     model = PinocchioPoint(chain, point)
     for index, configuration in enumerate(angles):
         expected = model.pose_and_jacobian(configuration)
@@ -163,6 +165,7 @@ def test_any_leading_axes_are_kept(kuka, batch):
             np.testing.assert_allclose(found[index], alone, rtol=0, atol=ROUNDING)
     for found, expected in zip(poses(kuka.chain, angles, point), (position, rotation), strict=True):
         np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(jacobians(kuka.chain, angles, point), jacobian)
 
 
 @pytest.mark.parametrize("size", [6, 7, 8, 14, 15])
@@ -174,6 +177,7 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
 
 
 def test_a_batch_larger_than_the_real_block_holds_every_configuration(kuka):

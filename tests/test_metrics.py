@@ -8,7 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import random_loads, without_tool
 
+from elastocal import metrics
 from elastocal.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.evaluation import accuracy_sums
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.metrics import (
     error_moment,
@@ -81,6 +83,18 @@ def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuk
     for group in range(2):
         expected = np.repeat(position_errors(judge, models[group]), counts[group], axis=1).mean(axis=1)
         np.testing.assert_allclose(found[group], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("models", [1, 4, 5, 6])
+def test_scores_do_not_depend_on_how_many_models_are_scored_at_a_time(kuka, monkeypatch, models):
+    rng, judge = np.random.default_rng(4), judge_of(kuka)
+    compliance = kuka.compliance * rng.uniform(0.8, 1.2, (7, 2, 6))
+    counts = rng.integers(1, 4, (7, len(judge.initial_errors)))
+    whole = mean_deviation(judge, compliance, counts), accuracy_sums(compliance, judge)
+    monkeypatch.setattr(metrics, "MODELS_AT_A_TIME", models)
+    parts = mean_deviation(judge, compliance, counts), accuracy_sums(compliance, judge)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9)
 
 
 def test_initial_errors_are_the_deflections_themselves(kuka):

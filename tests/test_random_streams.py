@@ -67,3 +67,12 @@ def test_draws_do_not_depend_on_order_number_or_blocks(order, cut):
 def test_draws_are_stacked_along_the_first_axis():
     assert draw(5, "kuka", "x", [4, 9], uniform).shape == (2, 4, 3)
     np.testing.assert_array_equal(draw(5, "kuka", "x", [4, 9], uniform)[1], uniform(stream(5, "kuka", "x", 9)))
+
+
+def test_draws_are_those_of_streams_of_their_own_whatever_the_one_before_left_over():
+    # Three halves of a word leave a half for the next draw.
+    def halves(generator):
+        return generator.integers(0, 2**32, 3, dtype=np.uint32)
+
+    for number, array in enumerate(draw(5, "kuka", "x", range(3), halves)):
+        np.testing.assert_array_equal(array, halves(stream(5, "kuka", "x", number)))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.kinematics import jacobians, pose_differences, poses
 
 
 def wrench_of_offset_force(force, offset_m, rotation=None):
@@ -99,10 +99,10 @@ def joint_torques(chain, joint_angles, wrench, at):
     ndarray (..., n)
         N m.
     """
-    return generalized_forces(poses_and_jacobians(chain, joint_angles, at)[2], wrench)
+    return generalized_forces(jacobians(chain, joint_angles, at), wrench)
 
 
-def regressor(jacobian, torques):
+def regressor(jacobian, torques, out=None):
     """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9).
 
     Parameters
@@ -111,13 +111,15 @@ def regressor(jacobian, torques):
         Of the measuring point.
     torques : ndarray (..., n)
         N m; J^T w of the loaded point.
+    out : ndarray (..., 6, n), optional
+        Overwritten with the result; may be the Jacobian itself.
 
     Returns
     -------
     ndarray (..., 6, n)
         m or rad per rad/(N m).
     """
-    return jacobian * torques[..., None, :]
+    return np.multiply(jacobian, torques[..., None, :], out=out)
 
 
 def exact_deflections(chain, coordinates, spring_deflections, point):

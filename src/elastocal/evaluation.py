@@ -15,8 +15,8 @@ from elastocal.metrics import (
     mean_deviation,
     position_errors,
     relative_stiffness_error,
+    scored_parts,
 )
-from elastocal.random_streams import draw
 
 LARGEST_TRUSTED_SPREAD = 0.25
 
@@ -43,44 +43,6 @@ class Averages:
     relative_spread: np.ndarray
 
 
-def bootstrap_weights(seed, key, data_sets, replicates):
-    """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
-
-    Independent weights of mean one are the bootstrap that does not need to know how many there are. They are the same for every
-    noise level and strategy, so that replicates of two of them may be compared one by one.
-
-    Parameters
-    ----------
-    seed, key
-        As in `random_streams.stream`.
-    data_sets : sequence of int
-    replicates : int
-
-    Returns
-    -------
-    ndarray (1 + replicates, sets)
-    """
-    counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
-    return np.vstack([np.ones(len(counts)), counts.T])
-
-
-def bootstrap_test_weights(seed, key, tests, replicates):
-    """How often each test configuration counts in each replicate, as `bootstrap_weights` for data sets.
-
-    Parameters
-    ----------
-    seed, key, replicates
-        As in `bootstrap_weights`.
-    tests : int
-
-    Returns
-    -------
-    ndarray (1 + replicates, tests)
-    """
-    counts = draw(seed, key, "bootstrap of tests", [0], lambda stream: stream.poisson(1.0, (replicates, tests)))[0]
-    return np.vstack([np.ones(tests), counts])
-
-
 def average(blocks, judge, method, deviation_of, test_weights):
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
@@ -94,7 +56,7 @@ def average(blocks, judge, method, deviation_of, test_weights):
     deviation_of : {"averaged_model", "each_data_set"}
         Whether equation 15 scores the averaged model or averages the scores of the data sets (reading R8).
     test_weights : ndarray (1 + replicates, tests)
-        From `bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
+        From `bootstrap.bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
 
     Returns
     -------
@@ -192,12 +154,10 @@ def accuracy_sums(compliance, judge):
         Number of data sets, sum and sum of squares of: mean (m), mean square (m^2), 95th percentile and largest (m) of the
         position error over the test configurations, squared relative error of each compliance.
     """
-    sets, lengths, n = compliance.shape
-    errors = position_errors(judge, compliance.reshape(-1, n))
-    rank = int(np.ceil(0.95 * errors.shape[1])) - 1
-    mean, square = errors.mean(axis=1), np.einsum("mt,mt->m", errors, errors) / errors.shape[1]
-    errors.partition(rank, axis=1)
-    single = np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
+    sets, lengths, _ = compliance.shape
+    single = np.empty((sets, lengths, 4))
+    for part in scored_parts(sets, lengths):
+        single[part] = _scores_of_one_data_set(compliance[part], judge)
     values = np.concatenate([single, ((compliance - judge.reference) / judge.reference) ** 2], axis=-1)
     return np.stack([np.full(values.shape[1:], float(sets)), values.sum(axis=0), (values**2).sum(axis=0)])
 
@@ -247,6 +207,16 @@ def reached_length(values, replicate_values, limit):
         `metrics.length_to_reach`, since leaving them out would make the error too small.
     """
     return float(first_length_below(values, limit)), float(np.std(length_to_reach(replicate_values, limit), ddof=1))
+
+
+def _scores_of_one_data_set(compliance, judge):
+    """Mean, mean square, 95th percentile and largest of the position error, (sets, lengths, 4)."""
+    sets, lengths, n = compliance.shape
+    errors = position_errors(judge, compliance.reshape(-1, n))
+    rank = int(np.ceil(0.95 * errors.shape[1])) - 1
+    mean, square = errors.mean(axis=1), np.einsum("mt,mt->m", errors, errors) / errors.shape[1]
+    errors.partition(rank, axis=1)
+    return np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
 
 
 def _replicated_scores(averages, true_compliance, first_stage_joints):

@@ -241,20 +241,20 @@ def prefix_triangles(systems, configurations, pivots):
     for index, new in enumerate(systems):
         if triangles is None:
             triangles = np.zeros((configurations, pivots, *new.shape[1:]))
+            products = np.empty_like(new)
         else:
             triangles[index] = triangles[index - 1]
         triangle = triangles[index]
         for k in range(pivots):
-            head, tail = triangle[k, k], new[:, k]
-            norm = np.sqrt(head * head + np.einsum("rs,rs->s", tail, tail))
-            reflected = -np.copysign(norm, head)
+            head, tail, rest = triangle[k, k], new[:, k], new[:, k + 1 :]
+            dots = np.einsum("rs,rcs->cs", tail, new[:, k:])
+            reflected = -np.copysign(np.sqrt(head * head + dots[0]), head)
             lead = head - reflected
-            scale = norm * np.abs(lead)
-            weight = lead * triangle[k, k + 1 :] + np.einsum("rs,rcs->cs", tail, new[:, k + 1 :])
+            scale = -reflected * lead
+            weight = lead * triangle[k, k + 1 :] + dots[1:]
             weight /= np.where(scale > 0, scale, 1.0)
             triangle[k, k + 1 :] -= lead * weight
-            for row, factor in zip(new[:, k + 1 :], tail, strict=True):
-                row -= factor * weight
+            rest -= np.multiply(tail[:, None], weight, out=products[:, k + 1 :])
             triangle[k, k] = reflected
     return triangles
 

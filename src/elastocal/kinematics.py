@@ -124,6 +124,27 @@ def poses_and_jacobians_of_points(chain, coordinates, points):
     return tuple(_each_batch_first(array, batch) for array in (position, rotation, jacobian))
 
 
+def jacobians(chain, coordinates, point):
+    """Geometric Jacobian of a measuring point, where its pose is not needed.
+
+    Parameters
+    ----------
+    chain, coordinates, point
+        As in `poses_and_jacobians`.
+
+    Returns
+    -------
+    ndarray (..., 6, n)
+        The last of what `poses_and_jacobians` returns.
+    """
+    components, batch = _component_first(coordinates)
+    jacobian = np.empty((6, chain.coordinates, components.shape[1]))
+    for part in _blocks(components.shape[1]):
+        ((_, origin),), screws = _sweep(chain, components[:, part], [point])
+        _store_twists(screws, point.after, origin, jacobian[:, :, part])
+    return _batch_first(jacobian, batch)
+
+
 def rotation_vectors(rotation):
     """Rotation vectors of rotation matrices, for angles below pi.
 

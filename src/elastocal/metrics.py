@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.kinematics import jacobians
 
-# Bounds the memory in which averaged models are scored.
-GROUPS_AT_A_TIME = 16
+# So many models at a time keep their errors at 500 test configurations in a second-level cache.
+MODELS_AT_A_TIME = 400
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
     point = robot.chain.end_effector
     at = loaded_point(robot.chain, point, wrench_at)
     torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, at)
-    jacobian = poses_and_jacobians(robot.chain, experiments.joint_angles, point)[2]
+    jacobian = jacobians(robot.chain, experiments.joint_angles, point)
     slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
     predicted = exact_deflections(robot.chain, experiments.joint_angles, robot.compliance * torques, point)
     offset = (predicted - true_deflection)[..., :3].reshape(-1, 3, 1)
@@ -82,6 +82,23 @@ def error_moment(judge):
     moment = np.zeros((size, size))
     moment[first, second] = judge.quadratic_forms.mean(axis=0) / 2
     return (moment + moment.T)[:-1, :-1]
+
+
+def scored_parts(groups, models):
+    """Slices of groups of models, small enough for the errors of one to stay in the cache.
+
+    Parameters
+    ----------
+    groups : int
+    models : int
+        In each group.
+
+    Returns
+    -------
+    list of slice
+    """
+    size = max(1, MODELS_AT_A_TIME // models)
+    return [slice(start, start + size) for start in range(0, groups, size)]
 
 
 def position_errors(judge, compliance):
@@ -123,8 +140,7 @@ def mean_deviation(judge, compliance, test_weights=None):
         test_weights = np.ones((len(compliance), len(judge.initial_errors)))
     groups, models, joints = compliance.shape
     means = np.empty((groups, models))
-    for start in range(0, groups, GROUPS_AT_A_TIME):
-        part = slice(start, start + GROUPS_AT_A_TIME)
+    for part in scored_parts(groups, models):
         errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
         means[part] = (errors @ test_weights[part, :, None])[..., 0]
     return means / test_weights.sum(axis=1, keepdims=True)

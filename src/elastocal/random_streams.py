@@ -45,7 +45,15 @@ def draw(seed, robot, purpose, data_sets, sampler):
     -------
     ndarray (sets, ...)
     """
-    return np.stack([sampler(stream(seed, robot, purpose, data_set)) for data_set in data_sets])
+    generator = stream(seed, robot, purpose, 0)
+    start = generator.bit_generator.state
+    drawn = []
+    for data_set in data_sets:
+        # One generator is set to the start of each stream: to make one for each takes longer than most draws.
+        start["state"]["counter"][2] = data_set
+        generator.bit_generator.state = start
+        drawn.append(sampler(generator))
+    return np.stack(drawn)
 
 
 @lru_cache

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.elastostatics import exact_deflections, generalized_forces, loaded_point, wrench_of_offset_force
 from elastocal.experiments import Experiments
-from elastocal.kinematics import poses, poses_and_jacobians
+from elastocal.kinematics import jacobians, poses
 from elastocal.links import extended_chain, spring_compliance
 from elastocal.random_streams import draw
 
@@ -90,7 +90,7 @@ def true_deflections(robot, experiments, point, wrench_at):
     unloaded = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
     unloaded[..., : robot.joints] = experiments.joint_angles
     measured = replace(chain.point(point.name), offset_m=point.offset_m)
-    jacobian = poses_and_jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))[2]
+    jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
     springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(robot)
     return exact_deflections(chain, unloaded, springs, measured)
 

@@ -125,10 +125,11 @@ def read_blocks(path, schema, columns=None, **where):
         name = _metadata(path, file, _TABLE, schema.name)
         if name != schema.name:
             raise InputError(path, f"metadata {_TABLE}", name, schema.name)
+        fields = file.schema_arrow
         for column in schema.columns:
-            index = file.schema_arrow.get_field_index(column.name)
-            if index < 0 or file.schema_arrow.field(index).type != _arrow_type(column):
-                found = "nothing" if index < 0 else f"type {file.schema_arrow.field(index).type}"
+            index = fields.get_field_index(column.name)
+            if index < 0 or fields.field(index).type != _arrow_type(column):
+                found = "nothing" if index < 0 else f"type {fields.field(index).type}"
                 raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
         digests = _metadata(path, file, _DIGESTS)
         if len(digests) != file.num_row_groups:

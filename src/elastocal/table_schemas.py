@@ -107,10 +107,22 @@ def accuracy(joints):
     return TableSchema("accuracy", tuple(columns))
 
 
+_REPLICATE = Column("replicate", "int32", "", "number of the bootstrap replicate, from 1", minimum=1)
+
+WEIGHTS = TableSchema(
+    "weights",
+    (
+        Column("members", "string", "", "what counts: data sets or test configurations; a row group holds one"),
+        Column("number", "int32", "", "number of the data set or test configuration, from 0", minimum=0),
+        _REPLICATE,
+        Column("count", "int32", "", "how often it counts in the replicate", minimum=0),
+    ),
+)
+
 REPLICATES = TableSchema(
     "replicates",
     (
-        Column("replicate", "int32", "", "number of the bootstrap replicate over data sets, from 1", minimum=1),
+        _REPLICATE,
         _LENGTH,
         Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
         Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),

@@ -6,12 +6,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from elastocal.bootstrap import bootstrap_test_weights, bootstrap_weights
 from elastocal.elastostatics import joint_torques
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.metrics import error_moment
 from elastocal.robot import with_target_offset
 from elastocal.simulation import Loading, measurement_noise
-from elastocal.study import simulate
+from elastocal.study import simulate, weights
 from elastocal.study.bound import bound_blocks
 from elastocal.study.columns import to_deflections, to_experiments
 from elastocal.study.design import design_blocks
@@ -19,10 +20,12 @@ from elastocal.study.evaluate import evaluated, judge_from
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.study.measure import measured_blocks
 from elastocal.study.simulate import experiment_blocks, ideal_blocks
+from elastocal.study.weights import DATA_SETS, TESTS, to_weights, weight_blocks
 
 PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
 OFFSET = (0.1, 0.05, 0.2)
 AT = ("end_effector", "measuring_point")
+CONFIGURATIONS_OF_THE_TEST = 30
 
 
 def experiments_of(robot, sets=5, configurations=4, purpose="identification", key="kuka"):
@@ -160,8 +163,14 @@ def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies
 
 
 def judge(robot, at="end_effector"):
-    experiments = experiments_of(robot, 1, 30, purpose="test")
+    experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
     return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
+
+
+def evaluated_in_one_block(table, scores, first_stage_joints, method, replicates, lengths):
+    sets = int(table["data_set"].max()) + 1
+    *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
+    return evaluated([table], counts, tests, scores, first_stage_joints, method, "averaged_model", lengths)
 
 
 def test_bounds_are_below_what_the_strategies_reach(kuka, strategies):
@@ -175,7 +184,7 @@ def test_bounds_are_below_what_the_strategies_reach(kuka, strategies):
     assert (bounds["3DoF+6DoF"] < bounds["6DoF"]).all()
     for name, points in (("6DoF", "6DoF"), ("3+6DoF-comb", "3DoF+6DoF"), ("4-6DoF-after-3DoF", "3DoF+6DoF")):
         table = identified(kuka, strategies[name], experiments, deflections)
-        tables = evaluated([table], scores, "kuka", 1, (0, 1, 2), "stiffness", "averaged_model", 10, [4])
+        tables = evaluated_in_one_block(table, scores, (0, 1, 2), "stiffness", 10, [4])
         ratio = tables[2]["rms"][0] / (noise * bounds[points][3])
         # 200 data sets with heavy tails at four configurations: 15 %.
         assert ratio > 0.85
@@ -197,12 +206,14 @@ def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
     experiments = experiments_of(kuka, sets=12)
     table = identified(kuka, strategies["3+6DoF-comb"], experiments, deflections_of(kuka, experiments, 5e-5))
 
-    def cut(*edges):
-        return [{n: v[4 * a : 4 * b] for n, v in table.items()} for a, b in pairwise(edges)]
+    counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
+
+    def cut(columns, rows, edges):
+        return [{n: columns[n][rows * a : rows * b] for n in columns if n != "members"} for a, b in pairwise(edges)]
 
     scores = judge(kuka)
     whole, parts = (
-        evaluated(iter(cut(*c)), scores, "kuka", 1, (0,), "stiffness", "averaged_model", 12, [2, 4])
+        evaluated(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
         for c in ((0, 12), (0, 1, 7, 12))
     )
     for one, other in zip(whole, parts, strict=True):
@@ -215,9 +226,24 @@ def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
     moved = with_target_offset(kuka, OFFSET)
     table = {"data_set": np.arange(12), "length": np.ones(12)}
     table |= {f"c{j + 1}": np.full(12, c) for j, c in enumerate(kuka.compliance)}
-    found = evaluated([table], judge(moved), "kuka", 1, (0,), "compliance", "averaged_model", 10, [1])
+    found = evaluated_in_one_block(table, judge(moved), (0,), "compliance", 10, [1])
     # Roots of rounding.
     np.testing.assert_allclose(found[0]["deviation"], 0, atol=1e-9)
+
+
+def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
+    for size in (500, 5, 2):
+        monkeypatch.setattr(weights, "SETS_PER_BLOCK", size)
+        *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
+        assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
+        np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
+        np.testing.assert_array_equal(to_weights(tests), bootstrap_test_weights(1, "kuka", 7, 4))
+
+
+def test_the_weights_table_names_the_right_member_and_replicate():
+    (sets, tests) = weight_blocks("kuka", 1, 5, 7, 4)
+    for block, drawn in ((sets, bootstrap_weights(1, "kuka", range(5), 4)), (tests, bootstrap_test_weights(1, "kuka", 7, 4))):
+        np.testing.assert_array_equal(block["count"], drawn[block["replicate"], block["number"]])
 
 
 def test_links_bend_beyond_what_joints_explain(kuka_extended, strategies):

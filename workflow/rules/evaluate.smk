@@ -1,13 +1,32 @@
 """Metrics: what each strategy is worth, averaged over data sets as in the paper and for one data set, and what is possible.
 
-Needs results/identified/ and data/simulated/. Writes results/metrics/, results/replicates/ and results/accuracy/, each
-{robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
+Needs results/identified/ and data/simulated/. Writes results/weights/{robot}.parquet, results/metrics/, results/replicates/ and
+results/accuracy/, each {robot}/{noise}um/{strategy}.parquet, and results/bounds/{robot}.parquet.
 """
+
+
+rule draw_weights:
+    input:
+        sources=sources("draw_weights.py"),
+    output:
+        weights="results/weights/{robot}.parquet",
+    log:
+        "results/logs/draw_weights/{robot}.log",
+    benchmark:
+        "results/timings/draw_weights/{robot}.tsv"
+    params:
+        seed=config["seed"],
+        data_sets=config["data_sets"],
+        tests=config["test_configurations"],
+        replicates=config["evaluation"]["bootstrap_replicates"],
+    script:
+        "../scripts/draw_weights.py"
 
 
 rule evaluate:
     input:
         identified=rules.identify.output.identified,
+        weights=rules.draw_weights.output.weights,
         test_experiments="data/simulated/{robot}/test/experiments.parquet",
         test_ideal="data/simulated/{robot}/test/ideal.parquet",
         sources=sources("evaluate.py"),
@@ -27,7 +46,6 @@ rule evaluate:
         wrench_at=READINGS["wrench_at"],
         average=READINGS["average"],
         deviation_of=READINGS["deviation_of"],
-        replicates=config["evaluation"]["bootstrap_replicates"],
         lengths=config["evaluation"]["lengths"],
     script:
         "../scripts/evaluate.py"

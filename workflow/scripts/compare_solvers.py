@@ -4,6 +4,7 @@ from elastocal.provenance import provenance
 from elastocal.robot import parse_chain, with_target_offset
 from elastocal.storage import read_blocks, write_table
 from elastocal.strategies import strategy_from_document
+from elastocal.study.columns import DEFLECTION_COLUMNS
 from elastocal.study.identify import paired_blocks
 from elastocal.study.solvers import solver_table
 from elastocal.table_schemas import DEFLECTIONS, experiments, solvers
@@ -18,7 +19,7 @@ def compare_solvers(job):
     points = dict.fromkeys(name for strategy in strategies for name in strategy.points)
     blocks = paired_blocks(
         read_blocks(job.input.experiments, experiments(chain.coordinates)),
-        {name: read_blocks(job.input.measured, DEFLECTIONS, point=name) for name in points},
+        {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in points},
     )
     solved = solver_table(blocks, chain, strategies, settings.rows, settings.wrench_at, settings.length, settings.start)
     write_table(job.output.solvers, solvers(chain.coordinates), solved, provenance(settings))

@@ -5,7 +5,8 @@ from elastocal.robot import robot_from_document, with_target_offset
 from elastocal.storage import read_blocks, read_table, write_table
 from elastocal.strategies import strategy_from_document
 from elastocal.study.evaluate import evaluated, judge_from
-from elastocal.table_schemas import DEFLECTIONS, REPLICATES, accuracy, experiments, identified, metrics
+from elastocal.study.weights import DATA_SETS, TESTS
+from elastocal.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
 
 from job import run
 
@@ -21,15 +22,15 @@ def evaluate(job):
         settings.wrench_at,
     )
     needed = ["data_set", *(f"c{j + 1}" for j in range(n))]
+    counts = ["replicate", "count"]
     tables = evaluated(
         read_blocks(job.input.identified, identified(n), needed),
+        read_blocks(job.input.weights, WEIGHTS, counts, members=DATA_SETS),
+        read_table(job.input.weights, WEIGHTS, counts, members=TESTS),
         judge,
-        job.wildcards.robot,
-        settings.seed,
         strategy_from_document(settings.strategy).first_stage_joints,
         settings.average,
         settings.deviation_of,
-        settings.replicates,
         settings.lengths,
     )
     origin = provenance(settings, **dict(job.wildcards))

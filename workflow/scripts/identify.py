@@ -4,6 +4,7 @@ from elastocal.provenance import provenance
 from elastocal.robot import parse_chain, with_target_offset
 from elastocal.storage import read_blocks, write_table
 from elastocal.strategies import strategy_from_document, without_forgotten_stages
+from elastocal.study.columns import DEFLECTION_COLUMNS
 from elastocal.study.identify import identified_blocks, paired_blocks
 from elastocal.table_schemas import DEFLECTIONS, design, experiments, identified
 
@@ -18,7 +19,7 @@ def identify(job):
         strategy = without_forgotten_stages(strategy, chain.coordinates)
     blocks = paired_blocks(
         read_blocks(job.input.experiments, experiments(chain.coordinates)),
-        {name: read_blocks(job.input.measured, DEFLECTIONS, point=name) for name in strategy.points},
+        {name: read_blocks(job.input.measured, DEFLECTIONS, DEFLECTION_COLUMNS, point=name) for name in strategy.points},
     )
     designs = read_blocks(job.input.design, design(chain.coordinates), ["condition"])
     solved = identified_blocks(blocks, designs, chain, strategy, settings.rows, settings.wrench_at, settings.start)

@@ -1,6 +1,6 @@
 """Table 2: deviation before calibration."""
 
-from elastocal.evaluation import bootstrap_weights
+from elastocal.bootstrap import bootstrap_weights
 from elastocal.frames import read_frame, write_csv
 from elastocal.table_schemas import INITIAL
 from elastocal.tables import table2

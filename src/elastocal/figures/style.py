@@ -56,6 +56,8 @@ def line_style(index):
 def save(figure, pdf, png):
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
 
+    Both have the same layout; it is worked out once, since that takes as long as drawing.
+
     Parameters
     ----------
     figure : matplotlib.figure.Figure
@@ -65,3 +67,4 @@ def save(figure, pdf, png):
     for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
         with appearing_whole(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+        figure.set_layout_engine("none")

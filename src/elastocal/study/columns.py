@@ -6,6 +6,8 @@ from elastocal.experiments import Experiments
 from elastocal.table_schemas import COMPONENTS, WRENCH
 
 COMPONENT_NAMES = tuple(name for name, _, _ in COMPONENTS)
+# All that `to_deflections` looks at.
+DEFLECTION_COLUMNS = ("configuration", *COMPONENT_NAMES)
 WRENCH_NAMES = tuple(name for name, _, _ in WRENCH)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from elastocal.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.identification import Readings, condition_numbers, covariance, estimate_compliance, undetermined_prefixes
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.kinematics import jacobians
 from elastocal.study.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.table_schemas import covariance_columns
 
@@ -39,14 +39,13 @@ class Design:
         self.joint_angles, wrench = configuration_first(loads.joint_angles), configuration_first(loads.wrench)
         loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
         measured = {name: chain.point(name) for name in points}
-        jacobians = {
-            point: poses_and_jacobians(chain, self.joint_angles, point)[2] for point in {*loaded.values(), *measured.values()}
-        }
-        forces = {point: generalized_forces(jacobians[point], wrench) for point in {*loaded.values()}}
+        movements = {point: jacobians(chain, self.joint_angles, point) for point in {*loaded.values(), *measured.values()}}
+        forces = {point: generalized_forces(movements[point], wrench) for point in {*loaded.values()}}
         self.torques = {name: forces[loaded[name]] for name in points}
+        # Nothing else needs the Jacobian of a measured point: its regressor takes its place in memory.
         self.regressors = {
-            name: np.moveaxis(regressor(jacobians[measured[name]], self.torques[name]), (-2, -1), (0, 1))[:rows]
-            for name in points
+            name: np.moveaxis(regressor(movements[point], self.torques[name], out=movements[point]), (-2, -1), (0, 1))[:rows]
+            for name, point in measured.items()
         }
 
 

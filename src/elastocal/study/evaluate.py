@@ -6,13 +6,12 @@ from elastocal.evaluation import (
     accuracy_sums,
     accuracy_table,
     average,
-    bootstrap_test_weights,
-    bootstrap_weights,
     metrics_table,
     replicates_table,
 )
 from elastocal.metrics import make_judge
 from elastocal.study.columns import data_sets, to_deflections, to_experiments
+from elastocal.study.weights import to_weights
 
 
 def judge_from(robot, test_experiments, test_deflections, wrench_at):
@@ -20,21 +19,21 @@ def judge_from(robot, test_experiments, test_deflections, wrench_at):
     return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
 
 
-def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, deviation_of, replicates, lengths):
+def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage_joints, method, deviation_of, lengths):
     """Tables of metrics, bootstrap replicates and accuracy of one strategy.
 
     Parameters
     ----------
     identified_blocks : iterable of dict
         Blocks of the identified table.
+    weight_blocks : iterable of dict
+        Blocks of the weights table for the same data sets.
+    test_weights : dict
+        The block of the weights table for the test configurations.
     judge : Judge
-    key : str
-        Name of the robot's file.
-    seed : int
     first_stage_joints : sequence of int
     method, deviation_of
         Readings R7 and R8, see `evaluation.average`.
-    replicates : int
     lengths : sequence of int
         For the accuracy of one data set.
 
@@ -46,14 +45,13 @@ def evaluated(identified_blocks, judge, key, seed, first_stage_joints, method, d
 
     def weighted():
         """Estimates with their weights, one pass for both views of them."""
-        for block in identified_blocks:
+        for block, counts in zip(identified_blocks, weight_blocks, strict=True):
             sets = data_sets(block)
             compliance = np.stack([block[f"c{j + 1}"].reshape(len(sets), -1) for j in range(joints)], axis=-1)
             sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
-            yield compliance, bootstrap_weights(seed, key, sets, replicates)
+            yield compliance, to_weights(counts)
 
-    tests = bootstrap_test_weights(seed, key, len(judge.initial_errors), replicates)
-    averages = average(weighted(), judge, method, deviation_of, tests)
+    averages = average(weighted(), judge, method, deviation_of, to_weights(test_weights))
     return (
         metrics_table(averages, judge.reference, first_stage_joints),
         replicates_table(averages, judge.reference, first_stage_joints),

@@ -1,0 +1,43 @@
+"""Bootstrap weights: how often each data set and each test configuration counts in each replicate."""
+
+import numpy as np
+
+from elastocal.random_streams import draw
+
+
+def bootstrap_weights(seed, key, data_sets, replicates):
+    """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
+
+    Independent weights of mean one are the bootstrap that does not need to know how many there are. They are the same for every
+    noise level and strategy, so that replicates of two of them may be compared one by one.
+
+    Parameters
+    ----------
+    seed, key
+        As in `random_streams.stream`.
+    data_sets : sequence of int
+    replicates : int
+
+    Returns
+    -------
+    ndarray (1 + replicates, sets)
+    """
+    counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
+    return np.vstack([np.ones(len(counts)), counts.T])
+
+
+def bootstrap_test_weights(seed, key, tests, replicates):
+    """How often each test configuration counts in each replicate, as `bootstrap_weights` for data sets.
+
+    Parameters
+    ----------
+    seed, key, replicates
+        As in `bootstrap_weights`.
+    tests : int
+
+    Returns
+    -------
+    ndarray (1 + replicates, tests)
+    """
+    counts = draw(seed, key, "bootstrap of tests", [0], lambda stream: stream.poisson(1.0, (replicates, tests)))[0]
+    return np.vstack([np.ones(tests), counts])

@@ -1,0 +1,17 @@
+"""Bootstrap weights of one robot."""
+
+from elastocal.provenance import provenance
+from elastocal.storage import write_table
+from elastocal.study.weights import weight_blocks
+from elastocal.table_schemas import WEIGHTS
+
+from job import run
+
+
+def draw_weights(job):
+    settings = job.params
+    drawn = weight_blocks(job.wildcards.robot, settings.seed, settings.data_sets, settings.tests, settings.replicates)
+    write_table(job.output.weights, WEIGHTS, drawn, provenance(settings, **dict(job.wildcards)))
+
+
+run(draw_weights, snakemake)
