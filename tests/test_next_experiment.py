@@ -32,11 +32,11 @@ def against(campaign, found, *rivals):
     return Attribution(members[0].effect, members, 0.01, rivals, np.zeros(count), np.zeros(count), np.ones(count, int), 1)
 
 
-def proposed(campaign, found, rivals, limits, count=3, seed=0):
+def proposed(campaign, found, rivals, limits, count=3, seed=0, together=False):
     final = found_in(campaign, found)
     attribution = against(campaign, found, *rivals)
     draws = np.random.default_rng(seed)
-    return final, propose(final, attribution, campaign.observations, campaign.candidates, limits, count, draws)
+    return final, propose(final, attribution, campaign.observations, campaign.candidates, limits, count, draws, together)
 
 
 def rows_of(final, found, rival, targets, observations):
@@ -87,15 +87,17 @@ def separations_by_least_squares(campaign, final, found, rivals, proposal):
     targets = list(final.model.targets)
     taken = {target.point for target in targets}
     targets += [Target(point.name, point.name, (0.0, 0.0, 0.0)) for point in chain.points if point.name not in taken]
-    target = np.array([[t.point for t in targets].index(point) for point in proposal.point])
+    points = [point.split() for point in proposal.point]
+    target = np.array([[t.point for t in targets].index(point) for read in points for point in read])
     rotation = np.tile(np.eye(3), (len(target), 1, 1)) if final.model.rows == 6 else None
     states = states_of(proposal, campaign.observations)
-    beyond = Observations(states, np.arange(len(target)), target, np.zeros((len(target), 3)), rotation)
+    state = np.repeat(np.arange(len(points)), len(points[0]))
+    beyond = Observations(states, state, target, np.zeros((len(target), 3)), rotation)
     worst = []
     for rival in rivals:
         here = rows_of(final, found, rival, final.model.targets, campaign.observations)
-        there = rows_of(final, found, rival, tuple(targets), beyond).reshape(len(target), -1, here.shape[1])
-        worst.append([left_over(np.concatenate([here, *there[:count]])) for count in range(len(target) + 1)])
+        there = rows_of(final, found, rival, tuple(targets), beyond).reshape(len(points), -1, here.shape[1])
+        worst.append([left_over(np.concatenate([here, *there[:count]])) for count in range(len(points) + 1)])
     return np.min(worst, axis=0)
 
 
@@ -119,6 +121,17 @@ def test_separations_are_what_least_squares_leaves(contest, rows, kuka):
     final, proposal = proposed(campaign, found, rivals, kuka.joint_limits)
     expected = separations_by_least_squares(campaign, final, found, rivals, proposal)
     # Other fits to the same data, without what was found: a little off.
+    tolerance = {"rtol": 2e-3, "atol": 3e-3 * expected.max()}
+    np.testing.assert_allclose([proposal.present, *proposal.separation], expected, **tolerance)
+
+
+def test_states_read_at_all_targets_are_worth_what_least_squares_leaves_and_chosen_once(kuka):
+    found, targets = "link_elasticity@2", (Target("elbow", "3DoF", (0.0, 0.0, 0.0)), *HAND)
+    campaign = planted(kuka, {found: [1.5e-7, 1.5e-7]}, targets=targets)
+    final, proposal = proposed(campaign, found, ["joint_tilt@2", "joint_tilt@1"], kuka.joint_limits, 12, together=True)
+    assert proposal.point == ("3DoF 6DoF",) * 12
+    assert len(np.unique(proposal.joint_angles, axis=0)) == 12
+    expected = separations_by_least_squares(campaign, final, found, ["joint_tilt@2", "joint_tilt@1"], proposal)
     tolerance = {"rtol": 2e-3, "atol": 3e-3 * expected.max()}
     np.testing.assert_allclose([proposal.present, *proposal.separation], expected, **tolerance)
 

@@ -28,7 +28,7 @@ class Proposal:
     wrench : ndarray (E, 6)
         N, N m, at the last measuring point, base axes.
     point : tuple of str
-        Measuring point to put a target on.
+        Measuring point to put a target on; several, with spaces between, where targets are read together.
     separation : ndarray (E,)
         Smallest non-centrality between what was found and a rival, after this state and all before it.
     present : float
@@ -42,7 +42,7 @@ class Proposal:
     present: float
 
 
-def propose(final, attribution, observations, candidates, joint_limits, count, stream):
+def propose(final, attribution, observations, candidates, joint_limits, count, stream, together=False):
     """Choose states one by one, each the one that most raises the smallest separation from the alternatives.
 
     Parameters
@@ -58,21 +58,25 @@ def propose(final, attribution, observations, candidates, joint_limits, count, s
     count : int
         States to choose.
     stream : numpy.random.Generator
+    together : bool
+        Whether each state is read at all targets of the campaign, and then not twice; otherwise at one target, which may be on
+        a measuring point that has none yet.
 
     Returns
     -------
     Proposal
     """
     bare = without(final, {member.key for member in attribution.members}, observations)
-    targets, offsets, turns = _targets_everywhere(bare)
-    model = replace(bare.model, targets=targets)
-    estimate = replace(bare.estimate, target_offset=offsets, target_rotation=turns)
+    model, estimate = (bare.model, bare.estimate) if together else _with_targets_everywhere(bare)
+    targets = model.targets
     pool = _pool(model, estimate, observations, joint_limits, stream)
     contests = []
     for key in attribution.alternatives[:_RIVALS]:
         rival = (candidates[key], [shape.start for shape in candidates[key].shapes])
         here = _rows(bare.model, bare.estimate, bare, final, attribution.members, rival, observations)
         there = _rows(model, estimate, bare, final, attribution.members, rival, pool)
+        if together:
+            there = there.reshape(_POOL, -1, there.shape[-1])
         contests.append((_Information.of(here.reshape(-1, here.shape[-1])), there))
     before = min(information.separation for information, _ in contests)
     chosen, separations = [], []
@@ -83,19 +87,25 @@ def propose(final, attribution, observations, candidates, joint_limits, count, s
         chosen.append(best)
         separations.append(worst[best])
         contests = [(information.with_rows(there[best]), there) for information, there in contests]
-    points = tuple(targets[pool.target[index]].point for index in chosen)
+    if together:
+        # The states of a pose follow each other, one for each target.
+        chosen = [index * len(targets) for index in chosen]
+        points = (" ".join(dict.fromkeys(target.point for target in targets)),) * count
+    else:
+        points = tuple(targets[pool.target[index]].point for index in chosen)
     states = pool.states
     return Proposal(states.joint_angles[chosen], states.wrench[chosen], points, np.array(separations), before)
 
 
-def _targets_everywhere(fitted):
-    """The model's targets, and one at each measuring point that has none yet."""
+def _with_targets_everywhere(fitted):
+    """Model and estimate with one more target at each measuring point that has none yet."""
     chain, targets = fitted.model.sites.chain, fitted.model.targets
     bare = [point.name for point in chain.points if point.name not in {target.point for target in targets}]
     added = tuple(Target(name, name, (0.0, 0.0, 0.0)) for name in bare)
     offsets = np.concatenate([fitted.estimate.target_offset, np.zeros((len(added), 3))])
     turns = np.concatenate([fitted.estimate.target_rotation, np.tile(np.eye(3), (len(added), 1, 1))])
-    return (*targets, *added), offsets, turns
+    estimate = replace(fitted.estimate, target_offset=offsets, target_rotation=turns)
+    return replace(fitted.model, targets=(*targets, *added)), estimate
 
 
 def _pool(model, estimate, observations, joint_limits, stream):

@@ -10,7 +10,7 @@ from itertools import combinations
 from pathlib import Path
 
 from elastocal.plant.arm import arm_from_file
-from elastocal.plant.campaigns import Design, continued, schedule_of
+from elastocal.plant.campaigns import Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, drawn_defect, truth_of, with_defects
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.folders import write_blind_campaign, write_truth
@@ -278,26 +278,6 @@ def make_case(case, blind_folder, sealed_folder, robots_folder):
     made = write_blind_campaign(folder, case.name, case.robot, bad, design, schedule_of(robot.arm, design, case.seed))
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | told for defect, told in sized]}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
-
-
-def make_follow_up(case, angles, wrench, blind_folder, robots_folder):
-    """Carry out a proposed experiment on the robot of a case, and write the campaign anew with what was read further.
-
-    Parameters
-    ----------
-    case : Case
-    angles : ndarray (E, n)
-        Of the model, rad, as in next_experiment.csv; equal rows that follow each other are one pose.
-    wrench : ndarray (E, 6)
-        N, N m.
-    blind_folder : str or Path
-        The campaign goes to ``blind_folder/<name>/``; its truth is that of the case.
-    robots_folder : str or Path
-    """
-    robot, design = specimen_of(case, robots_folder), design_of(case)
-    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
-    schedule = continued(schedule_of(robot.arm, design, case.seed), angles, wrench, design.seconds_per_state)
-    write_blind_campaign(Path(blind_folder) / case.name, case.name, case.robot, bad, design, schedule)
 
 
 def write_manifest(path, digests):

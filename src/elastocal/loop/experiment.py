@@ -7,7 +7,7 @@ from elastocal.next_experiment import propose
 from elastocal.study.columns import WRENCH_NAMES
 
 
-def proposal_frame(case, final, attributions, states, draws):
+def proposal_frame(case, final, attributions, states, draws, together=False):
     """States that best tell each effect found from its alternatives; no rows where nothing is confounded.
 
     Parameters
@@ -18,6 +18,8 @@ def proposal_frame(case, final, attributions, states, draws):
     states : int
         For each effect that is confounded.
     draws : numpy.random.Generator
+    together : bool
+        Whether each state is read at all targets of the campaign, see `propose`.
 
     Returns
     -------
@@ -31,7 +33,7 @@ def proposal_frame(case, final, attributions, states, draws):
     for attribution in attributions:
         if not attribution.alternatives:
             continue
-        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws)
+        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws, together)
         reported = np.linalg.solve(robot.reported_matrix, (found.joint_angles - robot.reported_offset).T).T
         for number in range(states):
             loaded = int(found.wrench[number].any())

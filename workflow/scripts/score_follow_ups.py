@@ -1,0 +1,26 @@
+"""How often the name is right after further poses, proposed or random: what was sealed against what was said then."""
+
+from pathlib import Path
+
+from elastocal.blind.follow_up_scores import followed, poses_needed, rates, with_one_effect
+from elastocal.blind.truths import opened_truths
+from elastocal.frames import write_csv
+from elastocal.loop.opened import opened_json
+
+from job import run
+
+
+def score_follow_ups(job):
+    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    truths = opened_truths(files, job.input.manifest)
+    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in opened_json(path)}
+    anew = [entry for path in job.input.anew for entry in opened_json(path)]
+    cases = followed(truths, first, anew)
+    one = with_one_effect(cases)
+    write_csv(job.output.cases, cases)
+    write_csv(job.output.rates, rates(cases[one]))
+    write_csv(job.output.others, rates(cases[~one]))
+    write_csv(job.output.poses, poses_needed(cases[one]))
+
+
+run(score_follow_ups, snakemake)
