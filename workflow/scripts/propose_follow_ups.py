@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from elastocal.blind.follow_up import MOST, POSES, followed_up
+from elastocal.blind.follow_up import LADDER, MOST, POSES, followed_up
 from elastocal.frames import write_csv
 from elastocal.loop.opened import opened_json
 from elastocal.loop.proposed import proposed
@@ -14,7 +14,7 @@ def propose_follow_ups(job):
     frames = [pd.DataFrame({"case": []})]
     for verdict in followed_up(opened_json(job.input.verdicts), MOST[job.params.size]):
         folder = f"{job.input.blind}/{verdict['campaign']}"
-        frame = proposed(folder, "config/robots", verdict, max(POSES), job.params.seed)
+        frame = proposed(folder, "config/robots", verdict, max(POSES), LADDER, job.params.seed)
         frames.append(frame.assign(case=verdict["campaign"]))
     write_csv(job.output.proposals, pd.concat(frames, ignore_index=True))
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from elastocal.blind.cases import defects_of, design_of, specimen_of
-from elastocal.blind.follow_up import ARMS, POSES, folder_name
+from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
 from elastocal.plant.campaigns import continued, schedule_of
 from elastocal.plant.defects import with_defects
 from elastocal.plant.folders import write_blind_campaign
@@ -24,7 +24,7 @@ def carry_out(case, shown, wrench, folder, robots_folder):
     shown : ndarray (E, n)
         Angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most telling first.
     wrench : ndarray (E, 6)
-        N, N m.
+        N, N m; each is read at the shares `LADDER` of it, as the poses of the campaign were.
     folder : str or Path
         The campaign with the first of each number of `POSES` goes to ``<arm>_<poses>/<name>/``.
     robots_folder : str or Path
@@ -32,25 +32,25 @@ def carry_out(case, shown, wrench, folder, robots_folder):
     robot, design = specimen_of(case, robots_folder), design_of(case)
     bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
     first = schedule_of(robot.arm, design, case.seed)
-    experiments = ((shown, wrench), random_experiment(robot.arm, design, wrench, case.seed))
+    experiments = ((shown, wrench), random_experiment(robot.arm, design, len(wrench), case.seed))
     for arm, (angles, loads) in zip(ARMS, experiments, strict=True):
         for poses in POSES:
             angle = robot.arm.angles_shown_as(angles[:poses])
-            schedule = continued(first, angle, loads[:poses], design.seconds_per_state)
+            schedule = continued(first, angle, loads[:poses], design.seconds_per_state, ladder=LADDER)
             write_blind_campaign(
                 Path(folder) / folder_name(arm, poses) / case.name, case.name, case.robot, bad, design, schedule
             )
 
 
-def random_experiment(arm, design, wrench, seed):
-    """Poses and loads drawn as those of the campaign were, with as many readings as a proposal.
+def random_experiment(arm, design, count, seed):
+    """Poses and loads drawn as those of the campaign were.
 
     Parameters
     ----------
     arm : Arm
     design : Design
-    wrench : ndarray (E, 6)
-        Of the proposal; where it has no load there is none here.
+    count : int
+        Of poses, E.
     seed : int
         Of the case.
 
@@ -61,6 +61,6 @@ def random_experiment(arm, design, wrench, seed):
         The campaign's largest force, in a random direction for each pose.
     """
     other = int(stream(seed, "random follow-up").integers(2**48))
-    drawn = schedule_of(arm, replace(design, poses=len(wrench), held_out=0, ladder=(0.0, 1.0), repeats=1), other)
+    drawn = schedule_of(arm, replace(design, poses=count, held_out=0, ladder=(0.0, 1.0), repeats=1), other)
     loaded = drawn.load == 1
-    return arm.shown_angles(drawn.angle[loaded]), drawn.shown_wrench[loaded] * wrench.any(axis=1, keepdims=True)
+    return arm.shown_angles(drawn.angle[loaded]), drawn.shown_wrench[loaded]

@@ -9,6 +9,8 @@ from elastocal.verdict import CLASS, NAMED
 
 # Poses after which a verdict is stated anew.
 POSES = (5, 10, 20)
+# Shares of its load at which each is read, as each pose of the campaign was.
+LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 # Where the poses come from: the loop's proposal, or drawn as those of the campaign were.
 ARMS = ("proposed", "random")
 # Most cases of a block that are followed up, by the size of the benchmark; it bounds the time and looks at no outcome.

@@ -7,7 +7,7 @@ from elastocal.next_experiment import propose
 from elastocal.study.columns import WRENCH_NAMES
 
 
-def proposal_frame(case, final, attributions, states, draws, together=False):
+def proposal_frame(case, final, attributions, states, draws, ladder=None):
     """States that best tell each effect found from its alternatives; no rows where nothing is confounded.
 
     Parameters
@@ -18,8 +18,8 @@ def proposal_frame(case, final, attributions, states, draws, together=False):
     states : int
         For each effect that is confounded.
     draws : numpy.random.Generator
-    together : bool
-        Whether each state is read at all targets of the campaign, see `propose`.
+    ladder : tuple of float, optional
+        Shares of its load at which each pose is read, see `propose`; the rows are then poses, with the load at the share 1.
 
     Returns
     -------
@@ -33,7 +33,7 @@ def proposal_frame(case, final, attributions, states, draws, together=False):
     for attribution in attributions:
         if not attribution.alternatives:
             continue
-        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws, together)
+        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws, ladder)
         reported = np.linalg.solve(robot.reported_matrix, (found.joint_angles - robot.reported_offset).T).T
         for number in range(states):
             loaded = int(found.wrench[number].any())

@@ -14,8 +14,8 @@ from elastocal.loop.reading_columns import reading_columns
 from elastocal.random_streams import stream
 
 
-def proposed(folder, robots_folder, verdict, states, seed):
-    """States that best tell what was found in a campaign from its alternatives.
+def proposed(folder, robots_folder, verdict, poses, ladder, seed):
+    """Poses that best tell what was found in a campaign from its alternatives.
 
     Parameters
     ----------
@@ -23,8 +23,10 @@ def proposed(folder, robots_folder, verdict, states, seed):
         As in `campaign.read_campaign`.
     verdict : dict
         As verdict.json, without faults of the data. What it found is fitted again, not searched for again.
-    states : int
-        For each effect that is confounded; each is a pose of its own under one load, read at all targets of the campaign.
+    poses : int
+        For each effect that is confounded; read at all targets of the campaign.
+    ladder : tuple of float
+        Shares of its load at which each is read.
     seed : int
 
     Returns
@@ -38,7 +40,7 @@ def proposed(folder, robots_folder, verdict, states, seed):
     p_values = {key: effect["p_value"] for effect in verdict["effects"] for key in effect["members"]}
     attributions = attribute(final, found, p_values, case.observations, list(case.candidates.values()))
     draws = stream(seed, case.campaign.name, "next experiment", 0)
-    return proposal_frame(case, final, attributions, states, draws, together=True)
+    return proposal_frame(case, final, attributions, poses, draws, ladder)
 
 
 def _fitted_again(case, effects):

@@ -100,7 +100,7 @@ def schedule_of(arm, design, seed):
     )
 
 
-def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
+def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0, ladder=(0.0, 1.0)):
     """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
 
     Parameters
@@ -112,6 +112,8 @@ def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
         As it shall be shown, N, N m at the flange, base axes; the moment is that of the force at a lever.
     seconds_per_state, pause_s : float
         Pace, and how long after the last state the first one comes.
+    ladder : tuple of float
+        Shares of its load at which each row is read, 0 first.
 
     Returns
     -------
@@ -127,8 +129,8 @@ def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
         if first:
             rows.append((state, 0.0))
             load.append(0)
-        if wrench[state].any():
-            rows.append((state, 1.0))
+        for share in ladder[1:] if wrench[state].any() else ():
+            rows.append((state, share))
             load.append(load[-1] + 1)
     state, share = np.array([row for row, _ in rows]), np.array([share for _, share in rows])[:, None]
     force, moment = wrench[state, :3], wrench[state, 3:]
