@@ -143,7 +143,7 @@ def test_a_ladder_begins_at_the_larger_loads_of_the_campaign(kuka):
     states = campaign.observations.states
     halved = replace(states, wrench=states.wrench * np.where(states.pose % 2, 1.0, 0.5)[:, None])
     campaign = replace(campaign, observations=replace(campaign.observations, states=halved))
-    _, proposal = proposed(campaign, "link_elasticity@2", ["joint_tilt@2"], kuka.joint_limits, 10, ladder=(0.0, 1.0))
+    _, proposal = proposed(campaign, "link_elasticity@2", ["joint_tilt@2"], kuka.joint_limits, 160, ladder=(0.0, 1.0))
     force = np.linalg.norm(halved.wrench[:, :3], axis=1)
     assert (np.linalg.norm(proposal.wrench[:, :3], axis=1) >= np.median(force)).all()
 
