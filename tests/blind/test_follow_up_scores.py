@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import beta
 from test_scores import said, truth
 
-from elastocal.blind.follow_up_scores import followed, poses_needed, rates, with_one_effect
+from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
 
 
 def entry(case, arm, poses, verdict):
@@ -38,7 +38,7 @@ ANEW = [
 
 @pytest.fixture
 def cases():
-    return followed(TRUTHS, dict.fromkeys("abcde", CLASS), ANEW)
+    return followed(TRUTHS, dict.fromkeys("abcde", CLASS), ANEW, {"a": 3.0, "b": 30.0, "c": 0.0, "d": 100.0})
 
 
 def row(table, *key):
@@ -75,7 +75,13 @@ def test_poses_needed_are_those_of_the_cases_that_reached_the_name(cases):
     assert table.loc[("proof", "random")].tolist() == [2, 1, 20]
 
 
+def test_aliases_that_the_proposal_cannot_tell_are_set_apart(cases):
+    assert set(cases.loc[with_prospects(cases), "case"]) == {"b", "d"}
+    proposals = pd.DataFrame({"case": ["a", "b", "a", "b"], "separation": [1.0, 2.0, 3.0, 30.0]})
+    assert promised(proposals) == {"a": 3.0, "b": 30.0}
+
+
 def test_nothing_followed_up_makes_empty_tables():
-    none = followed(TRUTHS, {}, [])
+    none = followed(TRUTHS, {}, [], promised(pd.DataFrame({"case": []})))
     assert rates(none[with_one_effect(none)]).empty and poses_needed(none).empty
     assert "right_name" in rates(none) and isinstance(none, pd.DataFrame)

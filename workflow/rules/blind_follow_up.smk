@@ -64,10 +64,12 @@ rule score_follow_ups:
         sealed=expand(rules.make_cases.output.sealed, block=BLIND),
         manifest=rules.seal_cases.output.manifest,
         first=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
+        proposals=expand(rules.propose_follow_ups.output.proposals, block=BLIND),
         anew=expand(rules.diagnose_follow_ups.output.verdicts, block=BLIND),
         sources=sources("score_follow_ups.py"),
     output:
         rates="reports/blind/follow_up.csv",
+        separable="reports/blind/follow_up_separable.csv",
         others="reports/blind/follow_up_other.csv",
         poses="reports/blind/follow_up_poses.csv",
         cases="reports/blind/follow_up_cases.csv",

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from elastocal.blind.follow_up_scores import followed, poses_needed, rates, with_one_effect
+import pandas as pd
+
+from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
 from elastocal.blind.truths import opened_truths
 from elastocal.frames import write_csv
 from elastocal.loop.opened import opened_json
@@ -15,10 +17,12 @@ def score_follow_ups(job):
     truths = opened_truths(files, job.input.manifest)
     first = {verdict["campaign"]: verdict for path in job.input.first for verdict in opened_json(path)}
     anew = [entry for path in job.input.anew for entry in opened_json(path)]
-    cases = followed(truths, first, anew)
+    proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)
+    cases = followed(truths, first, anew, promised(proposals))
     one = with_one_effect(cases)
     write_csv(job.output.cases, cases)
     write_csv(job.output.rates, rates(cases[one]))
+    write_csv(job.output.separable, rates(cases[one & with_prospects(cases)]))
     write_csv(job.output.others, rates(cases[~one]))
     write_csv(job.output.poses, poses_needed(cases[one]))
 
