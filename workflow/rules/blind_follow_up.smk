@@ -84,3 +84,22 @@ rule score_follow_ups:
 rule blind_follow_up:
     input:
         rules.score_follow_ups.output,
+
+
+rule score_sweep:
+    input:
+        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
+        manifest=rules.seal_cases.output.manifest,
+        verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
+        sources=sources("score_sweep.py"),
+    output:
+        table="reports/blind/sweep.csv",
+        cases="reports/blind/sweep_cases.csv",
+        pdf="reports/blind/figures/sweep.pdf",
+        png="reports/blind/figures/sweep.png",
+    log:
+        "results/logs/score_sweep.log",
+    benchmark:
+        "results/timings/score_sweep.tsv"
+    script:
+        "../scripts/score_sweep.py"

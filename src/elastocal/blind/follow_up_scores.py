@@ -57,7 +57,7 @@ def promised(proposals):
 
 def with_one_effect(cases):
     """Which rows are of cases that a single name can be right for: one effect of the catalogue that readings can show."""
-    return cases["group"].isin(("single", "setting")) & ~cases["truth"].isin(("none", "force_scale"))
+    return cases["group"].isin(("single", "setting", "sweep")) & ~cases["truth"].isin(("none", "force_scale"))
 
 
 def with_prospects(cases):

@@ -41,6 +41,8 @@ class Design:
         Effects that the campaign says its model has.
     measured : {"pose", "position"}
     frame : {"base", "tracker"}
+    reach : float
+        Share of the joint limits, about their middle, that poses are drawn from.
     """
 
     poses: int = 30
@@ -58,6 +60,7 @@ class Design:
     declared: tuple = ()
     measured: str = "pose"
     frame: str = "base"
+    reach: float = 1.0
 
 
 def schedule_of(arm, design, seed):
@@ -75,7 +78,7 @@ def schedule_of(arm, design, seed):
     """
     draws = stream(seed, "schedule")
     low, high = arm.limits.T
-    angles = low + (high - low) * draws.random((design.poses, arm.joints))
+    angles = low + (high - low) * (0.5 + design.reach * (draws.random((design.poses, arm.joints)) - 0.5))
     direction = draws.standard_normal((design.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     states, approach, previous = [], [], []
