@@ -30,7 +30,7 @@ def robot_of(text, compliance=None, links=()):
     chain = chain_of(text)
     n = chain.coordinates
     compliance = 1e-6 * np.arange(1, n + 1) if compliance is None else np.asarray(compliance)
-    return Robot("test", chain, compliance, np.tile([-1.0, 1.0], (n, 1)), links)
+    return Robot("test", chain, compliance, np.tile([-1.0, 1.0], (n, 1)), links, np.eye(n), np.zeros(n))
 
 
 @contextmanager

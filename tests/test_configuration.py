@@ -165,6 +165,7 @@ FAULTY_SOURCES = {
     "missing key": ({"poses": None}, "poses", ["nothing", "joint limits"]),
     "value out of range": ({"poses": 3}, "poses", ["found 3", "8 or more"]),
     "unknown robot": ({"robot": "kukka"}, "robots", ["'kukka'", "'kuka'?"]),
+    "unknown declared robot": ({"declared_robot": "fanuk"}, "robots", ["'fanuk'", "'fanuc'?"]),
     "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
 }
 

@@ -309,5 +309,5 @@ def test_parameter_is_held_where_its_standard_error_would_exceed_its_plausible_s
 
 def test_parameters_are_held_given_those_before_them():
     gram = 1e4 * np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool)), [True, False, True])
-    np.testing.assert_array_equal(identifiable(gram, np.array([True, False, False])), [False, True, True])
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), [True, False, True])
+    np.testing.assert_array_equal(identifiable(gram, np.array([True, False, False]), np.zeros(3, bool)), [False, True, True])

@@ -10,7 +10,14 @@ from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, PinocchioPoint, chain_of, homogeneous, random_angles
 
 from elastocal import kinematics
-from elastocal.kinematics import pose_differences, poses, poses_and_jacobians, rotation_vectors
+from elastocal.kinematics import (
+    pose_differences,
+    poses,
+    poses_and_jacobians,
+    poses_and_jacobians_of_points,
+    poses_of_points,
+    rotation_vectors,
+)
 from elastocal.robot import with_target_offset
 
 # Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
@@ -267,3 +274,15 @@ def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
     for new, old, expected in zip(again, held, poses_and_jacobians(kuka.chain, second, point), strict=True):
         assert np.shares_memory(new, old)
         np.testing.assert_array_equal(new, expected)
+
+
+@pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
+def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
+    points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
+    angles = random_angles(np.random.default_rng(3), kuka.chain, *batch)
+    together = poses_and_jacobians_of_points(kuka.chain, angles, points)
+    for number, point in enumerate(points):
+        for found, wanted in zip(together, poses_and_jacobians(kuka.chain, angles, point), strict=True):
+            np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
+    for found, wanted in zip(poses_of_points(kuka.chain, angles, points), together, strict=False):
+        np.testing.assert_array_equal(found, wanted)

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import check_grad
 from scipy.stats import chi2
 from support import chain_of
 from synthetic import made_estimate, made_model, made_readings
 
+from elastocal import noise as noise_module
 from elastocal.campaign import Campaign, Target
 from elastocal.noise import FEWEST, Noise, declared_noise, noise_from_repeats, reading_covariances, taken_noise
 
@@ -154,3 +156,20 @@ def test_covariance_is_that_of_simulated_readings(rows):
     drawn_rows = (np.einsum("tri,si->str", jacobian[0], joints) + sensor).reshape(200000, -1)
     found = reading_covariances(noise, jacobian, rows)[0]
     np.testing.assert_allclose(found, np.cov(drawn_rows.T), rtol=0, atol=0.02 * found.max())
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_derivatives_of_the_likelihood_agree_with_differences(fanuc, rows, monkeypatch):
+    seen = {}
+    real = noise_module.minimize
+
+    def spy(function, start, data, *rest, **options):
+        seen.update(function=function, start=start, data=data)
+        return real(function, start, data, *rest, **options)
+
+    monkeypatch.setattr(noise_module, "minimize", spy)
+    noise_from_repeats(*drawn(fanuc, 2, poses=8, joint_rad=2e-5, rows=rows))
+    at = seen["start"] + np.random.default_rng(3).normal(0, 0.2, len(seen["start"]))
+    slope = seen["function"](at, *seen["data"])[1]
+    error = check_grad(lambda x: seen["function"](x, *seen["data"])[0], lambda x: seen["function"](x, *seen["data"])[1], at)
+    assert error < 1e-4 * np.linalg.norm(slope)

@@ -66,6 +66,11 @@ def test_cluster_is_the_pose_with_all_its_loads_in_its_session():
     np.testing.assert_array_equal(found.cluster, np.repeat([0, 1, 2, 3], 4))
 
 
+def test_clusters_of_readings_are_in_the_order_of_the_file():
+    keys = [(1, 4, 0, 0, 0), (0, 9, 1, 0, 0), (0, 4, 0, 0, 0), (1, 4, 1, 2, 1), (0, 9, 0, 1, 0)]
+    np.testing.assert_array_equal(state_clusters(readings(keys)), [2, 1, 0, 2, 1])
+
+
 def test_approaches_from_different_sides_are_different_states():
     approach = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
     found = averaged(readings(FOUR, [[0, 0, 0], [2, 4, 6], [5, 5, 5], [7, 5, 3]], approach=approach))

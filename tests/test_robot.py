@@ -146,6 +146,15 @@ def test_reported_joints_come_in_radians():
     np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
 
 
+def test_reported_angles_are_converted_both_ways():
+    robot = robot_from_document(document(reported_joints={"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}))
+    reported = np.radians([[10.0, 20.0], [-30.0, 5.0], [0.0, 0.0]])
+    angles = np.radians([[100.0, -55.0], [60.0, -80.0], [90.0, -45.0]])
+    np.testing.assert_allclose(robot.model_angles(reported), angles, rtol=1e-12)
+    np.testing.assert_allclose(robot.reported_angles(angles), reported, atol=1e-12)
+    np.testing.assert_allclose(robot.model_angles(reported[0]), angles[0], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [

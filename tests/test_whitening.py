@@ -10,7 +10,7 @@ from elastocal.campaign import Target
 from elastocal.model import circumstances, linearize
 from elastocal.noise import Noise
 from elastocal.observations import Observations
-from elastocal.whitening import whitening
+from elastocal.whitening import spectrum, whitening
 
 TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
 NOISE = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))
@@ -92,3 +92,12 @@ def test_discrepancy_is_not_averaged_by_repeats(case):
     seen, jacobian = case
     by = whitening(seen, jacobian, replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6)), 1e-4)
     np.testing.assert_allclose(by.apply(np.full((len(seen), seen.rows), 1e-4)), 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("discrepancy", [0.0, 30e-6, 2e-3])
+def test_spectrum_gives_the_whitened_square_for_every_discrepancy(case, discrepancy):
+    seen, jacobian = case
+    values = np.random.default_rng(8).normal(0, 1e-4, (len(seen), seen.rows))
+    variances, squares = spectrum(seen, jacobian, NOISE, values)
+    whitened = whitening(seen, jacobian, NOISE, discrepancy).apply(values)
+    np.testing.assert_allclose((squares / (variances + discrepancy**2)).sum(), (whitened**2).sum(), rtol=1e-10)

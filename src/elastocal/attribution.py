@@ -11,7 +11,7 @@ from elastocal.selection import without
 # larger one: no law of the catalogue is so exact that the small part in which near relatives differ is to be trusted.
 CONFOUNDED_BIC = 6.0
 CONFOUNDED_DEG = 20.0
-CONFOUNDED_BIC_NEAR = 20.0
+CONFOUNDED_BIC_NEAR = 10.0
 # Beyond this angle a candidate makes less than a quarter of what was found: it may be missing too, but does not stand for it.
 UNRELATED_DEG = 60.0
 
@@ -129,7 +129,10 @@ def _attribution(name, members, final, others_found, p_values, observations, can
     others = without(final, keys, observations)
     taken = {candidate.key for candidate in others_found}
     mine = directions(others, observations, members, 0.0, 0.0)
-    seen = directions(others, observations, [c for c in candidates if c.key not in taken | keys])
+    # Another form of the same effect at the same joints goes by the same name.
+    forms = {(member.effect, member.joints) for member in members}
+    rivals = [c for c in candidates if c.key not in taken and (c.effect, c.joints) not in forms]
+    seen = directions(others, observations, rivals)
     basis = np.linalg.qr(np.concatenate(mine.columns, axis=1))[0]
     explained = basis @ (basis.T @ seen.residual)
     rows, total = len(seen.residual), seen.residual @ seen.residual

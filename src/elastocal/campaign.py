@@ -63,7 +63,7 @@ class Readings:
     target : ndarray of int32 (N,)
         Index into the campaign's targets.
     joint_angles : ndarray (N, n)
-        The model's, rad: ``reported_matrix @ reported + reported_offset``.
+        The model's, rad, not the controller's: `Robot.model_angles` of what it reports.
     wrench : ndarray (N, 6)
         External wrench at the origin of the last measuring point, base axes; N, N m.
     position : ndarray (N, 3)
@@ -477,7 +477,6 @@ def _readings(table, robot, targets):
             raise table.cell_fault(
                 index, "target", shown(label), f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
             )
-    matrix = robot.reported_matrix
     approach = None
     if table.has(table.approach):
         senses = table.numbers(table.approach)
@@ -486,14 +485,14 @@ def _readings(table, robot, targets):
             index, joint = np.argwhere(wrong)[0]
             raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
         # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
-        approach = np.sign(senses @ matrix.T)
+        approach = np.sign(senses @ robot.reported_matrix.T)
     return Readings(
         session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
         pose=table.integers("pose"),
         load=table.integers("load"),
         repeat=table.integers("repeat"),
         target=np.array([names[label] for label in labels], np.int32),
-        joint_angles=reported @ matrix.T + robot.reported_offset,
+        joint_angles=robot.model_angles(reported),
         wrench=table.numbers(table.wrench) if table.has(table.wrench) else np.zeros((len(table.rows), 6)),
         position=table.numbers("xyz"),
         rotation_vector=table.numbers(table.orientation) if table.orientation else None,
@@ -509,11 +508,9 @@ def _check_angles(reported, table, robot):
     low, high = robot.joint_limits.T
     farthest = max(_FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
-    def model(angles):
-        return angles @ robot.reported_matrix.T + robot.reported_offset
-
-    def inside(angles, margin=0.0):
-        return (model(angles) >= low - margin) & (model(angles) <= high + margin)
+    def inside(reported, margin=0.0):
+        angles = robot.model_angles(reported)
+        return (angles >= low - margin) & (angles <= high + margin)
 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)

@@ -104,6 +104,7 @@ def campaign_sources(config, folder, source="config.yaml"):
         if document["source"] == "simulated":
             path = _path(folder, "campaigns", name)
             document["robot_document"] = _named_document(folder, "robots", "robot", document["robot"], path)
+            _named_document(folder, "robots", "robot", document["declared_robot"], path)
         found[name] = document
     return found
 

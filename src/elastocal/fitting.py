@@ -13,16 +13,18 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.model import circumstances, linearize, parameter_values, parameters, residuals, stepped
+from elastocal.model import bends, circumstances, joint_compliances, linearize, parameter_values, parameters, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.registration import registered
-from elastocal.whitening import Whitening, whitening
+from elastocal.whitening import Whitening, spectrum, whitening
 
 _STEPS = 30
 # Largest step that remains, in standard errors.
 _SETTLED = 1e-3
 # Observations beyond this quantile of their distance lose weight.
 _HUBER_QUANTILE = 0.99
+# Correlation beyond which a parameter cannot be told because of a shape.
+_BOUND_TO_SHAPE = 0.5
 _DISCREPANCY_ROUNDS = 6
 # Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
 _ABOVE_NOISE = 1.02
@@ -48,6 +50,10 @@ class Fit:
     whitener : Whitening
     residual : ndarray (M, rows)
         m and rad, base axes.
+    joint_jacobian : ndarray (M, rows, n)
+        Of each target with respect to the joints.
+    circumstances : Circumstances
+        Of the states fitted.
     """
 
     model: object
@@ -59,6 +65,8 @@ class Fit:
     weights: np.ndarray
     whitener: Whitening
     residual: np.ndarray
+    joint_jacobian: np.ndarray
+    circumstances: object
 
     @property
     def parameters(self):
@@ -96,15 +104,16 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     Fit
     """
     start = registered(model, observations) if start is None else start
+    around = circumstances(model, start, observations.states)
     if discrepancy_m is not None:
-        return _robustly(model, observations, noise, start, discrepancy_m)
+        return _robustly(model, observations, around, noise, start, discrepancy_m)
     discrepancy = likely_discrepancy_m
-    found = _robustly(model, observations, noise, start, discrepancy)
+    found = _robustly(model, observations, around, noise, start, discrepancy)
     for _ in range(_DISCREPANCY_ROUNDS):
         before, discrepancy = discrepancy, _discrepancy(found, observations)
         if abs(discrepancy - before) <= 0.01 * max(discrepancy, before):
             break
-        found = _robustly(model, observations, noise, found.estimate, discrepancy)
+        found = _robustly(model, observations, around, noise, found.estimate, discrepancy)
     return found
 
 
@@ -126,37 +135,42 @@ def fit_frames(fitted, model, observations, noise):
     start = registered(model, observations)
     start = replace(start, coefficients=fitted.estimate.coefficients, shapes=fitted.estimate.shapes)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
-    return _robustly(model, observations, noise, start, fitted.discrepancy_m, frozen).estimate
+    around = circumstances(model, start, observations.states)
+    return _robustly(model, observations, around, noise, start, fitted.discrepancy_m, frozen).estimate
 
 
-def _robustly(model, observations, noise, estimate, discrepancy, frozen=False):
+def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=False):
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
+    bending = bends(model, estimate)
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
     for step_number in range(_STEPS):
-        around = circumstances(model, estimate, observations.states)
+        around = replace(around, compliance=joint_compliances(model, estimate))
         line = linearize(model, estimate, observations, around)
-        whitener = whitening(observations, line.coordinate_jacobian[..., : model.sites.joints], noise, discrepancy)
+        jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+        whitener = whitening(observations, jacobian, noise, discrepancy)
         if step_number:
             distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
             weights = norm.weights(distance / max(np.median(distance) / typical, 1.0))
         root = np.sqrt(weights)
         right = whitener.apply(line.residual * root[:, None]).reshape(-1)
         left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
-        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, parameter_values(model, estimate))
+        present = parameter_values(model, estimate)
+        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, present, bending)
         estimate = stepped(model, estimate, step)
         deviation = np.sqrt(np.diag(covariance))
         if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
             break
-    residual = residuals(model, estimate, observations, circumstances(model, estimate, observations.states))
-    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual)
+    around = replace(around, compliance=joint_compliances(model, estimate))
+    residual = residuals(model, estimate, observations, around)
+    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around)
 
 
-def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0):
+def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
     """Least squares over the parameters that the data can tell.
 
     Parameters
@@ -173,6 +187,8 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
         One over the variance of the prior about zero; 0 for none.
     present : float or ndarray (P,)
         Values from which the step is taken.
+    bending : bool or ndarray of bool (P,)
+        As in `identifiable`.
 
     Returns
     -------
@@ -184,7 +200,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     scaled = left * plausible
     gram = scaled.T @ scaled + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = scaled.T @ right - plausible * np.broadcast_to(penalty * present, len(plausible))
-    held = ~identifiable(gram, np.broadcast_to(frozen, len(plausible)))
+    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, bending)))
     free = np.flatnonzero(~held)
     step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
     if len(free):
@@ -194,7 +210,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     return step, covariance, held
 
 
-def identifiable(gram, frozen):
+def identifiable(gram, frozen, bending):
     """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
 
     Parameters
@@ -203,6 +219,8 @@ def identifiable(gram, frozen):
         Information on the parameters, each in units of its plausible size.
     frozen : ndarray of bool (P,)
         Left out from the start.
+    bending : ndarray of bool (P,)
+        Shapes: given up before a parameter that they are bound to, as that of their law is where it is nearly a straight line.
 
     Returns
     -------
@@ -221,11 +239,14 @@ def identifiable(gram, frozen):
             kept.append(number)
     # Parameters that came later may have taken from what their predecessors could be told by.
     while kept:
-        deviation = np.sqrt(np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])))
+        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+        deviation = np.sqrt(np.diag(covariance))
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
             break
-        kept.pop(worst)
+        correlation = np.where(bending[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
+        shape = int(np.argmax(correlation))
+        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask
@@ -233,17 +254,12 @@ def identifiable(gram, frozen):
 
 def _discrepancy(found, observations):
     """Standard deviation that brings the mean square of the whitened residual to one."""
-    around = circumstances(found.model, found.estimate, observations.states)
-    joints = found.model.sites.joints
-    jacobian = linearize(
-        replace(found.model, effects=()), replace(found.estimate, coefficients=(), shapes=()), observations, around
-    ).coordinate_jacobian[..., :joints]
     weighted = found.residual * np.sqrt(found.weights)[:, None]
     freedom = found.degrees_of_freedom
+    variances, squares = spectrum(observations, found.joint_jacobian, found.noise, weighted)
 
     def excess(discrepancy):
-        whitened = whitening(observations, jacobian, found.noise, discrepancy).apply(weighted)
-        return (whitened**2).sum() / freedom - 1.0
+        return (squares / (variances + discrepancy**2)).sum() / freedom - 1.0
 
     if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
         return 0.0

@@ -3,7 +3,7 @@
 import pandas as pd
 
 from elastocal.storage import read_provenance, read_table
-from elastocal.whole_files import appearing_whole
+from elastocal.whole_files import write_text
 
 
 def read_frame(path, schema, columns=None):
@@ -75,9 +75,3 @@ def _latex(text):
     for plain, escaped in (("_", r"\_"), ("%", r"\%"), ("±", r"$\pm$"), ("µ", r"\textmu{}")):
         text = str(text).replace(plain, escaped)
     return text
-
-
-def write_text(path, text):
-    """Write a text; the file appears whole or not at all."""
-    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
-        file.write(text)

@@ -68,7 +68,7 @@ def summary(distance):
     }
 
 
-def intervals(errors, replicates, stream):
+def intervals(errors, replicates, stream, reference=0):
     """95 % intervals of the summary by a bootstrap over poses.
 
     Parameters
@@ -77,27 +77,39 @@ def intervals(errors, replicates, stream):
         Of several models for the same observations; every replicate draws the same poses for all.
     replicates : int
     stream : numpy.random.Generator
+    reference : int
+        Which of `errors` the reductions count from.
 
     Returns
     -------
     intervals : list of dict of str to ndarray (2,)
         For each of `errors`.
     reductions : list of ndarray (2,)
-        Of the share by which the RMS falls from the first of `errors` to each.
+        Of the share by which the RMS falls from the reference to each.
     """
-    drawn = {name: np.empty((len(errors), replicates)) for name in METRICS}
-    cluster, poses = errors[0].cluster, errors[0].poses
-    members = np.argsort(cluster, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(cluster))])
-    for replicate in range(replicates):
-        chosen = stream.integers(0, poses, poses)
-        rows = np.concatenate([members[starts[pose] : starts[pose + 1]] for pose in chosen])
-        for number, one in enumerate(errors):
-            for name, value in summary(one.distance[rows]).items():
-                drawn[name][number, replicate] = value
-    reductions = [np.percentile(1 - rms / drawn["rms_m"][0], _INTERVAL) for rms in drawn["rms_m"]]
-    found = [{name: np.percentile(drawn[name][number], _INTERVAL) for name in METRICS} for number in range(len(errors))]
-    return found, reductions
+    poses = errors[0].poses
+    chosen = stream.integers(0, poses, (replicates, poses))
+    times = np.array([np.bincount(row, minlength=poses) for row in chosen])[:, errors[0].cluster]
+    drawn = [_repeated_summary(one.distance, times) for one in errors]
+    found = [{name: np.percentile(values, _INTERVAL) for name, values in one.items()} for one in drawn]
+    whole = drawn[reference]["rms_m"]
+    return found, [np.percentile(1 - one["rms_m"] / whole, _INTERVAL) for one in drawn]
+
+
+def _repeated_summary(distance, times):
+    """The summary of each row of ``times`` (B, M), in which observations count so many times."""
+    order = np.argsort(distance)
+    rising, up_to = distance[order], np.cumsum(times[:, order], axis=1)
+    count = up_to[:, -1]
+    place = 0.95 * (count - 1)
+    below = np.floor(place).astype(int)
+    low, high = (rising[(up_to <= rank[:, None]).sum(axis=1)] for rank in (below, np.minimum(below + 1, count - 1)))
+    return {
+        "mean_m": times @ distance / count,
+        "rms_m": np.sqrt(times @ distance**2 / count),
+        "p95_m": low + (place - below) * (high - low),
+        "max_m": rising[(up_to < count[:, None]).sum(axis=1)],
+    }
 
 
 def noise_floor(fitted, observations, model, estimate):

@@ -30,12 +30,32 @@ def poses(chain, coordinates, point):
     rotation : ndarray (..., 3, 3)
         Columns are the axes of the point's frame in base axes.
     """
+    position, rotation = poses_of_points(chain, coordinates, [point])
+    return position[0], rotation[0]
+
+
+def poses_of_points(chain, coordinates, points):
+    """Poses of several measuring points in one walk along the chain.
+
+    Parameters
+    ----------
+    chain, coordinates
+        As in `poses`.
+    points : sequence of MeasuringPoint
+
+    Returns
+    -------
+    position : ndarray (T, ..., 3)
+    rotation : ndarray (T, ..., 3, 3)
+    """
     components, batch = _component_first(coordinates)
-    position, rotation = np.empty((3, components.shape[1])), np.empty((3, 3, components.shape[1]))
-    for part in _blocks(components.shape[1]):
-        axes, origin, _ = _sweep(chain, components[:, part], point)
-        _store_pose(axes, origin, position[:, part], rotation[:, :, part])
-    return _batch_first(position, batch), _batch_first(rotation, batch)
+    size = components.shape[1]
+    position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
+    for part in _blocks(size):
+        frames, _ = _sweep(chain, components[:, part], points)
+        for number, frame in enumerate(frames):
+            _store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
+    return _each_batch_first(position, batch), _each_batch_first(rotation, batch)
 
 
 def poses_and_jacobians(chain, coordinates, point, out=None):
@@ -72,10 +92,36 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
         results = [_component_first_view(array, len(shape)) for array, shape in zip(out, shapes, strict=True)]
     position, rotation, jacobian = results
     for part in _blocks(size):
-        axes, origin, screws = _sweep(chain, components[:, part], point)
+        ((axes, origin),), screws = _sweep(chain, components[:, part], [point])
         _store_pose(axes, origin, position[:, part], rotation[:, :, part])
-        _store_twists(screws, origin, jacobian[:, :, part])
+        _store_twists(screws, point.after, origin, jacobian[:, :, part])
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
+
+
+def poses_and_jacobians_of_points(chain, coordinates, points):
+    """Poses and Jacobians of several measuring points in one walk along the chain.
+
+    Parameters
+    ----------
+    chain, coordinates
+        As in `poses_and_jacobians`.
+    points : sequence of MeasuringPoint
+
+    Returns
+    -------
+    position : ndarray (T, ..., 3)
+    rotation : ndarray (T, ..., 3, 3)
+    jacobian : ndarray (T, ..., 6, n)
+    """
+    components, batch = _component_first(coordinates)
+    size, shapes = components.shape[1], ((3,), (3, 3), (6, chain.coordinates))
+    position, rotation, jacobian = (np.empty((len(points), *shape, size)) for shape in shapes)
+    for part in _blocks(size):
+        frames, screws = _sweep(chain, components[:, part], points)
+        for number, (axes, origin) in enumerate(frames):
+            _store_pose(axes, origin, position[number, :, part], rotation[number, :, :, part])
+            _store_twists(screws, points[number].after, origin, jacobian[number, :, :, part])
+    return tuple(_each_batch_first(array, batch) for array in (position, rotation, jacobian))
 
 
 def rotation_vectors(rotation):
@@ -146,35 +192,51 @@ def _batch_first(components, batch):
     return np.moveaxis(components, range(len(shape)), range(-len(shape), 0))
 
 
+def _each_batch_first(components, batch):
+    """As `_batch_first`, behind an axis of points."""
+    shape = components.shape[1:-1]
+    components = components.reshape(len(components), *shape, *batch)
+    return np.moveaxis(components, range(1, 1 + len(shape)), range(-len(shape), 0))
+
+
 def _blocks(size):
     return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
 
 
-def _sweep(chain, coordinates, point):
-    """Walk the chain up to `point`: axes of the frame, target, and (kind, sign, axis, origin) of each coordinate on the way.
+def _sweep(chain, coordinates, points):
+    """Walk the chain up to the last of the points.
 
-    The origin is none where the point lies on the axis and only turns.
+    Gives axes and target of each point, and (place, kind, sign, axis, origin) of each coordinate on the way. The origin is none
+    where all points behind lie on the axis and only turn.
     """
-    transforms = chain.transforms[: point.after]
+    transforms = chain.transforms[: max(point.after for point in points)]
     turns = iter(_cosines_and_sines(coordinates, [transform for transform in transforms if transform.kind == "R"]))
     axes = before_turns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     origin, turned_about = [0.0, 0.0, 0.0], None
     screws = [None] * chain.coordinates
+    frames = {0: (axes, origin)}
     for number, transform in enumerate(transforms):
         axis, coordinate, sign = transform.axis, transform.coordinate, transform.sign
         if coordinate is not None:
-            moves = transform.kind == "T" or not _lies_on(axis, transforms[number:], point)
-            screws[coordinate] = (transform.kind, sign, axes[axis], origin if moves else None)
+            moves = transform.kind == "T" or not all(
+                _lies_on(axis, transforms[number : point.after], point) for point in points if point.after > number
+            )
+            screws[coordinate] = (number, transform.kind, sign, axes[axis], origin if moves else None)
         if transform.kind == "T":
             amount = transform.constant if coordinate is None else _product(sign, coordinates[coordinate])
             origin = _moved(origin, amount, axes[axis])
-            continue
-        if axis != turned_about:
-            before_turns, turned_about = axes, axis
-        axes = _turned(before_turns, axis, *next(turns))
-    for axis, length in zip(axes, point.offset_m, strict=True):
+        else:
+            if axis != turned_about:
+                before_turns, turned_about = axes, axis
+            axes = _turned(before_turns, axis, *next(turns))
+        frames[number + 1] = (axes, origin)
+    return [(frames[point.after][0], _offset(*frames[point.after], point.offset_m)) for point in points], screws
+
+
+def _offset(axes, origin, offset_m):
+    for axis, length in zip(axes, offset_m, strict=True):
         origin = _moved(origin, length, axis)
-    return axes, origin, screws
+    return origin
 
 
 def _lies_on(axis, transforms, point):
@@ -228,13 +290,13 @@ def _store_pose(axes, origin, position, rotation):
             rotation[i, j] = axes[j][i]
 
 
-def _store_twists(screws, target, jacobian):
+def _store_twists(screws, after, target, jacobian):
     levers = {}
     for column, screw in enumerate(screws):
-        if screw is None:
+        if screw is None or screw[0] >= after:
             jacobian[:, column] = 0.0
             continue
-        kind, sign, axis, origin = screw
+        _, kind, sign, axis, origin = screw
         linear, angular = jacobian[:3, column], jacobian[3:, column]
         if kind == "T":
             _store(axis, linear)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from elastocal.model import circumstances, linearize
 from elastocal.whitening import whitening
 
 # A declared noise is trusted to about ten percent: so many degrees of freedom it stands for.
@@ -56,10 +55,8 @@ def lack_of_fit(fitted, observations):
     freedom = fitted.degrees_of_freedom
     if fitted.noise.source == "residual" or freedom <= 0:
         return LackOfFit(np.nan, np.nan, freedom, 0)
-    around = circumstances(fitted.model, fitted.estimate, observations.states)
-    line = linearize(fitted.model, fitted.estimate, observations, around)
-    jacobian = line.coordinate_jacobian[..., : fitted.model.sites.joints]
-    whitened = whitening(observations, jacobian, fitted.noise).apply(line.residual * np.sqrt(fitted.weights)[:, None])
+    whitener = whitening(observations, fitted.joint_jacobian, fitted.noise)
+    whitened = whitener.apply(fitted.residual * np.sqrt(fitted.weights)[:, None])
     ratio = (whitened**2).sum() / freedom
     noise_freedom = fitted.noise.degrees_of_freedom or _DECLARED_FREEDOM
     return LackOfFit(float(ratio), float(f_distribution.sf(ratio, freedom, noise_freedom)), freedom, noise_freedom)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import Parameter, circumstances_of
-from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.kinematics import pose_differences, poses_and_jacobians_of_points, poses_of_points
 from elastocal.sites import Sites, sites_of
 
 _LENGTH = ("dx", "dy", "dz")
@@ -193,6 +193,12 @@ def parameters(model, estimate):
     return found
 
 
+def bends(model, estimate):
+    """Which of the `parameters` are shapes, ndarray of bool (P,)."""
+    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
+    return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
+
+
 def parameter_values(model, estimate):
     """Present values of all that is fitted, in the order of `parameters`.
 
@@ -229,12 +235,9 @@ def predict(model, estimate, observations, circumstances):
     rotation : ndarray (M, 3, 3)
     """
     coordinates = displaced_coordinates(model, estimate, circumstances)
-    position, rotation = np.empty((len(observations), 3)), np.empty((len(observations), 3, 3))
-    for index, point in _points(model, estimate):
-        mask = observations.target == index
-        position[mask], rotation[mask] = poses(model.sites.chain, coordinates[observations.state[mask]], point)
-        rotation[mask] = rotation[mask] @ estimate.target_rotation[index]
-    return position, rotation
+    position, rotation = poses_of_points(model.sites.chain, coordinates, _points(model, estimate))
+    seen = observations.target, observations.state
+    return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
 
 
 def residuals(model, estimate, observations, circumstances):
@@ -268,17 +271,17 @@ def linearize(model, estimate, observations, circumstances):
     """
     coordinates = displaced_coordinates(model, estimate, circumstances)
     count, rows = len(observations), model.rows
-    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
-    jacobian = np.empty((rows, model.sites.chain.coordinates, count))
-    for index, point in _points(model, estimate):
-        mask = observations.target == index
-        position[mask], rotation[mask], at_point = poses_and_jacobians(
-            model.sites.chain, coordinates[observations.state[mask]], point
-        )
-        jacobian[..., mask] = np.moveaxis(at_point, 0, -1)[:rows]
+    position, rotation, at_points = poses_and_jacobians_of_points(model.sites.chain, coordinates, _points(model, estimate))
+    seen = observations.target, observations.state
+    position, rotation = position[seen], rotation[seen]
     residual = _differences(
         measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
     )
+    # Component first, so that every effect's arithmetic runs along the observations.
+    jacobian = np.empty((rows, model.sites.chain.coordinates, count))
+    for index, at_point in enumerate(at_points):
+        mask = observations.target == index
+        jacobian[..., mask] = np.moveaxis(at_point, 0, -1)[:rows][..., observations.state[mask]]
     jacobian = np.moveaxis(jacobian, -1, 0)
     columns = []
     if model.fitted_frames:
@@ -406,9 +409,8 @@ def _differences(measured, position, rotation):
 
 
 def _points(model, estimate):
-    for index, target in enumerate(model.targets):
-        point = model.sites.chain.point(target.point)
-        yield index, replace(point, offset_m=tuple(estimate.target_offset[index]))
+    points = [model.sites.chain.point(target.point) for target in model.targets]
+    return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]
 
 
 def _target_columns(rotation, mask, rows):

@@ -22,6 +22,8 @@ FEWEST = 9
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
+# Repeats this many times as far from the middle of their state as half of all are not noise: eight standard deviations.
+_WILD = 12.0
 _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
 
 
@@ -75,8 +77,9 @@ def noise_from_repeats(model, estimate, readings):
     if total < FEWEST:
         return None
     rows, joints = model.rows, model.sites.joints
-    position = np.concatenate([part.reshape(-1, rows)[:, :3].ravel() for part in contrasts]).std()
-    orientation = np.concatenate([part.reshape(-1, rows)[:, 3:].ravel() for part in contrasts]).std() if rows == 6 else position
+    every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
+    position = np.sqrt((every[:, :3] ** 2).mean())
+    orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor
@@ -84,9 +87,9 @@ def noise_from_repeats(model, estimate, readings):
     both = [np.log(position), np.log(orientation)][: rows // 3]
     start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
     bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
-    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", bounds=bounds)
+    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", jac=True, bounds=bounds)
     # Akaike: the joints' part must be worth its parameters.
-    if fitted.fun + joints > minimize(lambda logs: _negative_log_likelihood([*logs, *nothing], *data), both).fun:
+    if fitted.fun + joints > _negative_log_likelihood(np.concatenate([both, nothing]), *data)[0]:
         return sensor
     values = np.exp(fitted.x)
     # Each approach draws a joint once, however many targets are read.
@@ -153,7 +156,7 @@ def _contrasts(model, estimate, readings):
     line = linearize(bare, at, observations, circumstances(bare, at, observations.states))
     seen = np.bincount(observations.state)
     start = np.concatenate([[0], np.cumsum(seen)])
-    contrasts, jacobians = {}, {}
+    repeats = []
     for state in range(repeated.max() + 1):
         members = np.flatnonzero(repeated == state)
         targets = observations.target[start[members[0]] : start[members[0] + 1]]
@@ -162,17 +165,41 @@ def _contrasts(model, estimate, readings):
             continue
         residual = np.array([line.residual[start[m] : start[m + 1]].ravel() for m in members])
         jacobian = line.coordinate_jacobian[start[members[0]] : start[members[0] + 1], :, : model.sites.joints]
-        contrasts.setdefault(len(targets), []).extend(helmert(len(members)) @ residual)
-        jacobians.setdefault(len(targets), []).extend([jacobian] * (len(members) - 1))
+        repeats.append((residual, jacobian))
+    contrasts, jacobians = {}, {}
+    for (residual, jacobian), kept in zip(repeats, _not_far([residual for residual, _ in repeats], model.rows), strict=True):
+        if kept.sum() > 1:
+            contrasts.setdefault(len(jacobian), []).extend(helmert(kept.sum()) @ residual[kept])
+            jacobians.setdefault(len(jacobian), []).extend([jacobian] * (kept.sum() - 1))
     return [np.array(found) for found in contrasts.values()], [np.array(found) for found in jacobians.values()]
 
 
+def _not_far(repeats, rows):
+    """Which repeats of each state (n, k * rows) are not far from the others: a wild one would be taken for noise."""
+    off = [np.abs(residual - np.median(residual, axis=0)).reshape(len(residual), -1, rows) for residual in repeats]
+    # Two repeats are as far from each other as from their middle: they do not tell which of them is wild.
+    telling = [part.reshape(-1, rows) for part in off if len(part) > 2]
+    if not telling:
+        return [np.ones(len(part), bool) for part in off]
+    scale = np.repeat([np.median(part) for part in np.split(np.concatenate(telling), rows // 3, axis=1)], 3)
+    return [(part <= _WILD * scale).all(axis=(1, 2)) | (len(part) < 3) for part in off]
+
+
 def _negative_log_likelihood(logs, contrasts, jacobians, rows):
+    """Half of minus twice the logarithm of the likelihood, and its derivatives by the logarithms of the deviations."""
     values = np.exp(logs)
-    noise = Noise("", values[0], values[rows // 3 - 1], values[rows // 3 :])
-    total = 0.0
+    sensors = rows // 3
+    noise = Noise("", values[0], values[sensors - 1], values[sensors:])
+    total, slope = 0.0, np.zeros(len(values))
     for vectors, jacobian in zip(contrasts, jacobians, strict=True):
-        covariance = reading_covariances(noise, jacobian, rows)
-        total += 0.5 * np.linalg.slogdet(covariance)[1].sum()
-        total += 0.5 * (vectors * np.linalg.solve(covariance, vectors[..., None])[..., 0]).sum()
-    return total
+        groups, targets = jacobian.shape[:2]
+        inverse = np.linalg.inv(reading_covariances(noise, jacobian, rows))
+        told = (inverse @ vectors[..., None])[..., 0]
+        total += 0.5 * ((vectors * told).sum() - np.linalg.slogdet(inverse)[1].sum())
+        # By an element of the covariance: half of (inverse - told told^T).
+        sensor = (np.diagonal(inverse, axis1=1, axis2=2) - told**2).reshape(groups, targets, sensors, 3).sum(axis=(0, 1, 3))
+        slope[:sensors] += values[:sensors] ** 2 * sensor
+        stacked = jacobian.reshape(groups, targets * rows, -1)
+        joint = (stacked * (inverse @ stacked)).sum(axis=1) - (told[:, None] @ stacked)[:, 0] ** 2
+        slope[sensors:] += values[sensors:] ** 2 * joint.sum(axis=0)
+    return total, slope

@@ -78,7 +78,8 @@ def state_clusters(states):
 
     Parameters
     ----------
-    states : States
+    states : States or Readings
+        Of readings, that of each reading.
 
     Returns
     -------

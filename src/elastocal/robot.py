@@ -11,7 +11,7 @@ length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), e
 
 import math
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -159,14 +159,42 @@ class Robot:
     chain: Chain
     compliance: np.ndarray
     joint_limits: np.ndarray
-    links: tuple = ()
-    reported_matrix: np.ndarray = field(default=None)
-    reported_offset: np.ndarray = field(default=None)
+    links: tuple
+    reported_matrix: np.ndarray
+    reported_offset: np.ndarray
 
     @property
     def joints(self):
         """Number of joints."""
         return self.chain.coordinates
+
+    def model_angles(self, reported):
+        """The chain's joint angles from those that the controller reports.
+
+        Parameters
+        ----------
+        reported : ndarray (..., n)
+            rad.
+
+        Returns
+        -------
+        ndarray (..., n)
+        """
+        return reported @ self.reported_matrix.T + self.reported_offset
+
+    def reported_angles(self, angles):
+        """Joint angles as the controller reports them from the chain's.
+
+        Parameters
+        ----------
+        angles : ndarray (N, n)
+            rad.
+
+        Returns
+        -------
+        ndarray (N, n)
+        """
+        return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
 
 def parse_chain(text, lengths_m, source):

@@ -13,7 +13,7 @@ from scipy.linalg import cho_solve
 from scipy.sparse import csr_matrix
 from scipy.stats import f as f_distribution
 
-from elastocal.model import circumstances, effect_columns, linearize
+from elastocal.model import effect_columns, linearize
 
 # A candidate whose sensitivities keep less than this share off the model's own cannot be told.
 LEAST_RETAINED = 0.01
@@ -22,6 +22,8 @@ LEAST_NONCENTRALITY = 10.0
 # Directions of a candidate that keep less than this share (squared) are rounding.
 _ROUNDING = 1e-10
 _SHAPES_TRIED = 3
+# Candidates by which the criterion falls this much, up to so many, are taken out of the residual that stands for noise.
+_OBVIOUS_BIC, _MOST_OBVIOUS = 10.0, 6
 
 
 @dataclass(frozen=True)
@@ -101,8 +103,7 @@ def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, 
     -------
     Directions
     """
-    around = circumstances(fitted.model, fitted.estimate, observations.states)
-    line = linearize(fitted.model, fitted.estimate, observations, around)
+    line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
     rows = fitted.residual.size
     scale = np.array([parameter.plausible for _, parameter in fitted.parameters])
     known = fitted.whitened(line.sensitivities[..., ~fitted.held] * scale[~fitted.held]).reshape(rows, -1)
@@ -117,7 +118,7 @@ def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, 
             continue
         plausible = np.array([parameter.plausible for parameter in candidate.parameters])
         for shapes in _shapes_tried(candidate):
-            made = effect_columns([(candidate, shapes)], around, line.coordinate_jacobian, observations.state)
+            made = effect_columns([(candidate, shapes)], fitted.circumstances, line.coordinate_jacobian, observations.state)
             made = fitted.whitened(made * plausible).reshape(rows, -1)
             off = made - basis @ (basis.T @ made)
             # Twice is enough: the second pass removes the rounding of the first.
@@ -157,14 +158,12 @@ def score(found, replicates, stream):
     if not found.columns:
         nothing = np.zeros(0)
         return Scores(nothing, nothing, nothing, nothing, nothing)
-    sizes = np.array([columns.shape[1] for columns in found.columns])
+    statistic, rest, sizes = _statistics(found)
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    adjusted = leverage_adjusted(found)
+    adjusted = leverage_adjusted(_without_the_obvious(found))
     poses = csr_matrix((np.ones(len(found.cluster)), (found.cluster, np.arange(len(found.cluster)))))
     contributions = np.concatenate([poses @ (columns * adjusted[:, None]) for columns in found.columns], axis=1)
     model_part = poses @ (found.model * adjusted[:, None])
-    statistic = np.array([((columns.T @ found.residual) ** 2).sum() for columns in found.columns])
-    rest = found.residual @ found.residual
     p_value = _tail(statistic, rest, sizes, found.residual_freedom)
     signs = stream.choice([-1.0, 1.0], size=(replicates, poses.shape[0]))
     statistics = np.add.reduceat((signs @ contributions) ** 2, starts, axis=1)
@@ -273,6 +272,28 @@ def cross_validated_gains(found, candidates, folds):
             gains[candidate, out] = error**2 - (error - beyond[:, mine] @ solved) ** 2
     per_pose = np.array([np.bincount(found.cluster, gain) for gain in gains])
     return per_pose.sum(axis=1), np.sqrt(per_pose.shape[1]) * per_pose.std(axis=1, ddof=1)
+
+
+def _without_the_obvious(found):
+    """The same directions once the model has every candidate that stands out whatever the bootstrap says.
+
+    An effect that is there would otherwise be taken for noise: where few poses hold most of it, turning their signs makes
+    residuals as large as its own.
+    """
+    for _ in range(_MOST_OBVIOUS):
+        if not found.columns:
+            break
+        statistic, rest, sizes = _statistics(found)
+        gain = _bic_gain(statistic, rest, sizes, len(found.residual))
+        if gain.max() < _OBVIOUS_BIC:
+            break
+        found = absorbed(found, int(np.argmax(gain)))
+    return found
+
+
+def _statistics(found):
+    statistic = np.array([((columns.T @ found.residual) ** 2).sum() for columns in found.columns])
+    return statistic, found.residual @ found.residual, np.array([columns.shape[1] for columns in found.columns])
 
 
 def _inflated_factor(matrix):

@@ -9,9 +9,10 @@ from elastocal.fitting import Fit, fit
 from elastocal.screening import Directions, Scores, absorbed, cross_validated_gains, directions, score
 
 FAMILY_WISE_LEVEL = 0.05
-# An effect that is chosen must predict poses that were left out better, by this many standard errors.
-_GAIN_STD_ERRORS = 1.0
 FOLDS = 10
+# A first effect must stand out beyond chance. A further one must be worth its parameters as well, by the extended Bayesian
+# criterion: no law fits so well that nothing of the first is left behind it.
+_LEAST_FURTHER_GAIN = 0.0
 # Exact refits; each finds what the linear look before it could not see.
 _ROUNDS = 4
 # Up to so many chosen effects are weighed against each single one that could stand for all of them.
@@ -81,13 +82,13 @@ def search(declared, observations, candidates, replicates, stream, progress=None
     -------
     Search
     """
-    current, found, looks = declared, [], []
+    current, found, looks, needless = declared, [], [], set()
     for _ in range(_ROUNDS):
-        taken = {candidate.key for candidate in found}
+        taken = {candidate.key for candidate in found} | needless
         seen = directions(current, observations, [c for c in candidates if c.key not in taken])
         new = []
         while True:
-            look = _look(seen, replicates, stream)
+            look = _look(seen, replicates, stream, _LEAST_FURTHER_GAIN if found or new else -np.inf)
             looks.append(look)
             if progress:
                 progress(_told(look))
@@ -101,7 +102,9 @@ def search(declared, observations, candidates, replicates, stream, progress=None
         current = _refitted(current, observations, new)
         simpler = _simpler(declared, current, observations, found, candidates)
         if simpler:
-            found = [candidate for candidate, _ in simpler]
+            kept = [candidate for candidate, _ in simpler]
+            needless |= {candidate.key for candidate in found if candidate not in kept}
+            found = kept
             current = _refitted(_with_noise_of(declared, current), observations, simpler)
         needed = [candidate for candidate in found if _wald(current, candidate) < _DROPPED_LEVEL]
         if len(needed) < len(found):
@@ -141,14 +144,15 @@ def without(fitted, keys, observations):
     return fit(model, observations, fitted.noise, estimate, fitted.discrepancy_m)
 
 
-def _look(seen, replicates, stream):
+def _look(seen, replicates, stream, least_gain):
     scores = score(seen, replicates, stream)
     refused = []
     for index in np.argsort(-scores.bic_gain):
-        if scores.p_family[index] >= FAMILY_WISE_LEVEL:
+        if scores.p_family[index] >= FAMILY_WISE_LEVEL or scores.bic_gain[index] < least_gain:
             continue
+        # What is chosen must predict poses that were left out better, if by little: an effect may live in few poses.
         (gain,), (std_error,) = cross_validated_gains(seen, [index], FOLDS)
-        if gain > _GAIN_STD_ERRORS * std_error:
+        if gain > 0:
             return Look(seen, scores, int(index), float(gain), float(std_error), tuple(refused))
         refused.append(seen.candidates[index][0].key)
     return Look(seen, scores, None, refused=tuple(refused))
@@ -195,14 +199,18 @@ def _simpler(declared, current, observations, found, candidates):
 
 
 def _wald_statistic(fitted, candidate):
+    """Of the linear parameters, given the shapes: without its law a shape means nothing."""
     mine = parameter_slice(fitted, candidate.key)
     number = [effect.key for effect in fitted.model.effects].index(candidate.key)
-    values = fitted.estimate.coefficients[number]
-    free = ~fitted.held[mine[: len(values)]]
-    if not free.any():
+    linear, shapes = np.split(mine, [len(candidate.parameters)])
+    free = np.flatnonzero(~fitted.held)
+    tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
+    if not tested.any():
         return 0.0
-    covariance = fitted.covariance[np.ix_(mine[: len(values)][free], mine[: len(values)][free])]
-    return float(values[free] @ np.linalg.solve(covariance, values[free]))
+    values = fitted.estimate.coefficients[number][np.isin(linear, free)]
+    information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
+    covariance = np.linalg.inv(information[np.ix_(kept, kept)])[np.ix_(tested[kept], tested[kept])]
+    return float(values @ np.linalg.solve(covariance, values))
 
 
 def _wald(fitted, candidate):

@@ -5,10 +5,11 @@ its Jacobian the sensitivity of a measured point to each of them.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from elastocal.kinematics import poses, poses_and_jacobians
+from elastocal.kinematics import poses, poses_and_jacobians, poses_and_jacobians_of_points
 from elastocal.robot import Chain, MeasuringPoint, Transform
 
 # Below this a link is a point.
@@ -91,9 +92,17 @@ class Sites:
         -------
         list of int
         """
-        probes = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
-        return [k for k in links if np.abs(self.lever_of_weight(probes, joint, k)).max() > _SHORTEST_M]
+        return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
+
+    @cached_property
+    def _longest_levers(self):
+        """Of the weight of each link on each joint over some poses, ndarray (n + 1, n), m."""
+        coordinates = np.zeros((16, self.chain.coordinates))
+        coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
+        far_ends = [self.far_end(link) for link in range(self.joints + 1)]
+        jacobians = poses_and_jacobians_of_points(self.chain, coordinates, far_ends)[2]
+        return np.abs(jacobians[:, :, 2, : self.joints]).max(axis=1)
 
 
 def sites_of(chain):

@@ -23,6 +23,8 @@ class Evidence:
     attributions : tuple of Attribution
     data_faults : tuple of Fault
         Decisive ones.
+    doubted : bool
+        Whether the effect found departs from its law, see `law_check`.
     """
 
     tested: int
@@ -32,6 +34,7 @@ class Evidence:
     discrepancy_after_m: float
     attributions: tuple
     data_faults: tuple = ()
+    doubted: bool = False
 
     @property
     def explained(self):
@@ -51,8 +54,9 @@ def word(evidence):
     -------
     str
         adequate: nothing is missing that these data could show. named: one effect, told from all others. class: one effect or
-        one of those that these data cannot tell from it. several: more than one effect. unexplained: the residual is more than
-        noise and no effect of the catalogue accounts for it. not_testable: the data can test nothing.
+        one of those that these data cannot tell from it, or something akin to it that departs from its law. several: more
+        than one effect. unexplained: the residual is more than noise and no effect of the catalogue accounts for it.
+        not_testable: the data can test nothing.
     """
     if evidence.data_faults:
         return NAMED if len(evidence.data_faults) == 1 else SEVERAL
@@ -64,4 +68,4 @@ def word(evidence):
         return UNEXPLAINED
     if len(evidence.attributions) > 1:
         return SEVERAL
-    return CLASS if evidence.attributions[0].alternatives else NAMED
+    return CLASS if evidence.attributions[0].alternatives or evidence.doubted else NAMED

@@ -56,16 +56,49 @@ def whitening(observations, jacobian, noise, discrepancy_m=0.0):
     -------
     Whitening
     """
-    rows = observations.rows
-    lacking = np.repeat([discrepancy_m, discrepancy_m * noise.orientation_rad / noise.position_m], 3)[:rows] ** 2
     blocks = []
-    for members in _members(observations.state):
-        covariance = reading_covariances(noise, jacobian[members], rows)
-        covariance /= observations.states.repeats[observations.state[members[:, 0]]][:, None, None]
+    lacking = _lacking(noise, observations.rows) * discrepancy_m**2
+    for members, covariance in _covariances(observations, jacobian, noise):
         diagonal = np.arange(covariance.shape[1])
         covariance[:, diagonal, diagonal] += np.tile(lacking, members.shape[1])
         blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
     return Whitening(tuple(blocks))
+
+
+def spectrum(observations, jacobian, noise, values):
+    """Values in the directions in which a discrepancy of the model only adds to the variance.
+
+    Parameters
+    ----------
+    observations, jacobian, noise
+        As in `whitening`.
+    values : ndarray (M, rows)
+
+    Returns
+    -------
+    variances, squares : ndarray (M * rows,)
+        With a discrepancy d the squared length of the whitened values is the sum of squares / (variances + d^2).
+    """
+    variances, squares = [], []
+    for members, covariance in _covariances(observations, jacobian, noise):
+        scale = np.tile(1.0 / np.sqrt(_lacking(noise, observations.rows)), members.shape[1])
+        found, vectors = np.linalg.eigh(covariance * scale[:, None] * scale)
+        turned = vectors.transpose(0, 2, 1) @ (values[members].reshape(len(members), -1) * scale)[..., None]
+        variances.append(found.ravel())
+        squares.append(turned.ravel() ** 2)
+    return np.concatenate(variances), np.concatenate(squares)
+
+
+def _covariances(observations, jacobian, noise):
+    """Observations of the states with the same number of targets (G, k), and covariance of their averaged readings."""
+    for members in _members(observations.state):
+        covariance = reading_covariances(noise, jacobian[members], observations.rows)
+        yield members, covariance / observations.states.repeats[observations.state[members[:, 0]]][:, None, None]
+
+
+def _lacking(noise, rows):
+    """Variance of each component for a discrepancy of one in positions."""
+    return np.repeat([1.0, noise.orientation_rad / noise.position_m], 3)[:rows] ** 2
 
 
 def _members(state):

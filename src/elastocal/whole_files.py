@@ -25,3 +25,15 @@ def appearing_whole(path):
     finally:
         with suppress(FileNotFoundError):
             os.remove(partial)
+
+
+def write_text(path, text):
+    """Write a text; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+    text : str
+    """
+    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.write(text)

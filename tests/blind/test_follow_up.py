@@ -25,14 +25,16 @@ print(json.dumps({"opened": opened, "modules": modules, "states": len(frame), "s
 """
 
 
-def said(name, word):
-    return {"campaign": name, "verdict": word}
+def said(name, word, *alternatives):
+    return {"campaign": name, "verdict": word, "effects": [{"alternatives": list(alternatives)}]}
 
 
 def test_the_first_classes_by_name_are_followed_up_whatever_the_order():
-    verdicts = [said("c", "class"), said("a", "named"), said("d", "class"), said("b", "class")]
+    verdicts = [said(name, "class", "payload") for name in "cdb"]
+    # One is sure, and one doubts its law and has nothing to be told from.
+    verdicts += [said("a", "named"), said("aa", "class")]
     assert [verdict["campaign"] for verdict in followed_up(verdicts, 2)] == ["b", "c"]
-    assert followed_up(verdicts[1:2], 2) == []
+    assert followed_up(verdicts[3:], 2) == []
 
 
 def test_more_is_measured_until_a_single_name_is_said():

@@ -75,7 +75,7 @@ def test_estimates_come_back_from_their_table(kind, tmp_path):
     count = len(parameters(model, estimate))
     held = np.arange(count) % 3 == 0
     covariance = np.diag(np.arange(count, dtype=float) * ~held)
-    fitted = Fit(model, estimate, NOISE, 3e-5, held, covariance, np.ones(1), None, np.zeros((1, 3)))
+    fitted = Fit(model, estimate, NOISE, 3e-5, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
     columns = there_and_back(tmp_path / "p.parquet", PARAMETERS, parameter_columns(fitted))
     back, discrepancy = estimate_from(columns, model, estimate.sessions)
     assert discrepancy == 3e-5 and back.sessions == estimate.sessions

@@ -265,6 +265,18 @@ TINY = {
 }
 
 
+def test_an_edit_of_the_declared_robot_reads_a_simulated_campaign_again(cell):
+    """The robot that it simulates is another one, and so is its file."""
+    source = TINY | {"robot": "kuka_extended"}
+    cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(source), encoding="utf-8")
+    cell.configure({"loop": {"campaigns": ["tiny"]}})
+    training = "results/loop/tiny/training.parquet"
+    cell.run(training)
+    assert cell.planned(training) == set()
+    cell.replace("config/robots/kuka.yaml", "compliance_urad_per_Nm: [", "compliance_urad_per_Nm: [1")
+    assert cell.planned(training) == {("read_campaign", "tiny")}
+
+
 def test_a_new_effect_is_a_module_and_a_new_campaign_is_a_file(cell):
     cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
     cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(TINY), encoding="utf-8")

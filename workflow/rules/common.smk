@@ -66,9 +66,13 @@ def files_of(wildcards):
     """Files that a campaign is read from, those of the campaign that holds its test included."""
     if wildcards.campaign in OWN:
         return campaign_files(OWN[wildcards.campaign], "config/robots")
-    other = SOURCES[wildcards.campaign].get("holdout", {}).get("campaign")
+    source = SOURCES[wildcards.campaign]
+    other = source.get("holdout", {}).get("campaign")
     names = [wildcards.campaign, *([Path(other).name] if other else [])]
-    return expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
+    files = expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
+    # An import has its robots among its inputs; a simulation does not have the robot that it declares.
+    declared = [source["declared_robot"]] if source["source"] == "simulated" else []
+    return files + expand("config/robots/{robot}.yaml", robot=declared)
 
 
 def loop_reports(campaigns):

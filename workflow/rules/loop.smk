@@ -158,6 +158,7 @@ rule weigh_rivals:
         sources=sources("weigh_rivals.py"),
     output:
         rivals="results/loop/{campaign}/rivals.parquet",
+        doubts="results/loop/{campaign}/doubts.json",
         experiment="reports/loop/{campaign}/next_experiment.csv",
     log:
         "results/logs/weigh_rivals/{campaign}.log",
@@ -166,6 +167,7 @@ rule weigh_rivals:
     params:
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
+        replicates=config["loop"]["replicates"],
     script:
         "../scripts/weigh_rivals.py"
 
@@ -207,6 +209,7 @@ rule state_verdict:
         found=rules.trace_effects.output.found,
         parameters=rules.trace_effects.output.parameters,
         rivals=rules.weigh_rivals.output.rivals,
+        doubts=rules.weigh_rivals.output.doubts,
         before_after=rules.judge_held_out.output.before_after,
         errors=rules.judge_held_out.output.errors,
         sources=sources("state_verdict.py"),

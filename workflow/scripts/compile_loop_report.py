@@ -1,9 +1,8 @@
 """The report of a campaign as PDF."""
 
-import json
-
 import pandas as pd
 
+from elastocal.json_files import read_json
 from elastocal.loop.schemas import CANDIDATES, PARAMETERS, residuals
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
@@ -13,7 +12,7 @@ from job import run
 
 
 def compile_loop_report(job):
-    verdict, descriptions = opened(job.input.verdict), opened(job.input.descriptions)
+    verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
     joints = len(descriptions["robot"]["compliance_urad_per_Nm"])
     facts = loop_facts(
         verdict,
@@ -26,11 +25,6 @@ def compile_loop_report(job):
         job.params.replicates,
     )
     write_loop_report(job.output.report, facts, job.input.figures)
-
-
-def opened(path):
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
 
 
 run(compile_loop_report, snakemake)

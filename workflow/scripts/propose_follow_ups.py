@@ -4,7 +4,7 @@ import pandas as pd
 
 from elastocal.blind.follow_up import LADDER, MOST, POSES, followed_up
 from elastocal.frames import write_csv
-from elastocal.loop.opened import opened_json
+from elastocal.json_files import read_json
 from elastocal.loop.proposed import proposed
 
 from job import run
@@ -12,7 +12,7 @@ from job import run
 
 def propose_follow_ups(job):
     frames = [pd.DataFrame({"case": []})]
-    for verdict in followed_up(opened_json(job.input.verdicts), MOST[job.params.size]):
+    for verdict in followed_up(read_json(job.input.verdicts), MOST[job.params.size]):
         folder = f"{job.input.blind}/{verdict['campaign']}"
         frame = proposed(folder, "config/robots", verdict, max(POSES), LADDER, job.params.seed)
         frames.append(frame.assign(case=verdict["campaign"]))

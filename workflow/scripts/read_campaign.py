@@ -1,8 +1,6 @@
 """A campaign's folder, checked, as tables: readings to fit and readings to test."""
 
-import json
-
-from elastocal.frames import write_text
+from elastocal.json_files import write_json
 from elastocal.loop.intake import taken_in
 from elastocal.loop.reading_columns import reading_columns
 from elastocal.loop.schemas import readings
@@ -17,7 +15,7 @@ def read_campaign(job):
     for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
         schema = readings(part.joint_angles.shape[1])
         write_table(path, schema, [reading_columns(part)], provenance(descriptions, **job.wildcards))
-    write_text(job.output.descriptions, json.dumps(descriptions, indent=1) + "\n")
+    write_json(job.output.descriptions, descriptions)
 
 
 run(read_campaign, snakemake)

@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
 from elastocal.blind.truths import opened_truths
 from elastocal.frames import write_csv
-from elastocal.loop.opened import opened_json
+from elastocal.json_files import read_json
 
 from job import run
 
@@ -15,8 +15,8 @@ from job import run
 def score_follow_ups(job):
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
     truths = opened_truths(files, job.input.manifest)
-    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in opened_json(path)}
-    anew = [entry for path in job.input.anew for entry in opened_json(path)]
+    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}
+    anew = [entry for path in job.input.anew for entry in read_json(path)]
     proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)
     cases = followed(truths, first, anew, promised(proposals))
     one = with_one_effect(cases)

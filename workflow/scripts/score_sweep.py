@@ -7,14 +7,14 @@ from elastocal.blind.truths import opened_truths
 from elastocal.figures.style import save
 from elastocal.figures.sweep import sweep
 from elastocal.frames import write_csv
-from elastocal.loop.opened import opened_json
+from elastocal.json_files import read_json
 
 from job import run
 
 
 def score_sweep(job):
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
-    verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in opened_json(path)}
+    verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
     cases = swept(opened_truths(files, job.input.manifest), verdicts)
     table = against_angle(cases)
     write_csv(job.output.cases, cases)

@@ -4,9 +4,10 @@ import json
 
 import pandas as pd
 
-from elastocal.frames import read_long, write_text
+from elastocal.frames import read_long
 from elastocal.report.answers import answers
 from elastocal.table_schemas import REPLICATES, metrics
+from elastocal.whole_files import write_text
 
 from job import run
 

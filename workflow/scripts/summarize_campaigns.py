@@ -1,7 +1,7 @@
 """All campaigns of one kind on one page."""
 
 from elastocal.frames import read_frame, write_csv
-from elastocal.loop.opened import opened_json
+from elastocal.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.loop.summary import campaign_rows
 
@@ -10,7 +10,7 @@ from job import run
 
 def summarize_campaigns(job):
     settings = job.params
-    verdicts = {name: opened_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
+    verdicts = {name: read_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
     held_out = {
         name: read_frame(path, residuals(len(verdicts[name]["noise"]["joint_rad"]))).query("held_out")
         for name, path in zip(settings.campaigns, job.input.residuals, strict=True)

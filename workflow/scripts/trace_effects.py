@@ -3,8 +3,9 @@
 import sys
 
 from elastocal.attribution import confounding
+from elastocal.json_files import read_json
 from elastocal.loop.fit_columns import correlation_columns, parameter_columns
-from elastocal.loop.opened import opened_case, opened_fit, opened_json
+from elastocal.loop.opened import opened_case, opened_fit
 from elastocal.loop.schemas import CONFOUNDING, CORRELATIONS, FOUND, LOOKS, PARAMETERS
 from elastocal.loop.search_columns import confounding_columns, found_columns, look_blocks
 from elastocal.provenance import provenance
@@ -18,7 +19,7 @@ from job import run
 def trace_effects(job):
     case = opened_case(job.input.descriptions, job.input.training)
     declared, _ = opened_fit(case, job.input.declared, job.input.noise)
-    decisive = [fault for fault in opened_json(job.input.faults) if fault["decisive"]]
+    decisive = [fault for fault in read_json(job.input.faults) if fault["decisive"]]
     # Readings that must be corrected first tell nothing of the robot.
     candidates = [] if decisive else list(case.candidates.values())
     draws = stream(job.params.seed, case.campaign.name, "signs of poses", 0)

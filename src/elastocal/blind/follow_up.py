@@ -29,9 +29,11 @@ def followed_up(verdicts, most):
     Returns
     -------
     list of dict
-        The first verdicts "class" in the order of the names of their cases, which are in none.
+        The first verdicts "class" with alternatives, for which an experiment is proposed, in the order of the names of their
+        cases, which are in none.
     """
-    return [verdict for verdict in sorted(verdicts, key=lambda v: v["campaign"]) if verdict["verdict"] == CLASS][:most]
+    classes = [v for v in verdicts if v["verdict"] == CLASS and any(effect["alternatives"] for effect in v["effects"])]
+    return sorted(classes, key=lambda verdict: verdict["campaign"])[:most]
 
 
 def folder_name(arm, poses):

@@ -1,10 +1,10 @@
 """What was sealed, opened for the scores and for nothing else."""
 
 import hashlib
-import json
 from pathlib import Path
 
 from elastocal.errors import InputError
+from elastocal.json_files import read_json
 
 
 def opened_truths(files, manifest):
@@ -32,5 +32,5 @@ def opened_truths(files, manifest):
         found = hashlib.sha256(file.read_bytes()).hexdigest()
         if promised.get(file.name) != found:
             raise InputError(file, "", f"SHA-256 {found}", f"{promised.get(file.name)}, as sealed")
-        truths[file.stem] = json.loads(file.read_text(encoding="utf-8"))
+        truths[file.stem] = read_json(file)
     return truths

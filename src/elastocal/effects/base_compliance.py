@@ -14,11 +14,18 @@ _PARAMETERS = (
 
 
 def candidates(sites):
-    """One candidate, at the foot."""
+    """Two candidates at the foot: all ways to give, and rocking alone, which is what most foundations do."""
     tx, ty, tz, rx, ry, _ = sites.base
 
     def displacement(circumstances):
         load = circumstances.load
         return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]
+    def rocking(circumstances):
+        return displacement(circumstances)[2:]
+
+    load = frozenset({"load"})
+    return [
+        Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, load),
+        Candidate(NAME, FAMILY, (), "rocking", _PARAMETERS[2:], rocking, load),
+    ]

@@ -13,7 +13,7 @@ _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order
 
 
 def candidates(sites):
-    """One candidate, on the first joint that carries weight."""
+    """Two candidates on the first joint that carries weight: with the crank's part, and as for a crank that is very short."""
     joint = sites.shoulder
     if joint is None:
         return []
@@ -22,4 +22,10 @@ def candidates(sites):
         angle = circumstances.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in (1, 2) for wave in (np.cos, np.sin)]
 
-    return [Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)]
+    def first_order(circumstances):
+        return displacement(circumstances)[:2]
+
+    return [
+        Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement),
+        Candidate(NAME, FAMILY, (joint + 1,), "first order", _PARAMETERS[:2], first_order),
+    ]

@@ -24,5 +24,12 @@ def displacement(circumstances):
 
 
 def candidates(sites):
-    """One candidate, at the flange."""
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]
+    """Two candidates at the flange: a tool, and a mass alone, which is most of what a tool does."""
+
+    def mass(circumstances):
+        return displacement(circumstances)[:1]
+
+    return [
+        Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement),
+        Candidate(NAME, FAMILY, (), "mass", _PARAMETERS[:1], mass),
+    ]

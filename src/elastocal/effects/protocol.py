@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from elastocal.elastostatics import generalized_forces
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.kinematics import poses_and_jacobians_of_points
 from elastocal.robot import MeasuringPoint
 from elastocal.sites import Sites
 
@@ -165,10 +165,9 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0):
     coordinates = np.zeros((len(states), chain.coordinates))
     coordinates[:, :n] = states.joint_angles
     end = MeasuringPoint("end", chain.end_effector.after)
-    _, rotation, jacobian = poses_and_jacobians(chain, coordinates, end)
-    weight = np.empty((n + 1, len(states), chain.coordinates))
-    for link in range(n + 1):
-        weight[link] = -STANDARD_GRAVITY * poses_and_jacobians(chain, coordinates, sites.far_end(link))[2][:, 2]
+    far_ends = [sites.far_end(link) for link in range(n + 1)]
+    _, rotations, jacobians = poses_and_jacobians_of_points(chain, coordinates, [end, *far_ends])
+    rotation, jacobian, weight = rotations[0], jacobians[0], -STANDARD_GRAVITY * jacobians[1:, :, 2]
     return Circumstances(
         sites,
         np.asarray(compliance),

@@ -6,7 +6,7 @@ Catalogue row 12.
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "stiffening", "gearbox"
-_PARAMETERS = (Parameter("cubic", "rad/(N m)^3", 1e-13),)
+_PARAMETERS = (Parameter("cubic", "rad/(N m)^3", 1e-11),)
 
 
 def candidates(sites):

@@ -11,6 +11,7 @@ from elastocal.elastostatics import generalized_forces, regressor
 from elastocal.faults.placement import rms, robust_sigma, robustly_placed, spread
 from elastocal.fitting import solve_identifiable
 from elastocal.kinematics import poses_and_jacobians
+from elastocal.observations import state_clusters
 
 _GRAVITY, _POUND = 9.80665, 4.4482216
 _MANY_POSES = 150
@@ -127,7 +128,7 @@ def deflections(campaign, readings):
         wrench = np.zeros_like(at_rest)
         wrench[:, part] = readings.wrench[:, part]
         parts.append(regressor(jacobian, generalized_forces(end, wrench)) * campaign.robot.compliance)
-    pose = np.unique(np.column_stack([readings.session, readings.pose]), axis=0, return_inverse=True)[1].ravel()
+    pose = state_clusters(readings)
     count = int(pose.max()) + 1
     if count < _FEWEST_POSES:
         return None
@@ -260,7 +261,7 @@ def state_deflections(campaign, readings):
     StateDeflections or None
         None where there is none.
     """
-    pose = np.unique(np.column_stack([readings.session, readings.pose]), axis=0, return_inverse=True)[1].ravel()
+    pose = state_clusters(readings)
     compared = np.isin(pose, pose[readings.load == 0]) & np.isin(pose, pose[readings.wrench.any(axis=1)])
     if not compared.any():
         return None
@@ -318,7 +319,7 @@ def _ratios(bent, expected):
 
 
 def _some_poses(readings):
-    pose = np.unique(np.column_stack([readings.session, readings.pose]), axis=0, return_inverse=True)[1].ravel()
+    pose = state_clusters(readings)
     chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
     return readings.select(np.isin(pose, chosen))
 

@@ -23,6 +23,7 @@ from elastocal.faults.placement import (
     trimmed_rms,
 )
 from elastocal.faults.protocol import Fault, Value
+from elastocal.observations import state_clusters
 
 NAME, FAMILY, AFTER = "shuffled_rows", "data", ("wrong_sign", "wrong_unit")
 
@@ -190,7 +191,8 @@ def _matched(readings, as_written, beside, rest):
     left, source = _gaps(readings, predicted, _places(beside.measured, beside.measured_rotation), rows)
     back = (left < level) & (left < _NO_CHANCE * _spacing(readings, predicted, rows)) & (source != rows)
     # Each reading has one place: one that stands for many is no permutation.
-    taken = len(np.unique(_poses(readings)[source[back]])), len(np.unique(_poses(readings)[rows[back]]))
+    pose = state_clusters(readings)
+    taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
     if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
         return []
     before, after = rms(as_written.distance[rows]), rms(left[back])
@@ -233,10 +235,6 @@ def _spacing(readings, predicted, rows):
         other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
         spacing[members] = np.where(np.isfinite(other), other, 0.0)
     return spacing
-
-
-def _poses(readings):
-    return np.unique(np.column_stack([readings.session, readings.pose]), axis=0, return_inverse=True)[1].ravel()
 
 
 def _of_loads(campaign, readings):

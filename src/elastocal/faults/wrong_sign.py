@@ -118,14 +118,12 @@ def _double(joints):
 
 def _read(campaign, readings, way):
     robot = campaign.robot
-    matrix = np.eye(robot.joints) if robot.reported_matrix is None else robot.reported_matrix
-    offset = np.zeros(robot.joints) if robot.reported_offset is None else robot.reported_offset
     # The sign of a column of the file, which counts from where the controller counts.
-    reported = np.linalg.solve(matrix, (readings.joint_angles - offset).T).T
+    reported = robot.reported_angles(readings.joint_angles)
     turned = readings.rotation_vector
     return replace(
         readings,
-        joint_angles=reported @ way.matrix.T @ matrix.T + offset,
+        joint_angles=robot.model_angles(reported @ way.matrix.T),
         rotation_vector=None if turned is None else way.turn * turned,
     )
 

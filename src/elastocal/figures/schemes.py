@@ -14,6 +14,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
 from matplotlib.textpath import TextPath
 
+from elastocal.figures.style import PALETTE
+
 WIDTH_MM = 160.0
 MARGIN_MM = 3.0
 MM_PER_INCH = 25.4
@@ -21,11 +23,11 @@ FONT = FontProperties(family="DejaVu Sans", size=9)
 BOLD = FontProperties(family="DejaVu Sans", size=9, weight="bold")
 TEXT_HEIGHT_MM = 3.6
 
-# Okabe and Ito's palette, which colour-blind readers can tell apart; yellow is too pale for lines.
-INK, BLUE, SKY, ORANGE, RED, GREEN, PINK = "#222222", "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73", "#CC79A7"
+INK, GREY = "#222222", "#555555"
+BLUE, RED, GREEN, PINK, ORANGE, SKY = PALETTE[:6]
 POINT_COLOURS = (ORANGE, GREEN, PINK, RED, SKY, BLUE)
 POINT_MARKERS = "sDo^vP"
-JOINT_FACE = "#D6E8F5"
+JOINT_FACE, LINK_FACE = "#D6E8F5", "#E4E4E4"
 
 # Links after the joints that bend run from this heading to that one, in degrees above the horizontal. Headings that only
 # fall, by less than 180 degrees in all, make an arch that cannot meet itself; links that recede can still cross it, so there
@@ -434,7 +436,7 @@ def _draw_base(sheet, oblique, view, depth):
 
 
 def _draw_segment(sheet, segment):
-    style = {"lw": 3.0, "color": "#555555"} if segment.length_m else {"lw": 1.2, "ls": (0, (3, 2)), "color": "#555555"}
+    style = {"lw": 3.0, "color": GREY} if segment.length_m else {"lw": 1.2, "ls": (0, (3, 2)), "color": GREY}
     sheet.line([segment.start, segment.end], zorder=2, **style)
     sheet.take(segment.start, segment.end, 0.8)
 
@@ -513,11 +515,11 @@ def _kinematic_legend(sheet, segments, joints, points, middle, top):
         entries.append((lambda p: _draw_joint(sheet, p, None, taken=False), 8.0, "joint, axis normal to plane"))
     entries.append((lambda p: sheet.axes.plot(*p, ls="none", **_point_style(0)), 4.0, "measuring point"))
     if any(not segment.length_m for segment in segments):
-        separator = {"lw": 1.2, "ls": (0, (3, 2)), "color": "#555555"}
+        separator = {"lw": 1.2, "ls": (0, (3, 2)), "color": GREY}
         entries.append((lambda p: sheet.line([(p[0] - 4.0, p[1]), (p[0] + 4.0, p[1])], **separator), 9.0, "no length"))
     bottom = _legend(sheet, entries, middle, top)
     note = "Lengths are not to scale. A joint may be shown moved along its axis."
-    sheet.text((middle, bottom - 3.5), note, fontproperties=FONT, color="#555555")
+    sheet.text((middle, bottom - 3.5), note, fontproperties=FONT, color=GREY)
     return bottom - 3.5 - TEXT_HEIGHT_MM / 2
 
 
@@ -654,7 +656,7 @@ def _draw_block(sheet, block, x, y):
         _draw_spring(sheet, x + 8.0, x + width, y, ORANGE)
         sheet.text((x + width / 2, y + 6.4), block.label)
     else:
-        _draw_box(sheet, x, BLOCK_WIDTHS_MM["link"], y, "#E4E4E4", INK)
+        _draw_box(sheet, x, BLOCK_WIDTHS_MM["link"], y, LINK_FACE, INK)
         sheet.text((x + BLOCK_WIDTHS_MM["link"] / 2, y), "Link")
         sheet.text((x + BLOCK_WIDTHS_MM["link"] / 2, y - 6.2), block.label)
         if block.kind == "elastic link":
@@ -693,7 +695,7 @@ def _spring_legend(sheet, extended, top):
     half = BLOCK_WIDTHS_MM["link"] / 2
 
     def link(place):
-        _draw_box(sheet, place[0] - half, 2 * half, place[1], "#E4E4E4", INK)
+        _draw_box(sheet, place[0] - half, 2 * half, place[1], LINK_FACE, INK)
         sheet.text(place, "Link")
 
     entries = [

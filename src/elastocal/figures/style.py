@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 from elastocal.whole_files import appearing_whole
 
 WIDTH_MM = 165
+# Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
 DASHES = ("-", (0, (1, 2)), "--", (0, (4, 4)), "-", (0, (2, 3)), "-.", (0, (6, 1.5, 1, 1.5)))
 SETTINGS = {

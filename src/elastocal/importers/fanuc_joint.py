@@ -7,8 +7,9 @@ import numpy as np
 from elastocal.campaign import read_robot
 from elastocal.campaign import write_campaign as write_folder
 from elastocal.importers import fanuc_cpa, fanuc_static
-from elastocal.importers.reflectors import reflector_document, reflector_table
+from elastocal.importers.reflectors import reflector_table
 from elastocal.importers.repeats import pose_and_repeat
+from elastocal.importers.unloaded import unloaded_document
 
 # Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
 ROBOT = "fanuc_measured"
@@ -37,8 +38,7 @@ def write_campaign(static_path, cpa_path, folder, robots_folder, name="fanuc_joi
     for session, (source, path) in enumerate(((fanuc_static, static_path), (fanuc_cpa, cpa_path))):
         reported, positions = source.read(path)
         robot = read_robot(Path(robots_folder) / f"{source.ROBOT}.yaml")
-        angles = reported @ robot.reported_matrix.T + robot.reported_offset
-        tables.append(reflector_table(*pose_and_repeat(reported), angles, positions, session))
+        tables.append(reflector_table(*pose_and_repeat(reported), robot.model_angles(reported), positions, session))
     table = {column: np.concatenate([part[column] for part in tables]) for column in tables[0]}
     targets = (*fanuc_static.TARGETS, *fanuc_cpa.TARGETS)
-    write_folder(folder, reflector_document(name, ROBOT, targets, holdout), table, robot.joints)
+    write_folder(folder, unloaded_document(name, ROBOT, "position", targets, holdout), table, robot.joints)

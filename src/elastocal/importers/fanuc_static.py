@@ -3,10 +3,8 @@
 import numpy as np
 import scipy.io
 
-from elastocal.campaign import write_campaign as write_folder
 from elastocal.errors import InputError
-from elastocal.importers.reflectors import reflector_document, reflector_table
-from elastocal.importers.repeats import pose_and_repeat
+from elastocal.importers.reflectors import write_reflectors
 
 ROBOT, TARGETS = "fanuc_static", ("A", "B", "C")
 
@@ -61,6 +59,4 @@ def write_campaign(path, folder, name="fanuc_static", holdout=None):
     InputError
         As in `read`.
     """
-    joint_angles, positions = read(path)
-    table = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions)
-    write_folder(folder, reflector_document(name, ROBOT, TARGETS, holdout), table, joint_angles.shape[1])
+    write_reflectors(folder, name, ROBOT, *read(path), holdout)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-# What such data can be fitted with at all before any physics is looked for.
-DECLARED = ("joint_offset", "link_geometry")
+from elastocal.campaign import write_campaign
+from elastocal.importers.repeats import pose_and_repeat
+from elastocal.importers.unloaded import unloaded_document
 
 
 def reflector_table(pose, repeat, joint_angles, positions, session=None):
@@ -32,26 +33,20 @@ def reflector_table(pose, repeat, joint_angles, positions, session=None):
     return table | {axis: readings[:, i] for i, axis in enumerate("xyz")}
 
 
-def reflector_document(name, robot, targets, holdout=None, noise=None):
-    """Contents of ``campaign.yaml``: positions in the tracker's frame of reflectors whose offsets nobody knows.
+def write_reflectors(folder, name, robot, joint_angles, positions, holdout=None, noise=None):
+    """Write readings of one session as a campaign's folder.
 
     Parameters
     ----------
+    folder : str or Path
     name, robot : str
-    targets : iterable of str
+    joint_angles : ndarray (N, n)
+        As the controller reports them, rad.
+    positions : dict of str to ndarray (N, 3)
+        m, by reflector.
     holdout, noise : dict, optional
-
-    Returns
-    -------
-    dict
+        As in ``campaign.yaml``.
     """
-    document = {
-        "campaign": name,
-        "robot": robot,
-        "measured": "position",
-        "frame": "tracker",
-        "targets": {target: {"point": "6DoF", "offset_m": "unknown"} for target in targets},
-        "compliance": "nominal",
-        "declared": list(DECLARED),
-    }
-    return document | ({"noise": dict(noise)} if noise else {}) | ({"holdout": dict(holdout)} if holdout else {})
+    table = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions)
+    document = unloaded_document(name, robot, "position", positions, holdout, noise)
+    write_campaign(folder, document, table, joint_angles.shape[1])

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaign import write_campaign as write_folder
 from elastocal.errors import InputError
 from elastocal.importers.repeats import pose_and_repeat
+from elastocal.importers.unloaded import unloaded_document
 
 ROBOT, TARGET = "ur10", "TMac"
-DECLARED = ("joint_offset", "link_geometry")
 # One reading of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median and
 # less what the chain explains of their distance. Orientations: the 255 repeats of Series B, by their median.
 NOISE = {"position_m": 2.1e-5, "orientation_rad": 3.0e-5}
@@ -101,17 +101,7 @@ def write_campaign(path, folder, name, holdout=None, noise=NOISE):
     table |= {axis: readings["position"][:, i] for i, axis in enumerate("xyz")}
     table |= {f"r{axis}": readings["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
     table |= {covariate: readings[covariate] for covariate in ("time_s", "temperature_c") if covariate in readings}
-    document = {
-        "campaign": name,
-        "robot": ROBOT,
-        "measured": "pose",
-        "frame": "tracker",
-        "targets": {TARGET: {"point": "6DoF", "offset_m": "unknown"}},
-        "compliance": "nominal",
-        "declared": list(DECLARED),
-    }
-    document |= ({"noise": dict(noise)} if noise else {}) | ({"holdout": dict(holdout)} if holdout else {})
-    write_folder(folder, document, table, angles.shape[1])
+    write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
 
 
 def _lines(path):

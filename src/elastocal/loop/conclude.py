@@ -54,7 +54,7 @@ def candidate_columns(looks, rivals):
     return columns
 
 
-def concluded(case, noise_facts, declared, final, attributions, looks, rows, heldout, faults, warnings, foreseen):
+def concluded(case, noise_facts, declared, final, attributions, doubts, looks, rows, heldout, faults, warnings, foreseen):
     """The contents of verdict.json.
 
     Parameters
@@ -64,6 +64,8 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
         Of step 2.
     declared, final : Fit
     attributions : sequence of Attribution
+    doubts : sequence of dict
+        Fields of `law_check.Doubt`.
     looks : dict of str to ndarray
         Columns of the looks table.
     rows : sequence of dict
@@ -83,14 +85,14 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
     tested = len(set(looks["candidate"][(looks["look"] == 0) & np.isfinite(looks["p_value"])]))
     decisive = [fault for fault in faults if fault["decisive"]]
     missing = declared.discrepancy_m, final.discrepancy_m
-    evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive))
+    evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive), bool(doubts))
     said = word(evidence)
     gains = _gains(rows)
     return {
         "campaign": case.campaign.name,
         "verdict": said,
         "effects": [_fault_entry(fault) for fault in decisive]
-        + [_effect_entry(attribution, final, gains) for attribution in attributions],
+        + [_effect_entry(attribution, doubts, final, gains) for attribution in attributions],
         "noise": {
             "source": noise_facts["noise"]["source"],
             "position_m": noise_facts["noise"]["position_m"],
@@ -108,21 +110,29 @@ def concluded(case, noise_facts, declared, final, attributions, looks, rows, hel
         "compliance_urad_per_Nm": _compliances(declared, final),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": tested,
-        "warnings": [*noise_facts["warnings"], *_fault_warnings(faults), *warnings, *_remainder(said, after, evidence)],
+        "warnings": [
+            *noise_facts["warnings"],
+            *_fault_warnings(faults),
+            *warnings,
+            *_doubt_warnings(doubts),
+            *_remainder(said, after, evidence),
+        ],
     }
 
 
-def _effect_entry(attribution, final, gains):
+def _effect_entry(attribution, doubts, final, gains):
+    keys = [member.key for member in attribution.members]
     joints = sorted({joint for member in attribution.members for joint in member.joints})
     return {
         "name": attribution.effect,
         "family": attribution.members[0].family,
         "joints": joints,
-        "members": [member.key for member in attribution.members],
+        "members": keys,
         "parameters": [entry for member in attribution.members for entry in _parameters(member, final)],
         "p_value": attribution.p_value,
         "heldout_gain": gains.get(attribution.effect),
         "alternatives": list(attribution.alternatives),
+        "doubts": [doubt for doubt in doubts if doubt["effect"] in keys],
         "angle_to_nearest_deg": _number(attribution.angle_deg.min()) if len(attribution.angle_deg) else None,
     }
 
@@ -154,12 +164,20 @@ def _fault_entry(fault):
         "p_value": None,
         "heldout_gain": None,
         "alternatives": [],
+        "doubts": [],
         "angle_to_nearest_deg": None,
     }
 
 
 def _fault_warnings(faults):
     return [f"{fault['name']}: {fault['detail']}" for fault in faults if not fault["decisive"]]
+
+
+def _doubt_warnings(doubts):
+    return [
+        f"what {doubt['effect']} makes goes with {doubt['circumstance']} as its law does not: something akin to it"
+        for doubt in doubts
+    ]
 
 
 def _remainder(said, after, evidence):

@@ -1,6 +1,5 @@
 """Step 5: the next experiment as a table that a robot operator can work from."""
 
-import numpy as np
 import pandas as pd
 
 from elastocal.next_experiment import propose
@@ -34,7 +33,7 @@ def proposal_frame(case, final, attributions, states, draws, ladder=None):
         if not attribution.alternatives:
             continue
         found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws, ladder)
-        reported = np.linalg.solve(robot.reported_matrix, (found.joint_angles - robot.reported_offset).T).T
+        reported = robot.reported_angles(found.joint_angles)
         for number in range(states):
             loaded = int(found.wrench[number].any())
             values = (*reported[number], *found.wrench[number], found.separation[number], found.present)

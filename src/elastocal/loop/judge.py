@@ -142,9 +142,7 @@ def judged(steps, case, held_out, seed):
     before = next(number for number, step in enumerate(steps) if step.kind == "declared")
     after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    limits, _ = intervals(errors, _REPLICATES, draws)
-    draws = stream(seed, case.campaign.name, "held-out poses", 0)
-    _, reductions = intervals([errors[before], errors[after]], _REPLICATES, draws)
+    limits, reductions = intervals(errors, _REPLICATES, draws, before)
     floor = noise_floor(steps[after].fitted, held_out.observations, *placed[after])
     rows = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
@@ -162,7 +160,7 @@ def judged(steps, case, held_out, seed):
         "before": ends[0],
         "after": ends[1],
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
-        "reduction_ci95": [float(value) for value in reductions[1]],
+        "reduction_ci95": [float(value) for value in reductions[after]],
         "poses": errors[0].poses,
     }
     return Judged(rows, heldout, _warnings(steps, rows, errors, before, after))

@@ -1,7 +1,6 @@
 """Cases and fits from the files that earlier steps wrote."""
 
-import json
-
+from elastocal.json_files import read_json
 from elastocal.loop.case import case_from, noise_from
 from elastocal.loop.schemas import FOUND, PARAMETERS, readings
 from elastocal.storage import read_table
@@ -20,7 +19,7 @@ def opened_case(descriptions_path, readings_path, part=None):
     -------
     Case
     """
-    descriptions = opened_json(descriptions_path)
+    descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
     joints = len(described["robot"]["compliance_urad_per_Nm"])
     return case_from(described, read_table(readings_path, readings(joints)))
@@ -43,10 +42,4 @@ def opened_fit(case, parameters_path, noise_path, found_path=None):
     """
     keys = read_table(found_path, FOUND)["candidate"] if found_path else []
     model, found = case.with_found(keys)
-    return case.fitted(model, read_table(parameters_path, PARAMETERS), noise_from(opened_json(noise_path))), found
-
-
-def opened_json(path):
-    """Contents of a JSON file."""
-    with open(path, encoding="utf-8") as file:
-        return json.load(file)
+    return case.fitted(model, read_table(parameters_path, PARAMETERS), noise_from(read_json(noise_path))), found

@@ -19,14 +19,20 @@ _CANDIDATE = (
 )
 
 
+def _angles_and_wrench(joints):
+    return (
+        *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} of the chain") for j in range(1, joints + 1)),
+        *(Column(name, "float64", unit, f"{meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
+    )
+
+
 def readings(joints):
     """Readings of a campaign, as the library takes them; what was not recorded is not a number."""
     return TableSchema(
         "readings",
         (
             *_IDENTITY,
-            *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} of the chain") for j in range(1, joints + 1)),
-            *(Column(name, "float64", unit, f"{meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
+            *_angles_and_wrench(joints),
             *(Column(axis, "float64", "m", f"measured position along {axis}") for axis in "xyz"),
             *(Column(f"r{axis}", "float64", "rad", f"measured rotation vector about {axis}", missing=True) for axis in "xyz"),
             *(
@@ -133,8 +139,7 @@ def residuals(joints):
             *_IDENTITY,
             Column("held_out", "bool", "", "whether no step but the last has seen it"),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
-            *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} of the chain") for j in range(1, joints + 1)),
-            *(Column(name, "float64", unit, f"{meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
+            *_angles_and_wrench(joints),
             *(Column(axis, "float64", "m", f"measured position along {axis}, base axes") for axis in "xyz"),
             *(
                 Column(f"{stage}_{name}", "float64", unit, f"{meaning}, measured less predicted, {words}", missing=True)

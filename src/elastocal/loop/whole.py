@@ -5,6 +5,7 @@ import numpy as np
 from elastocal.attribution import attribute, by_effect
 from elastocal.fitting import fit
 from elastocal.hygiene import faults
+from elastocal.law_check import doubts
 from elastocal.loop.case import case_from, noise_from
 from elastocal.loop.conclude import concluded
 from elastocal.loop.declared import noise_of
@@ -49,6 +50,7 @@ def diagnosed(folder, robots_folder, replicates, seed):
     least = min(p_values.values(), default=1.0)
     p_values = {candidate.key: p_values.get(candidate.key, least) for candidate in found.effects}
     attributions = attribute(found.final, found.effects, p_values, case.observations, everything)
+    departures = doubts(found.final, found.effects, case.observations, replicates, stream(seed, case.campaign.name, "laws", 0))
     groups = {name: list(members) for name, members in by_effect(found.effects).items()}
     result = judged(model_steps(case, noise, declared, found.final, groups, []), case, unseen, seed)
     first = found.looks[0]
@@ -60,5 +62,16 @@ def diagnosed(folder, robots_folder, replicates, seed):
     listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known_faults]
     warnings = result.warnings
     return concluded(
-        case, facts, declared, found.final, attributions, looks, result.rows, result.heldout, listed, warnings, (None, None)
+        case,
+        facts,
+        declared,
+        found.final,
+        attributions,
+        [vars(doubt) for doubt in departures],
+        looks,
+        result.rows,
+        result.heldout,
+        listed,
+        warnings,
+        (None, None),
     )

@@ -11,6 +11,7 @@ import numpy as np
 from elastocal.plant.arm import turned
 
 _SWEEPS = 40
+_SETTLED_N = 1e-9
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,10 @@ class LoadCell:
         """
         found = force.copy()
         for _ in range(_SWEEPS):
-            found += force - self.shown(found, flange_rotation)
+            missing = force - self.shown(found, flange_rotation)
+            found += missing
+            if np.abs(missing).max() < _SETTLED_N:
+                break
         felt = np.where(force.any(axis=1)[:, None], found, 0.0)
         moment = np.cross(lever, felt if self.mount == "pull" else force)
         return np.concatenate([felt, moment + np.cross(self._errors(flange_rotation)[2], felt)], axis=1)

@@ -149,8 +149,12 @@ def sentences(verdict, tested):
     effect = found[0]
     if said == "class":
         others = listed(map(candidate_words, effect["alternatives"]), _MOST_NAMES)
+        doubted = listed(dict.fromkeys(doubt["circumstance"] for doubt in effect["doubts"]), _MOST_NAMES)
+        akin = f"something akin to it, for what it makes goes with {doubted} as its law does not" if doubted else ""
+        confused = f"one that these data cannot tell from it: {others}" if others else ""
+        either = ", or ".join(part for part in (confused, akin) if part)
         return [
-            f"The declared model lacks one effect: {named}, or one that these data cannot tell from it: {others}.",
+            f"The declared model lacks one effect: {named}, or {either}.",
             "Which of them it is takes another experiment; the errors below fall all the same.",
             last,
         ]

@@ -1,0 +1,30 @@
+"""What all public campaigns have in common: a tracker's readings of an unloaded flange, in a frame that nobody knows."""
+
+# What such data can be fitted with at all before any physics is looked for.
+_DECLARED = ("joint_offset", "link_geometry")
+
+
+def unloaded_document(name, robot, measured, targets, holdout=None, noise=None):
+    """Contents of ``campaign.yaml``: targets on the flange whose offsets nobody knows.
+
+    Parameters
+    ----------
+    name, robot : str
+    measured : {"position", "pose"}
+    targets : iterable of str
+    holdout, noise : dict, optional
+
+    Returns
+    -------
+    dict
+    """
+    document = {
+        "campaign": name,
+        "robot": robot,
+        "measured": measured,
+        "frame": "tracker",
+        "targets": {target: {"point": "6DoF", "offset_m": "unknown"} for target in targets},
+        "compliance": "nominal",
+        "declared": list(_DECLARED),
+    }
+    return document | ({"noise": dict(noise)} if noise else {}) | ({"holdout": dict(holdout)} if holdout else {})
