@@ -25,6 +25,8 @@ _SETTLED = 1e-3
 _HUBER_QUANTILE = 0.99
 # Correlation beyond which a parameter cannot be told because of a shape.
 _BOUND_TO_SHAPE = 0.5
+# Robust weight below which an observation is wild: less than one in a million is so far off by the noise.
+_TAME = 0.5
 _DISCREPANCY_ROUNDS = 6
 # Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
 _ABOVE_NOISE = 1.02
@@ -77,6 +79,16 @@ class Fit:
     def degrees_of_freedom(self):
         """Rows less fitted parameters."""
         return self.residual.size - int((~self.held).sum())
+
+    @property
+    def tame(self):
+        """Observations that are not wild, ndarray of bool (M,): single wild ones say nothing of the model."""
+        return self.weights >= _TAME
+
+    @property
+    def tame_freedom(self):
+        """Rows of the tame observations less fitted parameters."""
+        return self.degrees_of_freedom - int((~self.tame).sum()) * self.model.rows
 
     def whitened(self, values):
         """Rows (M, rows, ...) weighted and whitened as in the fit."""
@@ -254,8 +266,8 @@ def identifiable(gram, frozen, bending):
 
 def _discrepancy(found, observations):
     """Standard deviation that brings the mean square of the whitened residual to one."""
-    weighted = found.residual * np.sqrt(found.weights)[:, None]
-    freedom = found.degrees_of_freedom
+    weighted = found.residual * np.sqrt(found.weights * found.tame)[:, None]
+    freedom = found.tame_freedom
     variances, squares = spectrum(observations, found.joint_jacobian, found.noise, weighted)
 
     def excess(discrepancy):

@@ -52,11 +52,11 @@ def lack_of_fit(fitted, observations):
     -------
     LackOfFit
     """
-    freedom = fitted.degrees_of_freedom
+    freedom = fitted.tame_freedom
     if fitted.noise.source == "residual" or freedom <= 0:
         return LackOfFit(np.nan, np.nan, freedom, 0)
     whitener = whitening(observations, fitted.joint_jacobian, fitted.noise)
-    whitened = whitener.apply(fitted.residual * np.sqrt(fitted.weights)[:, None])
+    whitened = whitener.apply(fitted.residual * np.sqrt(fitted.weights * fitted.tame)[:, None])
     ratio = (whitened**2).sum() / freedom
     noise_freedom = fitted.noise.degrees_of_freedom or _DECLARED_FREEDOM
     return LackOfFit(float(ratio), float(f_distribution.sf(ratio, freedom, noise_freedom)), freedom, noise_freedom)

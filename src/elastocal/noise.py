@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from elastocal.model import circumstances, linearize
-from elastocal.observations import each_approach
+from elastocal.observations import each_approach, without_wild_repeats
 
 # Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.
 FEWEST_FOR_JOINTS = 60
@@ -22,8 +22,6 @@ FEWEST = 9
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
-# Repeats this many times as far from the middle of their state as half of all are not noise: eight standard deviations.
-_WILD = 12.0
 _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
 
 
@@ -152,11 +150,11 @@ def reading_covariances(noise, jacobians, rows):
 def _contrasts(model, estimate, readings):
     """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
     bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
-    observations, repeated = each_approach(readings)
+    observations, repeated = each_approach(without_wild_repeats(readings))
     line = linearize(bare, at, observations, circumstances(bare, at, observations.states))
     seen = np.bincount(observations.state)
     start = np.concatenate([[0], np.cumsum(seen)])
-    repeats = []
+    contrasts, jacobians = {}, {}
     for state in range(repeated.max() + 1):
         members = np.flatnonzero(repeated == state)
         targets = observations.target[start[members[0]] : start[members[0] + 1]]
@@ -165,24 +163,9 @@ def _contrasts(model, estimate, readings):
             continue
         residual = np.array([line.residual[start[m] : start[m + 1]].ravel() for m in members])
         jacobian = line.coordinate_jacobian[start[members[0]] : start[members[0] + 1], :, : model.sites.joints]
-        repeats.append((residual, jacobian))
-    contrasts, jacobians = {}, {}
-    for (residual, jacobian), kept in zip(repeats, _not_far([residual for residual, _ in repeats], model.rows), strict=True):
-        if kept.sum() > 1:
-            contrasts.setdefault(len(jacobian), []).extend(helmert(kept.sum()) @ residual[kept])
-            jacobians.setdefault(len(jacobian), []).extend([jacobian] * (kept.sum() - 1))
+        contrasts.setdefault(len(targets), []).extend(helmert(len(members)) @ residual)
+        jacobians.setdefault(len(targets), []).extend([jacobian] * (len(members) - 1))
     return [np.array(found) for found in contrasts.values()], [np.array(found) for found in jacobians.values()]
-
-
-def _not_far(repeats, rows):
-    """Which repeats of each state (n, k * rows) are not far from the others: a wild one would be taken for noise."""
-    off = [np.abs(residual - np.median(residual, axis=0)).reshape(len(residual), -1, rows) for residual in repeats]
-    # Two repeats are as far from each other as from their middle: they do not tell which of them is wild.
-    telling = [part.reshape(-1, rows) for part in off if len(part) > 2]
-    if not telling:
-        return [np.ones(len(part), bool) for part in off]
-    scale = np.repeat([np.median(part) for part in np.split(np.concatenate(telling), rows // 3, axis=1)], 3)
-    return [(part <= _WILD * scale).all(axis=(1, 2)) | (len(part) < 3) for part in off]
 
 
 def _negative_log_likelihood(logs, contrasts, jacobians, rows):

@@ -5,6 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+# Readings this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
+_WILD = 12.0
+
 
 @dataclass(frozen=True)
 class States:
@@ -120,6 +123,35 @@ def each_approach(readings):
     observations = _observations(readings, np.column_stack([key, readings.repeat]))
     unique = np.unique(np.column_stack([key, readings.repeat]), axis=0)
     return observations, np.unique(unique[:, :-1], axis=0, return_inverse=True)[1].ravel()
+
+
+def without_wild_repeats(readings):
+    """Readings without those that are far from the other repeats of their state and target.
+
+    A wild one would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is wild.
+
+    Parameters
+    ----------
+    readings : Readings
+
+    Returns
+    -------
+    Readings
+    """
+    group = np.unique(np.column_stack([_approached_alike(readings), readings.target]), axis=0, return_inverse=True)[1].ravel()
+    off = np.abs(readings.position - _medians(readings.position, group)[group])
+    telling = np.bincount(group)[group] > 2
+    if not telling.any():
+        return readings
+    return readings.select(np.flatnonzero(~(telling & (off > _WILD * np.median(off[telling])).any(axis=1))))
+
+
+def _medians(values, group):
+    """Median of each column in each group, ndarray (G, k)."""
+    count = np.bincount(group)
+    start = np.concatenate([[0], np.cumsum(count)[:-1]])
+    rising = np.column_stack([column[np.lexsort((column, group))] for column in values.T])
+    return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
 
 
 def _approached_alike(readings):

@@ -11,7 +11,7 @@ from elastocal.loop.fit_columns import estimate_from
 from elastocal.loop.reading_columns import readings_from
 from elastocal.model import Model, declared_model
 from elastocal.noise import Noise
-from elastocal.observations import Observations, averaged
+from elastocal.observations import Observations, averaged, without_wild_repeats
 from elastocal.robot import robot_from_document
 from elastocal.sites import sites_of
 
@@ -25,7 +25,7 @@ class Case:
     campaign : Campaign
         Its readings are those to fit.
     observations : Observations
-        Their repeats averaged.
+        Their repeats averaged, without the wild ones.
     model : Model
         As declared.
     candidates : dict of str to Candidate
@@ -69,7 +69,7 @@ def case_from(descriptions, columns):
     sites = sites_of(robot.chain)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
-    return Case(campaign, averaged(campaign.readings), model, candidates)
+    return Case(campaign, averaged(without_wild_repeats(campaign.readings)), model, candidates)
 
 
 def noise_facts(noise):
