@@ -14,6 +14,7 @@ include: "workflow/rules/report.smk"
 include: "workflow/rules/loop.smk"
 include: "workflow/rules/loop_report.smk"
 include: "workflow/rules/blind.smk"
+include: "workflow/rules/blind_follow_up.smk"
 
 
 rule study:

@@ -32,11 +32,11 @@ def against(campaign, found, *rivals):
     return Attribution(members[0].effect, members, 0.01, rivals, np.zeros(count), np.zeros(count), np.ones(count, int), 1)
 
 
-def proposed(campaign, found, rivals, limits, count=3, seed=0):
+def proposed(campaign, found, rivals, limits, count=3, seed=0, ladder=None):
     final = found_in(campaign, found)
     attribution = against(campaign, found, *rivals)
     draws = np.random.default_rng(seed)
-    return final, propose(final, attribution, campaign.observations, campaign.candidates, limits, count, draws)
+    return final, propose(final, attribution, campaign.observations, campaign.candidates, limits, count, draws, ladder)
 
 
 def rows_of(final, found, rival, targets, observations):
@@ -65,14 +65,15 @@ def left_over(rows):
     return ((last - others @ np.linalg.lstsq(others, last, rcond=1e-10)[0]) ** 2).sum()
 
 
-def states_of(proposal, observations):
-    count, joints = proposal.joint_angles.shape
+def states_of(proposal, observations, shares=(1.0,)):
+    poses, joints = proposal.joint_angles.shape
+    count, shares = poses * len(shares), np.array(shares)
     return States(
         np.zeros(count, int),
         np.arange(count),
         np.ones(count, int),
-        proposal.joint_angles,
-        proposal.wrench,
+        np.repeat(proposal.joint_angles, len(shares), axis=0),
+        (proposal.wrench[:, None] * shares[:, None]).reshape(count, -1),
         np.ones(count, int),
         np.zeros((count, joints)),
         np.full(count, observations.states.time_s.max()),
@@ -80,22 +81,24 @@ def states_of(proposal, observations):
     )
 
 
-def separations_by_least_squares(campaign, final, found, rivals, proposal):
+def separations_by_least_squares(campaign, final, found, rivals, proposal, shares=(1.0,)):
     """With the campaign alone, and after each proposed state."""
     found, rivals = campaign.candidates[found], [campaign.candidates[key] for key in rivals]
     chain = final.model.sites.chain
     targets = list(final.model.targets)
     taken = {target.point for target in targets}
     targets += [Target(point.name, point.name, (0.0, 0.0, 0.0)) for point in chain.points if point.name not in taken]
-    target = np.array([[t.point for t in targets].index(point) for point in proposal.point])
+    points = [point.split() for point in proposal.point for _ in shares]
+    target = np.array([[t.point for t in targets].index(point) for read in points for point in read])
     rotation = np.tile(np.eye(3), (len(target), 1, 1)) if final.model.rows == 6 else None
-    states = states_of(proposal, campaign.observations)
-    beyond = Observations(states, np.arange(len(target)), target, np.zeros((len(target), 3)), rotation)
+    states = states_of(proposal, campaign.observations, shares)
+    state = np.repeat(np.arange(len(points)), len(points[0]))
+    beyond = Observations(states, state, target, np.zeros((len(target), 3)), rotation)
     worst = []
     for rival in rivals:
         here = rows_of(final, found, rival, final.model.targets, campaign.observations)
-        there = rows_of(final, found, rival, tuple(targets), beyond).reshape(len(target), -1, here.shape[1])
-        worst.append([left_over(np.concatenate([here, *there[:count]])) for count in range(len(target) + 1)])
+        there = rows_of(final, found, rival, tuple(targets), beyond).reshape(len(proposal.point), -1, here.shape[1])
+        worst.append([left_over(np.concatenate([here, *there[:count]])) for count in range(len(there) + 1)])
     return np.min(worst, axis=0)
 
 
@@ -121,6 +124,28 @@ def test_separations_are_what_least_squares_leaves(contest, rows, kuka):
     # Other fits to the same data, without what was found: a little off.
     tolerance = {"rtol": 2e-3, "atol": 3e-3 * expected.max()}
     np.testing.assert_allclose([proposal.present, *proposal.separation], expected, **tolerance)
+
+
+def test_poses_with_a_ladder_are_worth_what_least_squares_leaves_and_chosen_once(kuka):
+    found, rivals = "link_elasticity@2", ["joint_tilt@2", "joint_tilt@1"]
+    campaign = planted(kuka, {found: [1.5e-7, 1.5e-7]}, targets=(Target("elbow", "3DoF", (0.0, 0.0, 0.0)), *HAND))
+    shares = (0.0, 1.0, -0.5)
+    final, proposal = proposed(campaign, found, rivals, kuka.joint_limits, 12, ladder=shares)
+    assert proposal.point == ("3DoF 6DoF",) * 12
+    assert len(np.unique(proposal.joint_angles, axis=0)) == 12
+    expected = separations_by_least_squares(campaign, final, found, rivals, proposal, shares)
+    tolerance = {"rtol": 2e-3, "atol": 3e-3 * expected.max()}
+    np.testing.assert_allclose([proposal.present, *proposal.separation], expected, **tolerance)
+
+
+def test_a_ladder_begins_at_the_larger_loads_of_the_campaign(kuka):
+    campaign = planted(kuka, {"link_elasticity@2": [1.5e-7, 1.5e-7]}, targets=HAND)
+    states = campaign.observations.states
+    halved = replace(states, wrench=states.wrench * np.where(states.pose % 2, 1.0, 0.5)[:, None])
+    campaign = replace(campaign, observations=replace(campaign.observations, states=halved))
+    _, proposal = proposed(campaign, "link_elasticity@2", ["joint_tilt@2"], kuka.joint_limits, 160, ladder=(0.0, 1.0))
+    force = np.linalg.norm(halved.wrench[:, :3], axis=1)
+    assert (np.linalg.norm(proposal.wrench[:, :3], axis=1) >= np.median(force)).all()
 
 
 def test_states_are_within_limits_under_loads_of_the_campaign_and_raise_the_separation(kuka):

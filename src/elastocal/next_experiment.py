@@ -28,7 +28,7 @@ class Proposal:
     wrench : ndarray (E, 6)
         N, N m, at the last measuring point, base axes.
     point : tuple of str
-        Measuring point to put a target on.
+        Measuring point to put a target on; several, with spaces between, where targets are read together.
     separation : ndarray (E,)
         Smallest non-centrality between what was found and a rival, after this state and all before it.
     present : float
@@ -42,7 +42,7 @@ class Proposal:
     present: float
 
 
-def propose(final, attribution, observations, candidates, joint_limits, count, stream):
+def propose(final, attribution, observations, candidates, joint_limits, count, stream, ladder=None):
     """Choose states one by one, each the one that most raises the smallest separation from the alternatives.
 
     Parameters
@@ -58,22 +58,29 @@ def propose(final, attribution, observations, candidates, joint_limits, count, s
     count : int
         States to choose.
     stream : numpy.random.Generator
+    ladder : tuple of float, optional
+        Shares of a load at which each pose is read, at all targets of the campaign. What is chosen are then poses, none twice,
+        each with the load at the share 1; without, readings of one target under one load, which may be on a measuring point
+        that has no target yet.
 
     Returns
     -------
     Proposal
     """
     bare = without(final, {member.key for member in attribution.members}, observations)
-    targets, offsets, turns = _targets_everywhere(bare)
-    model = replace(bare.model, targets=targets)
-    estimate = replace(bare.estimate, target_offset=offsets, target_rotation=turns)
-    pool = _pool(model, estimate, observations, joint_limits, stream)
-    contests = []
-    for key in attribution.alternatives[:_RIVALS]:
-        rival = (candidates[key], [shape.start for shape in candidates[key].shapes])
-        here = _rows(bare.model, bare.estimate, bare, final, attribution.members, rival, observations)
-        there = _rows(model, estimate, bare, final, attribution.members, rival, pool)
-        contests.append((_Information.of(here.reshape(-1, here.shape[-1])), there))
+    model, estimate = _with_targets_everywhere(bare) if ladder is None else (bare.model, bare.estimate)
+    drawn = _drawn(observations.states, joint_limits, ladder is not None, stream)
+    pool = _pool(model, observations.states, estimate.sessions[0], drawn, ladder, stream)
+    rivals = [
+        (candidates[key], [shape.start for shape in candidates[key].shapes]) for key in attribution.alternatives[:_RIVALS]
+    ]
+    here = _rows(bare.model, bare.estimate, bare, final, attribution.members, rivals, observations)
+    there = _rows(model, estimate, bare, final, attribution.members, rivals, pool)
+    entries = len(pool.target) if ladder is None else _POOL
+    contests = [
+        (_Information.of(mine.reshape(-1, mine.shape[-1])), _compressed(more.reshape(entries, -1, more.shape[-1])))
+        for mine, more in zip(here, there, strict=True)
+    ]
     before = min(information.separation for information, _ in contests)
     chosen, separations = [], []
     for _ in range(count):
@@ -83,72 +90,85 @@ def propose(final, attribution, observations, candidates, joint_limits, count, s
         chosen.append(best)
         separations.append(worst[best])
         contests = [(information.with_rows(there[best]), there) for information, there in contests]
-    points = tuple(targets[pool.target[index]].point for index in chosen)
-    states = pool.states
-    return Proposal(states.joint_angles[chosen], states.wrench[chosen], points, np.array(separations), before)
+    angles, wrench = drawn
+    poses = np.array(chosen) // (entries // _POOL)
+    names = [target.point for target in model.targets]
+    together = " ".join(dict.fromkeys(names))
+    points = tuple(names[pool.target[index]] if ladder is None else together for index in chosen)
+    return Proposal(angles[poses], wrench[poses], points, np.array(separations), before)
 
 
-def _targets_everywhere(fitted):
-    """The model's targets, and one at each measuring point that has none yet."""
+def _with_targets_everywhere(fitted):
+    """Model and estimate with one more target at each measuring point that has none yet."""
     chain, targets = fitted.model.sites.chain, fitted.model.targets
     bare = [point.name for point in chain.points if point.name not in {target.point for target in targets}]
     added = tuple(Target(name, name, (0.0, 0.0, 0.0)) for name in bare)
     offsets = np.concatenate([fitted.estimate.target_offset, np.zeros((len(added), 3))])
     turns = np.concatenate([fitted.estimate.target_rotation, np.tile(np.eye(3), (len(added), 1, 1))])
-    return (*targets, *added), offsets, turns
+    estimate = replace(fitted.estimate, target_offset=offsets, target_rotation=turns)
+    return replace(fitted.model, targets=(*targets, *added)), estimate
 
 
-def _pool(model, estimate, observations, joint_limits, stream):
-    """Random poses under the loads of the campaign and their opposites, with one target each, at every target in turn."""
-    states, count = observations.states, len(model.targets)
+def _drawn(states, joint_limits, only_largest, stream):
+    """Random poses under loads of the campaign or their opposites: angles (E, n) and wrenches (E, 6)."""
     low, high = np.clip(joint_limits, -np.pi, np.pi).T
     angles = low + (high - low) * stream.random((_POOL, len(low)))
-    wrench = states.wrench[stream.integers(0, len(states), _POOL)] * stream.choice([-1.0, 1.0], (_POOL, 1))
-    size = _POOL * count
+    force = np.linalg.norm(states.wrench[:, :3], axis=1)
+    loads = states.wrench[force >= np.median(force[force > 0])] if only_largest and force.any() else states.wrench
+    return angles, loads[stream.integers(0, len(loads), _POOL)] * stream.choice([-1.0, 1.0], (_POOL, 1))
 
-    def each(values):
-        return np.repeat(values, count, axis=0)
 
-    session = np.full(size, estimate.sessions[0])
-    later = None if states.time_s is None else np.full(size, states.time_s.max())
+def _pool(model, states, session, drawn, ladder, stream):
+    """Readings of each pose drawn: at every target in turn, or at all of them under each share of its load."""
+    (angles, wrench), count = drawn, len(model.targets)
+    shares = np.ones(count) if ladder is None else np.array(ladder)
+    size = _POOL * len(shares)
     warmth = None if states.temperature_c is None else np.full(size, states.temperature_c.mean())
-    approach = None if states.approach is None else stream.choice([-1.0, 1.0], (size, len(low)))
-    drawn = States(
-        session,
+    loaded = States(
+        np.full(size, session),
         np.arange(size),
         np.ones(size, int),
-        each(angles),
-        each(wrench),
+        np.repeat(angles, len(shares), axis=0),
+        (wrench[:, None] * shares[:, None]).reshape(size, -1),
         np.full(size, _REPEATS),
-        approach,
-        later,
+        None if states.approach is None else stream.choice([-1.0, 1.0], (size, angles.shape[1])),
+        None if states.time_s is None else np.full(size, states.time_s.max()),
         warmth,
     )
-    rotation = np.tile(np.eye(3), (size, 1, 1)) if model.rows == 6 else None
-    return Observations(drawn, np.arange(size), np.tile(np.arange(count), _POOL), np.zeros((size, 3)), rotation)
+    targets = np.tile(np.arange(count), _POOL if ladder is None else size)
+    state = np.arange(size) if ladder is None else np.repeat(np.arange(size), count)
+    rotation = np.tile(np.eye(3), (len(targets), 1, 1)) if model.rows == 6 else None
+    return Observations(loaded, state, targets, np.zeros((len(targets), 3)), rotation)
 
 
-def _rows(model, estimate, bare, final, members, rival, observations):
-    """Whitened sensitivities (M, rows, P + d + 1): of the model, of a rival, and what was found at its fitted size."""
+def _rows(model, estimate, bare, final, members, rivals, observations):
+    """Whitened sensitivities (M, rows, P + d + 1) for each rival: of the model, of the rival, of what was found at its size."""
     around = circumstances(model, estimate, observations.states)
     line = linearize(model, estimate, observations, around)
     scale = np.array([parameter.plausible for _, parameter in bare.parameters])
     known = (line.sensitivities * scale)[..., ~bare.held]
-    plausible = np.array([parameter.plausible for parameter in rival[0].parameters])
-    other = effect_columns([rival], around, line.coordinate_jacobian, observations.state) * plausible
     keys = [effect.key for effect in final.model.effects]
+
+    def columns(law):
+        return effect_columns([law], around, line.coordinate_jacobian, observations.state)
+
     made = 0.0
     for member in members:
         number = keys.index(member.key)
         law = (final.model.effects[number], final.estimate.shapes[number])
-        made = (
-            made
-            + effect_columns([law], around, line.coordinate_jacobian, observations.state)
-            @ (final.estimate.coefficients[number])
-        )
+        made = made + columns(law) @ final.estimate.coefficients[number]
     jacobian = line.coordinate_jacobian[..., : model.sites.joints]
     whitener = whitening(observations, jacobian, final.noise, final.discrepancy_m)
-    return whitener.apply(np.concatenate([known, other, made[..., None]], axis=-1))
+    found = []
+    for rival in rivals:
+        other = columns(rival) * np.array([parameter.plausible for parameter in rival[0].parameters])
+        found.append(whitener.apply(np.concatenate([known, other, made[..., None]], axis=-1)))
+    return found
+
+
+def _compressed(blocks):
+    """Fewer rows (E, P, P) with the same normal equations as blocks (E, rows, P), where that is fewer."""
+    return np.linalg.qr(blocks, mode="r") if blocks.shape[1] > blocks.shape[2] else blocks
 
 
 @dataclass(frozen=True)

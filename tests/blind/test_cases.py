@@ -5,7 +5,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
@@ -21,7 +20,6 @@ from elastocal.blind.cases import (
     cases_of,
     design_of,
     make_case,
-    make_follow_up,
     specimen_of,
     write_manifest,
 )
@@ -141,18 +139,6 @@ def test_nothing_of_the_truth_lies_in_the_blind_folder(tmp_path):
     content = b"".join(path.read_bytes() for path in (tmp_path / "blind").rglob("*") if path.is_file())
     for word in (b"lost_motion", b"seed", b"usual", str(case.seed).encode(), tmp_path.name.encode()):
         assert word not in content
-
-
-def test_a_follow_up_is_read_of_the_same_robot(tmp_path):
-    case = a_case(("lost_motion",), (50.0,))
-    before, _ = made(case, tmp_path)
-    readings = before.readings
-    angles, wrench = readings.joint_angles[readings.load == 1][:8:4], readings.wrench[readings.load == 1][:8:4]
-    make_follow_up(case, angles, wrench, tmp_path / "again", ROBOTS)
-    after = read_campaign(tmp_path / "again" / case.name, ROBOTS).readings
-    assert len(after.pose) > len(readings.pose)
-    np.testing.assert_array_equal(after.position[: len(readings.pose)], readings.position)
-    assert after.pose.max() > readings.pose.max()
 
 
 def test_a_manifest_names_the_hash_of_every_truth(tmp_path):

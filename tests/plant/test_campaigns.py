@@ -205,3 +205,7 @@ def test_a_further_experiment_changes_no_reading_that_is_there(fanuc_specimen, s
     assert not longer.shown_wrench[rows][[0, 3]].any()
     assert longer.training[rows].all()
     assert (np.diff(longer.time_s) > 0).all()
+    ladder = continued(schedule, angle[::2], wrench[::2], ladder=(0.0, 1.0, -0.5))
+    assert ladder.load[rows].tolist() == [0, 1, 2, 0, 1, 2]
+    shares = np.array([0, 1, -0.5])[:, None]
+    np.testing.assert_allclose(ladder.shown_wrench[rows], np.concatenate([shares * wrench[0], shares * wrench[2]]), atol=1e-9)

@@ -34,6 +34,7 @@ wildcard_constraints:
     strategy="[^/]+",
     noise=r"[\d.e-]+",
     campaign="[^/]+",
+    block="[^/]+",
     test="(/test)?",
 
 

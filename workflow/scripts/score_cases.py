@@ -1,28 +1,21 @@
 """What was sealed against what was said."""
 
-import hashlib
-import json
 from pathlib import Path
 
 import pandas as pd
 
 from elastocal.blind.scores import confused, outcome, summarized
-from elastocal.errors import InputError
+from elastocal.blind.truths import opened_truths
 from elastocal.frames import write_csv
+from elastocal.json_files import read_json
 
 from job import run
 
 
 def score_cases(job):
-    promised = dict(reversed(line.split()) for line in Path(job.input.manifest).read_text(encoding="utf-8").splitlines())
-    verdicts = {v["campaign"]: v for path in job.input.verdicts for v in json.loads(Path(path).read_text(encoding="utf-8"))}
-    rows = []
-    for file in sorted(file for folder in job.input.sealed for file in Path(folder).glob("*.json")):
-        found = hashlib.sha256(file.read_bytes()).hexdigest()
-        if promised.get(file.name) != found:
-            raise InputError(file, "", f"SHA-256 {found}", f"{promised.get(file.name)}, as sealed")
-        rows.append(outcome(json.loads(file.read_text(encoding="utf-8")), verdicts[file.stem]))
-    cases = pd.DataFrame(rows)
+    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
+    cases = pd.DataFrame([outcome(truth, verdicts[name]) for name, truth in opened_truths(files, job.input.manifest).items()])
     write_csv(job.output.cases, cases)
     write_csv(job.output.summary, summarized(cases))
     write_csv(job.output.confusion, confused(cases))

@@ -10,8 +10,8 @@ from itertools import combinations
 from pathlib import Path
 
 from elastocal.plant.arm import arm_from_file
-from elastocal.plant.campaigns import Design, continued, schedule_of
-from elastocal.plant.defects import KINDS, OUTSIDE, drawn_defect, truth_of, with_defects
+from elastocal.plant.campaigns import Design, schedule_of
+from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.folders import write_blind_campaign, write_truth
 from elastocal.plant.physical_robot import specimen
@@ -45,6 +45,23 @@ SETTINGS = {
     "without_time_and_temperature": {"design": {"covariates": ("approach",)}},
     "without_covariates": {"design": {"covariates": ()}},
 }
+# Designs of the confounding sweep, by name: the fewer points, loads and the narrower the joints, the more alike effects are.
+SWEEP_DESIGNS = {
+    f"{points}, {loads}, {joints}": {"design": read | loaded | reached}
+    for points, read in (("all points", {}), ("flange", {"points": ("6DoF",)}))
+    for loads, loaded in (("ladder", {}), ("one load", {"ladder": (0.0, 1.0)}))
+    for joints, reached in (("wide", {}), ("narrow", {"reach": 0.25}))
+}
+# Near relatives of the catalogue.
+SWEEP_PAIRS = (
+    ("stiffening", "lost_motion"),
+    ("joint_tilt", "link_elasticity"),
+    ("base_compliance", "link_elasticity"),
+    ("payload", "link_weight"),
+    ("compensator_stiffness", "joint_dependent_stiffness"),
+    ("link_geometry", "thermal_growth"),
+)
+SWEEP_LEVEL = 50.0
 _HARD_NULLS = tuple(name for name in SETTINGS if name != "usual" and not name.startswith("without"))
 # Effects that cannot be seen without what a setting leaves out.
 _UNSEEN = {
@@ -62,7 +79,7 @@ class Case:
     ----------
     key : str
         What it is; sealed.
-    group : {"none", "single", "pair", "outside", "setting"}
+    group : {"none", "single", "pair", "outside", "setting", "sweep"}
     robot : str
         Robot file in config/robots.
     effects : tuple of str
@@ -70,8 +87,10 @@ class Case:
     levels : tuple of float
         Non-centrality of each effect alone, on the poses that are not held out, after the compliances have absorbed theirs.
     setting : str
-        Key of `SETTINGS`.
+        Key of `SETTINGS`, or of `SWEEP_DESIGNS` in a sweep.
     seed : int
+    rival : str
+        In a sweep the near relative of the effect; otherwise empty.
     """
 
     key: str
@@ -81,6 +100,7 @@ class Case:
     levels: tuple
     setting: str
     seed: int
+    rival: str = ""
 
     @property
     def name(self):
@@ -102,6 +122,8 @@ class Counts:
     setting : int
         Without an effect, of each hard setting; with one at non-centrality 50, of each setting; and of effects that a setting
         hides, each.
+    sweep : int
+        Of each effect of each of `SWEEP_PAIRS` under each of `SWEEP_DESIGNS`.
     """
 
     none: int
@@ -112,6 +134,7 @@ class Counts:
     levels: tuple = LEVELS
     pair_levels: tuple = (50.0, 200.0)
     robots: tuple = field(default=ROBOTS)
+    sweep: int = 0
 
 
 SIZES = {
@@ -138,11 +161,11 @@ def cases_of(counts, seed):
     """
     found = []
 
-    def add(group, robot, effects, levels, setting, number):
-        words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number)]
+    def add(group, robot, effects, levels, setting, number, rival=""):
+        words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number), *([rival] if rival else [])]
         key = "/".join(words)
         digest = hashlib.sha256(f"blind/{seed}/{key}".encode()).digest()
-        found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little")))
+        found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little"), rival))
 
     for robot in counts.robots:
         for number in range(counts.none):
@@ -162,6 +185,10 @@ def cases_of(counts, seed):
             for setting, effects in _UNSEEN.items():
                 for effect in effects:
                     add("setting", robot, (effect,), (200.0,), setting, number)
+        for effect, rival in (*SWEEP_PAIRS, *(pair[::-1] for pair in SWEEP_PAIRS)):
+            for design in SWEEP_DESIGNS:
+                for number in range(counts.sweep):
+                    add("sweep", robot, (effect,), (SWEEP_LEVEL,), design, number, rival)
     return sorted(found, key=lambda case: case.name)
 
 
@@ -172,13 +199,17 @@ def block_of(cases, number, of):
 
 def design_of(case):
     """How the campaign of a case is made."""
-    setting = SETTINGS[case.setting]
+    setting = _setting(case)
     design = replace(Design(), **setting.get("design", {}))
     if "declared_ratio" in setting:
         tracker = replace(Tracker(), **setting.get("tracker", {}))
         noise = tuple(setting["declared_ratio"] * sigma for sigma in (tracker.sigma_m, tracker.sigma_rad))
         design = replace(design, repeats=1, declared_noise=noise)
     return design
+
+
+def _setting(case):
+    return (SWEEP_DESIGNS if case.group == "sweep" else SETTINGS)[case.setting]
 
 
 def specimen_of(case, robots_folder):
@@ -193,7 +224,7 @@ def specimen_of(case, robots_folder):
     -------
     PhysicalRobot
     """
-    robot, setting = specimen(arm_from_file(Path(robots_folder) / f"{case.robot}.yaml"), case.seed), SETTINGS[case.setting]
+    robot, setting = specimen(arm_from_file(Path(robots_folder) / f"{case.robot}.yaml"), case.seed), _setting(case)
     robot = replace(robot, tracker=replace(robot.tracker, **setting.get("tracker", {})))
     if "joint_rad" in setting:
         spread = setting["joint_rad"] * stream(case.seed, "repeatability").uniform(0.5, 1.5, robot.arm.joints)
@@ -222,7 +253,7 @@ def defects_of(case, robot, design):
     eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the raw
     non-centrality is taken instead, and the truth says so: nothing can find that.
     """
-    yardstick = Yardstick(robot, schedule_of(robot.arm, design, case.seed), free_frame=design.frame == "tracker")
+    yardstick = _yardstick(case, robot, design)
     found = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
         drawn = [drawn_defect(effect, robot.arm, case.seed + 1000 * order + draw) for draw in range(_DRAWS)]
@@ -233,6 +264,36 @@ def defects_of(case, robot, design):
             raise ValueError(f"{case.key}: no {effect} has a non-centrality of {level:g}")
         found.append(sized)
     return found
+
+
+def angle_to_rival(case, robot, design, bad):
+    """Smallest angle between what a case's defects and its rival, wherever that may sit, make off the compliances, degrees.
+
+    Parameters
+    ----------
+    case : Case
+        Of a sweep.
+    robot, bad : PhysicalRobot
+        Without and with the defects.
+    design : Design
+
+    Returns
+    -------
+    float
+    """
+    kind, yardstick = KINDS[case.rival], _yardstick(case, robot, design)
+
+    def at(place):
+        """Rivals whose details differ and which together span what there is at a place."""
+        defects = [Defect(case.rival, place, kind.plausible, case.seed + draw) for draw in range(_DRAWS)]
+        return [with_defects(robot, [defect]) for defect in defects]
+
+    return min(yardstick.angle_deg(bad, at(place)) for place in kind.places(robot.arm))
+
+
+def _yardstick(case, robot, design):
+    targets = [robot.arm.points.index(point) for point in design.points] or None
+    return Yardstick(robot, schedule_of(robot.arm, design, case.seed), targets, free_frame=design.frame == "tracker")
 
 
 def _first_plausible(yardstick, robot, drawn, level, quantity):
@@ -277,27 +338,9 @@ def make_case(case, blind_folder, sealed_folder, robots_folder):
     folder = Path(blind_folder) / case.name
     made = write_blind_campaign(folder, case.name, case.robot, bad, design, schedule_of(robot.arm, design, case.seed))
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | told for defect, told in sized]}
+    if case.rival:
+        truth["rival"] = {"effect": case.rival, "angle_deg": angle_to_rival(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
-
-
-def make_follow_up(case, angles, wrench, blind_folder, robots_folder):
-    """Carry out a proposed experiment on the robot of a case, and write the campaign anew with what was read further.
-
-    Parameters
-    ----------
-    case : Case
-    angles : ndarray (E, n)
-        Of the model, rad, as in next_experiment.csv; equal rows that follow each other are one pose.
-    wrench : ndarray (E, 6)
-        N, N m.
-    blind_folder : str or Path
-        The campaign goes to ``blind_folder/<name>/``; its truth is that of the case.
-    robots_folder : str or Path
-    """
-    robot, design = specimen_of(case, robots_folder), design_of(case)
-    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
-    schedule = continued(schedule_of(robot.arm, design, case.seed), angles, wrench, design.seconds_per_state)
-    write_blind_campaign(Path(blind_folder) / case.name, case.name, case.robot, bad, design, schedule)
 
 
 def write_manifest(path, digests):

@@ -6,7 +6,7 @@ from elastocal.next_experiment import propose
 from elastocal.study.columns import WRENCH_NAMES
 
 
-def proposal_frame(case, final, attributions, states, draws):
+def proposal_frame(case, final, attributions, states, draws, ladder=None):
     """States that best tell each effect found from its alternatives; no rows where nothing is confounded.
 
     Parameters
@@ -17,6 +17,8 @@ def proposal_frame(case, final, attributions, states, draws):
     states : int
         For each effect that is confounded.
     draws : numpy.random.Generator
+    ladder : tuple of float, optional
+        Shares of its load at which each pose is read, see `propose`; the rows are then poses, with the load at the share 1.
 
     Returns
     -------
@@ -30,7 +32,7 @@ def proposal_frame(case, final, attributions, states, draws):
     for attribution in attributions:
         if not attribution.alternatives:
             continue
-        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws)
+        found = propose(final, attribution, case.observations, case.candidates, robot.joint_limits, states, draws, ladder)
         reported = robot.reported_angles(found.joint_angles)
         for number in range(states):
             loaded = int(found.wrench[number].any())

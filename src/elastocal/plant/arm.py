@@ -92,6 +92,10 @@ class Arm:
         """What the controller shows for angles (S, n), rad."""
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
+    def angles_shown_as(self, shown):
+        """Angles (S, n) for which the controller shows these, rad."""
+        return shown @ self.reported_matrix.T + self.reported_offset
+
 
 def arm_from_file(path):
     """Read a robot file.

@@ -41,6 +41,8 @@ class Design:
         Effects that the campaign says its model has.
     measured : {"pose", "position"}
     frame : {"base", "tracker"}
+    reach : float
+        Share of the joint limits, about their middle, that poses are drawn from.
     """
 
     poses: int = 30
@@ -58,6 +60,7 @@ class Design:
     declared: tuple = ()
     measured: str = "pose"
     frame: str = "base"
+    reach: float = 1.0
 
 
 def schedule_of(arm, design, seed):
@@ -75,7 +78,7 @@ def schedule_of(arm, design, seed):
     """
     draws = stream(seed, "schedule")
     low, high = arm.limits.T
-    angles = low + (high - low) * draws.random((design.poses, arm.joints))
+    angles = low + (high - low) * (0.5 + design.reach * (draws.random((design.poses, arm.joints)) - 0.5))
     direction = draws.standard_normal((design.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     states, approach, previous = [], [], []
@@ -100,7 +103,7 @@ def schedule_of(arm, design, seed):
     )
 
 
-def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
+def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0, ladder=(0.0, 1.0)):
     """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
 
     Parameters
@@ -112,6 +115,8 @@ def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
         As it shall be shown, N, N m at the flange, base axes; the moment is that of the force at a lever.
     seconds_per_state, pause_s : float
         Pace, and how long after the last state the first one comes.
+    ladder : tuple of float
+        Shares of its load at which each row is read, 0 first.
 
     Returns
     -------
@@ -127,8 +132,8 @@ def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0):
         if first:
             rows.append((state, 0.0))
             load.append(0)
-        if wrench[state].any():
-            rows.append((state, 1.0))
+        for share in ladder[1:] if wrench[state].any() else ():
+            rows.append((state, share))
             load.append(load[-1] + 1)
     state, share = np.array([row for row, _ in rows]), np.array([share for _, share in rows])[:, None]
     force, moment = wrench[state, :3], wrench[state, 3:]

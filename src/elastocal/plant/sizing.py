@@ -15,6 +15,8 @@ from elastocal.plant.tracker import rotation_vector
 
 _STEP = 0.02
 _ROUNDS = 12
+# Below this share of the largest a direction is second order and rounding.
+_SAME = 0.02
 
 
 @dataclass(frozen=True)
@@ -84,10 +86,35 @@ class Yardstick:
         Signal
         """
         metres, radians = self._change(*seen_poses(robot, self.schedule))
-        seen = self.change(robot)[self.schedule.training].ravel()
-        left = seen - self._absorbed @ (self._absorbed.T @ seen)
+        seen, left = self._seen(robot), self.left(robot)
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
+
+    def left(self, robot):
+        """What the declared model cannot absorb of a robot's change in the readings that are not held out, ndarray."""
+        seen = self._seen(robot)
+        return seen - self._absorbed @ (self._absorbed.T @ seen)
+
+    def angle_deg(self, robot, others):
+        """Angle between what is left of a robot and all that others make together, in any proportion.
+
+        Parameters
+        ----------
+        robot : PhysicalRobot
+        others : iterable of PhysicalRobot
+            Each left with something.
+
+        Returns
+        -------
+        float
+        """
+        mine, theirs = self.left(robot), np.array([self.left(other) for other in others])
+        _, size, directions = np.linalg.svd(theirs / np.linalg.norm(theirs, axis=1, keepdims=True), full_matrices=False)
+        share = np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine)
+        return float(np.degrees(np.arccos(min(share, 1.0))))
+
+    def _seen(self, robot):
+        return self.change(robot)[self.schedule.training].ravel()
 
     def _change(self, position, rotation):
         position_0, rotation_0 = self.poses

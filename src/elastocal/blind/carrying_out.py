@@ -1,0 +1,66 @@
+"""Experiments after the first, carried out on the robot of a case: the proposed one, and as many random poses beside it.
+
+The plant's side. It is told the name of a case, angles and loads, and makes the robot again from the list of cases; it opens no
+sealed file, and what it writes is a campaign like the first.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+from elastocal.blind.cases import defects_of, design_of, specimen_of
+from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
+from elastocal.plant.campaigns import continued, schedule_of
+from elastocal.plant.defects import with_defects
+from elastocal.plant.folders import write_blind_campaign
+from elastocal.plant.random_numbers import stream
+
+
+def carry_out(case, shown, wrench, folder, robots_folder):
+    """Carry out a proposal and its random counterpart, and write the campaign of the case with what was read further.
+
+    Parameters
+    ----------
+    case : Case
+    shown : ndarray (E, n)
+        Angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most telling first.
+    wrench : ndarray (E, 6)
+        N, N m; each is read at the shares `LADDER` of it, as the poses of the campaign were.
+    folder : str or Path
+        The campaign with the first of each number of `POSES` goes to ``<arm>_<poses>/<name>/``.
+    robots_folder : str or Path
+    """
+    robot, design = specimen_of(case, robots_folder), design_of(case)
+    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
+    first = schedule_of(robot.arm, design, case.seed)
+    experiments = ((shown, wrench), random_experiment(robot.arm, design, len(wrench), case.seed))
+    for arm, (angles, loads) in zip(ARMS, experiments, strict=True):
+        for poses in POSES:
+            angle = robot.arm.angles_shown_as(angles[:poses])
+            schedule = continued(first, angle, loads[:poses], design.seconds_per_state, ladder=LADDER)
+            write_blind_campaign(
+                Path(folder) / folder_name(arm, poses) / case.name, case.name, case.robot, bad, design, schedule
+            )
+
+
+def random_experiment(arm, design, count, seed):
+    """Poses and loads drawn as those of the campaign were.
+
+    Parameters
+    ----------
+    arm : Arm
+    design : Design
+    count : int
+        Of poses, E.
+    seed : int
+        Of the case.
+
+    Returns
+    -------
+    shown : ndarray (E, n)
+    wrench : ndarray (E, 6)
+        The campaign's largest force, in a random direction for each pose.
+    """
+    other = int(stream(seed, "random follow-up").integers(2**48))
+    drawn = schedule_of(arm, replace(design, poses=count, held_out=0, ladder=(0.0, 1.0), repeats=1), other)
+    loaded = drawn.load == 1
+    return arm.shown_angles(drawn.angle[loaded]), drawn.shown_wrench[loaded]

@@ -1,0 +1,88 @@
+"""The loop once more: which blind cases are followed up, what is read further, and the verdicts on it.
+
+The analyst's side, which knows neither truths nor the plant; `carrying_out` is the other side.
+"""
+
+from pathlib import Path
+
+from elastocal.verdict import CLASS, NAMED
+
+# Poses after which a verdict is stated anew.
+POSES = (5, 10, 20)
+# Shares of its load at which each is read, as each pose of the campaign was.
+LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
+# Where the poses come from: the loop's proposal, or drawn as those of the campaign were.
+ARMS = ("proposed", "random")
+# Most cases of a block that are followed up, by the size of the benchmark; it bounds the time and looks at no outcome.
+MOST = {"smoke": 1, "quick": 2, "full": 2}
+
+
+def followed_up(verdicts, most):
+    """The cases that a block follows up.
+
+    Parameters
+    ----------
+    verdicts : sequence of dict
+        Of all cases of the block.
+    most : int
+
+    Returns
+    -------
+    list of dict
+        The first verdicts "class" with alternatives, for which an experiment is proposed, in the order of the names of their
+        cases, which are in none.
+    """
+    classes = [v for v in verdicts if v["verdict"] == CLASS and any(effect["alternatives"] for effect in v["effects"])]
+    return sorted(classes, key=lambda verdict: verdict["campaign"])[:most]
+
+
+def folder_name(arm, poses):
+    """Where campaigns with further poses lie: those of each arm, at each number of poses, in a folder of their own."""
+    return f"{arm}_{poses}"
+
+
+def diagnosed_until_named(folder_at, diagnose):
+    """Verdicts with more and more poses, until a single name is said.
+
+    Parameters
+    ----------
+    folder_at : dict of int to str
+        The campaign with so many further poses, the fewest first.
+    diagnose : callable
+        Verdict on a folder.
+
+    Returns
+    -------
+    dict of int to dict
+        Verdicts by the number of further poses; the last is the first that says "named", or that on all poses.
+    """
+    said = {}
+    for poses, folder in folder_at.items():
+        said[poses] = diagnose(folder)
+        if said[poses]["verdict"] == NAMED:
+            break
+    return said
+
+
+def diagnosed_anew(campaigns, diagnose):
+    """Verdicts on all that was followed up in a block.
+
+    Parameters
+    ----------
+    campaigns : str
+        Folder with ``<arm>_<poses>/<case>/``; empty where nothing was followed up.
+    diagnose : callable
+        Verdict on a folder.
+
+    Returns
+    -------
+    list of dict
+        ``campaign, arm, poses, verdict``; what is measured after a single name is not looked at.
+    """
+    anew = []
+    for name in sorted({folder.name for folder in Path(campaigns).glob("*/*")}):
+        for arm in ARMS:
+            folder_at = {poses: f"{campaigns}/{folder_name(arm, poses)}/{name}" for poses in POSES}
+            for poses, verdict in diagnosed_until_named(folder_at, diagnose).items():
+                anew.append({"campaign": name, "arm": arm, "poses": poses, "verdict": verdict})
+    return anew

@@ -1,0 +1,110 @@
+"""Scores of the loop once more: how often the name is right after so many further poses, proposed or random."""
+
+import pandas as pd
+from scipy.stats import binomtest
+
+from elastocal.attribution import CONFOUNDED_BIC_NEAR
+from elastocal.blind.follow_up import ARMS, POSES
+from elastocal.blind.scores import outcome
+from elastocal.verdict import CLASS
+
+# The robot on which the method was tuned, apart from those on which it is proved.
+TUNED_ON = ("kuka",)
+TUNED, PROOF = "tuned", "proof"
+_CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "foreseen", "arm", "poses_added"]
+_CASE_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
+_COLUMNS = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high", "still_class", "wrong_name", "other_verdict"]
+_POSES_COLUMNS = ["robots", "arm", "cases", "reached", "median_poses"]
+
+
+def followed(truths, first, anew, foreseen):
+    """What was said of each case followed up, after each number of poses.
+
+    Parameters
+    ----------
+    truths : dict of str to dict
+        Sealed documents by the name of the case.
+    first : dict of str to dict
+        Verdicts on the campaigns as they were.
+    anew : sequence of dict
+        ``campaign, arm, poses, verdict``: verdicts on the campaigns with further poses.
+    foreseen : dict of str to float
+        Separation that the proposal promises from the nearest rival with all its poses.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each case, arm and number of poses, 0 among them. After a single name no more is measured, and it stands.
+    """
+    said = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
+    rows = []
+    for name in sorted({entry["campaign"] for entry in anew}):
+        for arm in ARMS:
+            verdict = first[name]
+            for poses in (0, *POSES):
+                verdict = said.get((name, arm, poses), verdict)
+                rows.append({"arm": arm, "poses_added": poses, "foreseen": foreseen[name]} | outcome(truths[name], verdict))
+                rows[-1]["robots"] = TUNED if rows[-1]["robot"] in TUNED_ON else PROOF
+    return pd.DataFrame(rows, columns=_CASE_COLUMNS)
+
+
+def promised(proposals):
+    """Separation with all poses by the name of the case, of tables of proposals."""
+    if "separation" not in proposals:
+        return {}
+    return proposals.groupby("case")["separation"].max().to_dict()
+
+
+def with_one_effect(cases):
+    """Which rows are of cases that a single name can be right for: one effect of the catalogue that readings can show."""
+    return cases["group"].isin(("single", "setting", "sweep")) & ~cases["truth"].isin(("none", "force_scale"))
+
+
+def with_prospects(cases):
+    """Which rows are of cases whose proposal promises as much separation as the verdict asks for between near relatives.
+
+    The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
+    """
+    return cases["foreseen"] >= CONFOUNDED_BIC_NEAR
+
+
+def rates(cases):
+    """How often the name is right, with Clopper-Pearson intervals.
+
+    Parameters
+    ----------
+    cases : pandas.DataFrame
+        Of `followed`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns right_name to high are shares of the cases, the others counts.
+    """
+    rows = []
+    for key, part in cases.groupby(["robots", "arm", "poses_added"]):
+        right, still, wrong = part["named_right"].sum(), (part["verdict"] == CLASS).sum(), part["wrong_name"].sum()
+        interval = binomtest(int(right), len(part)).proportion_ci(method="exact")
+        rest = len(part) - right - still - wrong
+        rows.append((*key, len(part), right / len(part), interval.low, interval.high, still, wrong, rest))
+    return pd.DataFrame(rows, columns=_COLUMNS)
+
+
+def poses_needed(cases):
+    """How many further poses it took until the right name.
+
+    Parameters
+    ----------
+    cases : pandas.DataFrame
+        Of `followed`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        For the cases that reached it, their number and their median.
+    """
+    rows = []
+    for key, part in cases.groupby(["robots", "arm"]):
+        needed = part[part["named_right"]].groupby("case")["poses_added"].min()
+        rows.append((*key, part["case"].nunique(), len(needed), needed.median()))
+    return pd.DataFrame(rows, columns=_POSES_COLUMNS)

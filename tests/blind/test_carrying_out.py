@@ -1,0 +1,115 @@
+"""A further experiment does what was proposed, on the same robot, and changes nothing that was read before."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
+
+from elastocal.blind.carrying_out import carry_out, random_experiment
+from elastocal.blind.cases import Case, design_of, make_case
+from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
+from elastocal.campaign import read_campaign, split
+from elastocal.plant.arm import arm_from_file
+
+ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
+CASE = Case("lost motion", "single", "kuka", ("lost_motion",), (50.0,), "usual", 187654321)
+STATES = max(POSES)
+
+
+@pytest.fixture(scope="module")
+def experiment():
+    """Shown angles and loads."""
+    draws = np.random.default_rng(3)
+    force, lever = draws.normal(0, 500, (STATES, 3)), np.array([0.0, 0.5, 0.0])
+    return draws.uniform(-0.8, 0.8, (STATES, 6)), np.concatenate([force, np.cross(lever, force)], axis=1)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory, experiment):
+    """The first campaign in `blind`, the further ones in `again`."""
+    folder = tmp_path_factory.mktemp("follow_up")
+    make_case(CASE, folder / "blind", folder / "sealed", ROBOTS)
+    carry_out(CASE, *experiment, folder / "again", ROBOTS)
+    return folder
+
+
+def first_and_further(folder, arm, poses, robots=ROBOTS):
+    """Campaign before, campaign after, and which readings of the latter are new."""
+    before = read_campaign(folder / "blind" / CASE.name, ROBOTS)
+    after = read_campaign(folder / "again" / folder_name(arm, poses) / CASE.name, robots)
+    return before, after, after.readings.pose > before.readings.pose.max()
+
+
+@pytest.mark.parametrize("poses", POSES)
+@pytest.mark.parametrize("arm", ARMS)
+def test_what_was_read_before_stays_and_the_held_out_poses_too(folder, arm, poses):
+    before, after, new = first_and_further(folder, arm, poses)
+    for name in ("pose", "position", "rotation_vector", "joint_angles", "wrench", "time_s"):
+        np.testing.assert_array_equal(getattr(after.readings, name)[~new], getattr(before.readings, name))
+    assert len(np.unique(after.readings.pose[new])) == poses
+    training, held_out = split(after)
+    np.testing.assert_array_equal(held_out.position, split(before)[1].position)
+    assert set(np.unique(after.readings.pose[new])) <= set(training.pose)
+
+
+def test_the_proposed_poses_and_loads_are_those_carried_out(folder, experiment):
+    shown, wrench = experiment
+    _, after, new = first_and_further(folder, "proposed", STATES)
+    readings = after.readings.select(new)
+    for number in range(STATES):
+        mine = readings.pose == np.unique(readings.pose)[number]
+        np.testing.assert_allclose(readings.joint_angles[mine], np.tile(shown[number], (mine.sum(), 1)), atol=1e-12)
+        shares = np.array(LADDER)[readings.load[mine]]
+        assert set(shares) == set(design_of(CASE).ladder)
+        np.testing.assert_allclose(readings.wrench[mine], shares[:, None] * wrench[number], atol=1e-9)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_fewer_poses_are_the_first_of_more(folder, arm):
+    _, few, _ = first_and_further(folder, arm, POSES[0])
+    _, many, _ = first_and_further(folder, arm, POSES[-1])
+    count = len(few.readings.pose)
+    for name in ("position", "rotation_vector", "approach", "joint_angles"):
+        np.testing.assert_array_equal(getattr(many.readings, name)[:count], getattr(few.readings, name))
+
+
+def test_random_poses_are_read_like_the_proposed_and_others_than_the_campaigns(folder):
+    before, after, new = first_and_further(folder, "random", STATES)
+    _, proposed, theirs = first_and_further(folder, "proposed", STATES)
+    np.testing.assert_array_equal(after.readings.load[new], proposed.readings.load[theirs])
+    force = np.linalg.norm(after.readings.wrench[new, :3], axis=1)
+    np.testing.assert_allclose(force, np.abs(np.array(LADDER)[after.readings.load[new]]) * design_of(CASE).force_N, atol=1e-9)
+    known = {tuple(row) for row in before.readings.joint_angles.round(9)}
+    assert not known & {tuple(row) for row in after.readings.joint_angles[new].round(9)}
+    low, high = arm_from_file(ROBOTS / "kuka.yaml").limits.T
+    assert ((low <= after.readings.joint_angles[new]) & (after.readings.joint_angles[new] <= high)).all()
+
+
+def test_angles_are_those_that_the_controller_shows(tmp_path, experiment):
+    """On a robot whose controller counts its second joint the other way round and couples the third to it."""
+    matrix = np.eye(6)
+    matrix[1, 1], matrix[2, 1] = -1.0, 1.0
+    document = yaml.safe_load((ROBOTS / "kuka.yaml").read_text(encoding="utf-8"))
+    document["reported_joints"] = {"matrix": matrix.tolist(), "offset_deg": [0, 30, 0, 0, 0, 0]}
+    robots = tmp_path / "robots"
+    robots.mkdir()
+    (robots / "kuka.yaml").write_text(yaml.safe_dump(document), encoding="utf-8")
+    shown, wrench = experiment
+    carry_out(CASE, shown, wrench, tmp_path / "again", robots)
+    written = read_campaign(tmp_path / "again" / folder_name("proposed", 5) / CASE.name, robots)
+    new = written.readings.pose >= design_of(CASE).poses
+    poses = np.unique(written.readings.pose[new], return_index=True)[1]
+    # The campaign is read into angles of the model.
+    expected = shown[:5] @ matrix.T + np.radians([0, 30, 0, 0, 0, 0])
+    np.testing.assert_allclose(written.readings.joint_angles[new][poses], expected, atol=1e-9)
+
+
+def test_random_experiments_of_two_cases_differ_and_of_one_do_not():
+    arm, design = arm_from_file(ROBOTS / "kuka.yaml"), replace(design_of(CASE), force_N=300.0)
+    one, again, other = (random_experiment(arm, design, STATES, seed)[0] for seed in (1, 1, 2))
+    np.testing.assert_array_equal(one, again)
+    assert not np.isclose(one, other).any()

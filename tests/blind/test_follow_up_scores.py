@@ -1,0 +1,87 @@
+"""The name after further poses: every case counts at every number of poses, and a single name stands."""
+
+import pandas as pd
+import pytest
+from scipy.stats import beta
+from test_scores import said, truth
+
+from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
+
+
+def entry(case, arm, poses, verdict):
+    return {"campaign": case, "arm": arm, "poses": poses, "verdict": verdict}
+
+
+def sealed(case, *effects, robot="fanuc", group="single"):
+    document = truth(*effects, group=group)
+    return document | {"campaign": case, "case": document["case"] | {"robot": robot}}
+
+
+CLASS = said("class", "link_weight", alternatives=["payload@2"])
+TRUTHS = {
+    "a": sealed("a", "payload"),
+    "b": sealed("b", "payload"),
+    "c": sealed("c", "payload", robot="kuka"),
+    "d": sealed("d", "payload", "joint_tilt", group="pair"),
+}
+ANEW = [
+    entry("a", "proposed", 5, said("named", "payload")),
+    *(entry("a", "random", poses, CLASS) for poses in (5, 10, 20)),
+    entry("b", "proposed", 5, CLASS),
+    entry("b", "proposed", 10, said("named", "link_weight")),
+    entry("b", "random", 5, said("several", "payload", "joint_tilt")),
+    entry("b", "random", 10, CLASS),
+    entry("b", "random", 20, said("named", "payload")),
+    *(entry(case, arm, 5, said("named", "payload")) for case in "cd" for arm in ("proposed", "random")),
+]
+
+
+@pytest.fixture
+def cases():
+    return followed(TRUTHS, dict.fromkeys("abcde", CLASS), ANEW, {"a": 3.0, "b": 30.0, "c": 0.0, "d": 100.0})
+
+
+def row(table, *key):
+    return table.set_index(["robots", "arm", "poses_added"]).loc[key]
+
+
+def test_every_case_has_a_row_for_each_arm_and_number_of_poses(cases):
+    assert len(cases) == 4 * 2 * 4
+    assert set(cases["case"]) == set("abcd")
+
+
+def test_rates_count_what_was_said_last(cases):
+    table = rates(cases[with_one_effect(cases)])
+    before = row(table, "proof", "proposed", 0)
+    assert (before["cases"], before["right_name"], before["still_class"], before["wrong_name"]) == (2, 0, 2, 0)
+    assert (before["low"], before["high"]) == (0, pytest.approx(beta.ppf(0.975, 1, 2)))
+    for poses, right, still, wrong in ((5, 0.5, 1, 0), (10, 0.5, 0, 1), (20, 0.5, 0, 1)):
+        found = row(table, "proof", "proposed", poses)
+        assert (found["right_name"], found["still_class"], found["wrong_name"]) == (right, still, wrong)
+    assert row(table, "proof", "random", 5)["other_verdict"] == 1
+    assert row(table, "proof", "random", 20)["right_name"] == 0.5
+    assert row(table, "tuned", "random", 20)["cases"] == 1
+
+
+def test_a_truth_that_no_single_name_can_be_right_for_is_counted_apart(cases):
+    assert set(cases.loc[~with_one_effect(cases), "case"]) == {"d"}
+    other = rates(cases[~with_one_effect(cases)])
+    assert row(other, "proof", "random", 20)["wrong_name"] == 1
+
+
+def test_poses_needed_are_those_of_the_cases_that_reached_the_name(cases):
+    table = poses_needed(cases[with_one_effect(cases)]).set_index(["robots", "arm"])
+    assert table.loc[("proof", "proposed")].tolist() == [2, 1, 5]
+    assert table.loc[("proof", "random")].tolist() == [2, 1, 20]
+
+
+def test_aliases_that_the_proposal_cannot_tell_are_set_apart(cases):
+    assert set(cases.loc[with_prospects(cases), "case"]) == {"b", "d"}
+    proposals = pd.DataFrame({"case": ["a", "b", "a", "b"], "separation": [1.0, 2.0, 3.0, 30.0]})
+    assert promised(proposals) == {"a": 3.0, "b": 30.0}
+
+
+def test_nothing_followed_up_makes_empty_tables():
+    none = followed(TRUTHS, {}, [], promised(pd.DataFrame({"case": []})))
+    assert rates(none[with_one_effect(none)]).empty and poses_needed(none).empty
+    assert "right_name" in rates(none) and isinstance(none, pd.DataFrame)

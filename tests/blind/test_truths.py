@@ -1,0 +1,34 @@
+"""A truth is opened only as it was promised."""
+
+import hashlib
+
+import pytest
+
+from elastocal.blind.truths import opened_truths
+from elastocal.errors import InputError
+
+
+@pytest.fixture
+def sealed(tmp_path):
+    files = []
+    for name in ("case_b", "case_a"):
+        files.append(tmp_path / f"{name}.json")
+        files[-1].write_text(f'{{"campaign": "{name}"}}', encoding="utf-8")
+    lines = [f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {file.name}\n" for file in files]
+    (tmp_path / "manifest.sha256").write_text("".join(lines), encoding="utf-8")
+    return files, tmp_path / "manifest.sha256"
+
+
+def test_truths_come_by_the_names_of_their_cases(sealed):
+    assert opened_truths(*sealed) == {name: {"campaign": name} for name in ("case_a", "case_b")}
+    assert list(opened_truths(*sealed)) == ["case_a", "case_b"]
+
+
+def test_a_truth_that_was_changed_or_not_promised_is_refused(sealed, tmp_path):
+    files, manifest = sealed
+    files[0].write_text('{"campaign": "case_c"}', encoding="utf-8")
+    with pytest.raises(InputError, match=r"case_b\.json.*as sealed"):
+        opened_truths(files, manifest)
+    (tmp_path / "case_d.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"case_d\.json"):
+        opened_truths([tmp_path / "case_d.json"], manifest)

@@ -1,0 +1,22 @@
+"""Proposed experiments, and random ones beside them, on the robots of their cases."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from elastocal.blind.carrying_out import carry_out
+from elastocal.blind.cases import SIZES, cases_of
+from elastocal.study.columns import WRENCH_NAMES
+
+from job import run
+
+
+def carry_out_follow_ups(job):
+    Path(job.output.campaigns).mkdir(parents=True, exist_ok=True)
+    cases = {case.name: case for case in cases_of(SIZES[job.params.size], job.params.seed)}
+    for name, states in pd.read_csv(job.input.proposals).groupby("case"):
+        shown, wrench = states.filter(regex=r"^q\d+$").to_numpy(), states[list(WRENCH_NAMES)].to_numpy()
+        carry_out(cases[name], shown, wrench, job.output.campaigns, "config/robots")
+
+
+run(carry_out_follow_ups, snakemake)

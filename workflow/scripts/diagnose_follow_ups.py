@@ -1,0 +1,23 @@
+"""Verdicts anew on campaigns with further poses; this process opens no sealed file."""
+
+import sys
+from pathlib import Path
+
+from elastocal.blind.follow_up import diagnosed_anew
+from elastocal.json_files import write_json
+from elastocal.loop.whole import diagnosed
+
+from job import run
+
+
+def diagnose_follow_ups(job):
+    settings = job.params
+
+    def verdict_on(folder):
+        print(f"{job.wildcards.block}: {Path(folder).parent.name}", file=sys.stderr, flush=True)
+        return diagnosed(folder, "config/robots", settings.replicates, settings.seed)
+
+    write_json(job.output.verdicts, diagnosed_anew(job.input.campaigns, verdict_on), allow_nan=False)
+
+
+run(diagnose_follow_ups, snakemake)

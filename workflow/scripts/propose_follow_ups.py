@@ -1,0 +1,22 @@
+"""What to measure next for the first cases of a block that end in a class; this process opens no sealed file."""
+
+import pandas as pd
+
+from elastocal.blind.follow_up import LADDER, MOST, POSES, followed_up
+from elastocal.frames import write_csv
+from elastocal.json_files import read_json
+from elastocal.loop.proposed import proposed
+
+from job import run
+
+
+def propose_follow_ups(job):
+    frames = [pd.DataFrame({"case": []})]
+    for verdict in followed_up(read_json(job.input.verdicts), MOST[job.params.size]):
+        folder = f"{job.input.blind}/{verdict['campaign']}"
+        frame = proposed(folder, "config/robots", verdict, max(POSES), LADDER, job.params.seed)
+        frames.append(frame.assign(case=verdict["campaign"]))
+    write_csv(job.output.proposals, pd.concat(frames, ignore_index=True))
+
+
+run(propose_follow_ups, snakemake)

@@ -1,0 +1,30 @@
+"""How often the name is right after further poses, proposed or random: what was sealed against what was said then."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
+from elastocal.blind.truths import opened_truths
+from elastocal.frames import write_csv
+from elastocal.json_files import read_json
+
+from job import run
+
+
+def score_follow_ups(job):
+    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    truths = opened_truths(files, job.input.manifest)
+    first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}
+    anew = [entry for path in job.input.anew for entry in read_json(path)]
+    proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)
+    cases = followed(truths, first, anew, promised(proposals))
+    one = with_one_effect(cases)
+    write_csv(job.output.cases, cases)
+    write_csv(job.output.rates, rates(cases[one]))
+    write_csv(job.output.separable, rates(cases[one & with_prospects(cases)]))
+    write_csv(job.output.others, rates(cases[~one]))
+    write_csv(job.output.poses, poses_needed(cases[one]))
+
+
+run(score_follow_ups, snakemake)

@@ -1,0 +1,25 @@
+"""The confounding sweep: what was said of near relatives against the angle between them."""
+
+from pathlib import Path
+
+from elastocal.blind.sweep import against_angle, swept
+from elastocal.blind.truths import opened_truths
+from elastocal.figures.style import save
+from elastocal.figures.sweep import sweep
+from elastocal.frames import write_csv
+from elastocal.json_files import read_json
+
+from job import run
+
+
+def score_sweep(job):
+    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
+    cases = swept(opened_truths(files, job.input.manifest), verdicts)
+    table = against_angle(cases)
+    write_csv(job.output.cases, cases)
+    write_csv(job.output.table, table)
+    save(sweep(table), job.output.pdf, job.output.png)
+
+
+run(score_sweep, snakemake)
