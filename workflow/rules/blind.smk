@@ -4,7 +4,7 @@
 seal_cases and score_cases read what is sealed.
 """
 
-BLIND_BLOCKS = {"smoke": 1, "quick": 10, "full": 400}[config["blind"]]
+BLIND_BLOCKS = {"smoke": 1, "quick": 10, "full": 60}[config["blind"]]
 BLIND = [f"{config['blind']}_{number}" for number in range(1, BLIND_BLOCKS + 1)]
 
 
