@@ -135,12 +135,13 @@ def _attribution(name, members, final, others_found, p_values, observations, can
     seen = directions(others, observations, rivals)
     basis = np.linalg.qr(np.concatenate(mine.columns, axis=1))[0]
     explained = basis @ (basis.T @ seen.residual)
+    made = np.linalg.norm(explained)
     rows, total = len(seen.residual), seen.residual @ seen.residual
     rest = total - explained @ explained
     rivals, angles, differences, sizes = [], [], [], []
     for index, (candidate, _) in enumerate(seen.candidates):
         columns = seen.columns[index]
-        share = np.linalg.norm(columns.T @ explained) / np.linalg.norm(explained)
+        share = np.linalg.norm(columns.T @ explained) / made if made else 0.0
         rest_with = total - ((columns.T @ seen.residual) ** 2).sum()
         rivals.append(candidate.key)
         angles.append(np.degrees(np.arccos(min(share, 1.0))))

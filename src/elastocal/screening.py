@@ -185,19 +185,21 @@ def absorbed(found, winner):
     Returns
     -------
     Directions
-        Without the candidates that the winner leaves nothing of.
+        Without the candidates of which the winner, and those before it, leave too little.
     """
     basis = found.columns[winner]
     residual = found.residual - basis @ (basis.T @ found.residual)
-    kept, columns = [], []
+    kept, columns, retained = [], [], []
     for index, old in enumerate(found.columns):
         if found.candidates[index][0].key == found.candidates[winner][0].key:
             continue
         off = old - basis @ (basis.T @ old)
         values, vectors = np.linalg.eigh(off.T @ off)
-        good = values > LEAST_RETAINED**2
+        left = found.retained[index] * np.sqrt(np.clip(values, 0.0, 1.0))
+        good = left > LEAST_RETAINED
         if good.any():
             kept.append(index)
+            retained.append(left[good].max())
             columns.append(off @ (vectors[:, good] / np.sqrt(values[good])))
     return replace(
         found,
@@ -205,7 +207,7 @@ def absorbed(found, winner):
         model=np.concatenate([found.model, basis], axis=1),
         candidates=tuple(found.candidates[index] for index in kept),
         columns=tuple(columns),
-        retained=found.retained[kept],
+        retained=np.array(retained),
         noncentrality=found.noncentrality[kept],
     )
 
