@@ -90,6 +90,11 @@ class Fit:
         """Rows of the tame observations less fitted parameters."""
         return self.degrees_of_freedom - int((~self.tame).sum()) * self.model.rows
 
+    def values_of(self, key):
+        """Linear parameters and shapes of one effect."""
+        number = [effect.key for effect in self.model.effects].index(key)
+        return self.estimate.coefficients[number], self.estimate.shapes[number]
+
     def whitened(self, values):
         """Rows (M, rows, ...) weighted and whitened as in the fit."""
         weights = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))

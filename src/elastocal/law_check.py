@@ -104,8 +104,7 @@ def circumstances_of_a_law(circumstances, joints):
 
 def _varied(final, member, name, weight):
     """What an effect makes at its fitted size, times a circumstance, as a candidate of its own."""
-    number = [effect.key for effect in final.model.effects].index(member.key)
-    values, shapes = final.estimate.coefficients[number], final.estimate.shapes[number]
+    values, shapes = final.values_of(member.key)
 
     def displacement(circumstances):
         made = {}

@@ -147,16 +147,14 @@ def _rows(model, estimate, bare, final, members, rivals, observations):
     line = linearize(model, estimate, observations, around)
     scale = np.array([parameter.plausible for _, parameter in bare.parameters])
     known = (line.sensitivities * scale)[..., ~bare.held]
-    keys = [effect.key for effect in final.model.effects]
 
     def columns(law):
         return effect_columns([law], around, line.coordinate_jacobian, observations.state)
 
     made = 0.0
     for member in members:
-        number = keys.index(member.key)
-        law = (final.model.effects[number], final.estimate.shapes[number])
-        made = made + columns(law) @ final.estimate.coefficients[number]
+        values, shapes = final.values_of(member.key)
+        made = made + columns((member, shapes)) @ values
     jacobian = line.coordinate_jacobian[..., : model.sites.joints]
     whitener = whitening(observations, jacobian, final.noise, final.discrepancy_m)
     found = []

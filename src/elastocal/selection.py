@@ -63,6 +63,20 @@ class Search:
     final: Fit
     effects: tuple = field(default=())
 
+    @property
+    def chosen(self):
+        """Family-wise p-value, cross-validated gain and its standard error of each effect found, by its key.
+
+        What stands for several effects at once was not itself chosen in a look: the least of theirs is its own.
+        """
+        chosen = {
+            look.directions.candidates[look.chosen][0].key: (look.scores.p_family[look.chosen], look.gain, look.gain_std_error)
+            for look in self.looks
+            if look.chosen is not None
+        }
+        least = min(chosen.values(), default=None)
+        return {candidate.key: chosen.get(candidate.key, least) for candidate in self.effects}
+
 
 def search(declared, observations, candidates, replicates, stream, progress=None):
     """Find what a fitted model lacks.
@@ -109,8 +123,7 @@ def search(declared, observations, candidates, replicates, stream, progress=None
         needed = [candidate for candidate in found if _wald(current, candidate) < _DROPPED_LEVEL]
         if len(needed) < len(found):
             found = needed
-            shapes = dict(zip([e.key for e in current.model.effects], current.estimate.shapes, strict=True))
-            current = _refitted(declared, observations, [(candidate, shapes[candidate.key]) for candidate in found])
+            current = _refitted(declared, observations, [(c, current.values_of(c.key)[1]) for c in found])
             break
     strongest = sorted(found, key=lambda candidate: _wald_statistic(current, candidate), reverse=True)
     return Search(tuple(looks), declared, current, tuple(strongest))
@@ -201,13 +214,12 @@ def _simpler(declared, current, observations, found, candidates):
 def _wald_statistic(fitted, candidate):
     """Of the linear parameters, given the shapes: without its law a shape means nothing."""
     mine = parameter_slice(fitted, candidate.key)
-    number = [effect.key for effect in fitted.model.effects].index(candidate.key)
     linear, shapes = np.split(mine, [len(candidate.parameters)])
     free = np.flatnonzero(~fitted.held)
     tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
     if not tested.any():
         return 0.0
-    values = fitted.estimate.coefficients[number][np.isin(linear, free)]
+    values = fitted.values_of(candidate.key)[0][np.isin(linear, free)]
     information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     covariance = np.linalg.inv(information[np.ix_(kept, kept)])[np.ix_(tested[kept], tested[kept])]
     return float(values @ np.linalg.solve(covariance, values))

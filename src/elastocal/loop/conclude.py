@@ -93,13 +93,7 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
         "verdict": said,
         "effects": [_fault_entry(fault) for fault in decisive]
         + [_effect_entry(attribution, doubts, final, gains) for attribution in attributions],
-        "noise": {
-            "source": noise_facts["noise"]["source"],
-            "position_m": noise_facts["noise"]["position_m"],
-            "orientation_rad": noise_facts["noise"]["orientation_rad"],
-            "joint_rad": noise_facts["noise"]["joint_rad"],
-            "degrees_of_freedom": noise_facts["noise"]["degrees_of_freedom"],
-        },
+        "noise": noise_facts["noise"],
         "lack_of_fit": {
             "before": _fit_entry(before),
             "after": _fit_entry(after),
@@ -138,8 +132,7 @@ def _effect_entry(attribution, doubts, final, gains):
 
 
 def _parameters(member, final):
-    number = [effect.key for effect in final.model.effects].index(member.key)
-    values = np.concatenate([final.estimate.coefficients[number], final.estimate.shapes[number]])
+    values = np.concatenate(final.values_of(member.key))
     mine = parameter_slice(final, member.key)
     named = (*member.parameters, *member.shapes)
     return [

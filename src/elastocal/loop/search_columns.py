@@ -53,14 +53,7 @@ def look_blocks(looks, candidates):
 
 def found_columns(search):
     """Columns of the found table."""
-    chosen = {}
-    for look in search.looks:
-        if look.chosen is not None:
-            key = look.directions.candidates[look.chosen][0].key
-            chosen[key] = look.scores.p_family[look.chosen], look.gain, look.gain_std_error
-    # What stands for several effects at once was not itself chosen in a look: the least of theirs is its p-value.
-    least = min(chosen.values(), default=None)
-    rows = np.array([chosen.get(candidate.key, least) for candidate in search.effects]).reshape(-1, 3)
+    rows = np.array(list(search.chosen.values())).reshape(-1, 3)
     return candidate_columns(search.effects) | dict(zip(("p_family", "gain", "gain_std_error"), rows.T, strict=True))
 
 

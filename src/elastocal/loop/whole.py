@@ -43,12 +43,7 @@ def diagnosed(folder, robots_folder, replicates, seed):
     candidates = [] if any(fault.decisive for fault in known_faults) else everything
     draws = stream(seed, case.campaign.name, "signs of poses", 0)
     found = search(declared, case.observations, candidates, replicates, draws)
-    p_values = {}
-    for look in found.looks:
-        if look.chosen is not None:
-            p_values[look.directions.candidates[look.chosen][0].key] = float(look.scores.p_family[look.chosen])
-    least = min(p_values.values(), default=1.0)
-    p_values = {candidate.key: p_values.get(candidate.key, least) for candidate in found.effects}
+    p_values = {key: float(p_value) for key, (p_value, _, _) in found.chosen.items()}
     attributions = attribute(found.final, found.effects, p_values, case.observations, everything)
     departures = doubts(found.final, found.effects, case.observations, replicates, stream(seed, case.campaign.name, "laws", 0))
     groups = {name: list(members) for name, members in by_effect(found.effects).items()}
