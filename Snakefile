@@ -15,6 +15,7 @@ include: "workflow/rules/loop.smk"
 include: "workflow/rules/loop_report.smk"
 include: "workflow/rules/blind.smk"
 include: "workflow/rules/blind_follow_up.smk"
+include: "workflow/rules/blind_report.smk"
 
 
 rule study:

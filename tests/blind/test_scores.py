@@ -1,10 +1,8 @@
-"""Scores count every case, and a case for what it is."""
+"""A verdict is counted for what it is worth."""
 
-import pandas as pd
 import pytest
-from scipy.stats import beta
 
-from elastocal.blind.scores import confused, outcome, summarized
+from elastocal.blind.scores import outcome
 
 
 def truth(*effects, group="single", level=50.0):
@@ -12,10 +10,8 @@ def truth(*effects, group="single", level=50.0):
     return {"campaign": "case_x", "case": case}
 
 
-def said(word, *names, alternatives=(), before=2e-4, after=1e-4, warnings=()):
-    effects = [{"name": name, "alternatives": list(alternatives)} for name in names]
-    errors = {"before": {"rms_m": before}, "after": {"rms_m": after}}
-    return {"verdict": word, "effects": effects, "heldout": errors, "warnings": list(warnings)}
+def said(word, *names, alternatives=()):
+    return {"verdict": word, "effects": [{"name": name, "alternatives": list(alternatives)} for name in names]}
 
 
 OUTCOMES = {
@@ -40,8 +36,18 @@ OUTCOMES = {
         said("several", "joint_tilt", "payload"),
         {"detected", "exact", "holds_truth"},
     ),
-    "worse in silence": (truth(group="none"), said("adequate", after=3e-4), {"worse_unwarned"}),
-    "worse with a warning": (truth(group="none"), said("adequate", after=3e-4, warnings=["it grew"]), set()),
+    "one effect and another that is not there": (truth("payload"), said("several", "payload", "link_weight"), {"detected"}),
+    "right name that does not explain enough": (truth("payload"), said("unexplained", "payload"), {"detected"}),
+    "two classes that hold both": (
+        truth("payload", "joint_tilt", group="pair"),
+        said("several", "link_weight", "payload", alternatives=["payload@2", "joint_tilt@1"]),
+        {"detected", "holds_truth"},
+    ),
+    "two classes that hold but one": (
+        truth("payload", "joint_tilt", group="pair"),
+        said("several", "link_weight", "link_geometry", alternatives=["payload"]),
+        {"detected"},
+    ),
 }
 
 
@@ -52,17 +58,7 @@ def test_outcome_is(name):
     assert {key for key, value in row.items() if value is True} == expected
 
 
-def test_rates_have_clopper_pearson_intervals():
-    cases = pd.DataFrame(
-        [outcome(truth("payload"), said("named", "payload"))] * 7 + [outcome(truth("payload"), said("adequate"))] * 3
-    )
-    row = summarized(cases).set_index("quantity").loc["detected at non-centrality 50"]
-    assert (row.hits, row.cases, row.target) == (7, 10, ">= 0.97")
-    assert row.low == pytest.approx(beta.ppf(0.025, 7, 4)) and row.high == pytest.approx(beta.ppf(0.975, 8, 3))
-
-
-def test_every_case_is_in_the_confusion():
-    cases = pd.DataFrame([outcome(*entry[:2]) for entry in OUTCOMES.values()])
-    table = confused(cases)
-    assert table.drop(columns="truth").to_numpy().sum() == len(OUTCOMES)
-    assert set(table.truth) == {"payload", "force_bias", "none", "pair"}
+def test_the_robot_of_tuning_is_told_from_those_of_the_proof():
+    document = truth("payload")
+    assert outcome(document, said("adequate"))["robots"] == "proof"
+    assert outcome(document | {"case": document["case"] | {"robot": "kuka"}}, said("adequate"))["robots"] == "tuned"

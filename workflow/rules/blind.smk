@@ -1,7 +1,8 @@
 """The blind proof: sealed cases on an independent plant, diagnosed without their truths, scored with them.
 
-`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole. Writes data/blind/, data/sealed/ and reports/blind/. Only
-seal_cases and score_cases read what is sealed.
+`snakemake -j2 blind` makes the size quick; `--config blind=full` the whole. Writes data/blind/, data/sealed/,
+results/blind/{block}.json and reports/blind/manifest.sha256. What is sealed is read by seal_cases here and, after the diagnosis, by
+oracle_cases, score_cases and score_follow_ups.
 """
 
 BLIND_BLOCKS = {"smoke": 1, "quick": 10, "full": 60}[config["blind"]]
@@ -58,26 +59,3 @@ rule diagnose_cases:
         seed=config["seed"],
     script:
         "../scripts/diagnose_cases.py"
-
-
-rule score_cases:
-    input:
-        sealed=expand(rules.make_cases.output.sealed, block=BLIND),
-        manifest=rules.seal_cases.output.manifest,
-        verdicts=expand(rules.diagnose_cases.output.verdicts, block=BLIND),
-        sources=sources("score_cases.py"),
-    output:
-        cases="reports/blind/cases.csv",
-        summary="reports/blind/summary.csv",
-        confusion="reports/blind/confusion.csv",
-    log:
-        "results/logs/score_cases.log",
-    benchmark:
-        "results/timings/score_cases.tsv"
-    script:
-        "../scripts/score_cases.py"
-
-
-rule blind:
-    input:
-        rules.score_cases.output,

@@ -4,7 +4,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from elastocal.blind.scores import confused, outcome, summarized
+from elastocal.blind.case_rows import case_row
+from elastocal.blind.confusion import confused
+from elastocal.blind.coverage import covered, intervals_of
+from elastocal.blind.power import powers, undetectable
+from elastocal.blind.targets import by_setting, summarized
 from elastocal.blind.truths import opened_truths
 from elastocal.frames import write_csv
 from elastocal.json_files import read_json
@@ -13,12 +17,18 @@ from job import run
 
 
 def score_cases(job):
-    files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
+    truths = opened_truths([file for folder in job.input.sealed for file in Path(folder).glob("*.json")], job.input.manifest)
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
-    cases = pd.DataFrame([outcome(truth, verdicts[name]) for name, truth in opened_truths(files, job.input.manifest).items()])
+    oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
+    cases = pd.DataFrame([case_row(truth, verdicts[name], oracles[name]) for name, truth in truths.items()])
+    intervals = pd.DataFrame([row for name, truth in truths.items() for row in intervals_of(truth, verdicts[name])])
     write_csv(job.output.cases, cases)
-    write_csv(job.output.summary, summarized(cases))
+    write_csv(job.output.summary, summarized(cases, intervals, job.params.seed))
+    write_csv(job.output.settings, by_setting(cases))
     write_csv(job.output.confusion, confused(cases))
+    write_csv(job.output.power, powers(cases))
+    write_csv(job.output.coverage, covered(intervals))
+    write_csv(job.output.undetectable, undetectable(cases))
 
 
 run(score_cases, snakemake)

@@ -1,18 +1,15 @@
-"""Scores of blind cases: what was sealed against what was said."""
+"""What the verdict on a case is worth, given its truth."""
 
-import pandas as pd
-from statsmodels.stats.proportion import proportion_confint
+import numpy as np
+from scipy.optimize import linear_sum_assignment
 
-SILENT = ("adequate", "not_testable")
-# As the issue sets them, by what is counted and the non-centrality.
-_TARGETS = {
-    ("detected", 25.0): ">= 0.80",
-    ("detected", 50.0): ">= 0.97",
-    ("class", 50.0): ">= 0.95",
-    ("name", 200.0): ">= 0.95",
-    ("outside", 200.0): "<= 0.15",
-    ("pair", 200.0): ">= 0.85",
-}
+from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
+
+# The robot on which the method was tuned, apart from those on which it is proved.
+TUNED_ON = ("kuka",)
+TUNED, PROOF = "tuned", "proof"
+NONE = "none"
+SILENT = (ADEQUATE, NOT_TESTABLE)
 
 
 def outcome(truth, verdict):
@@ -28,83 +25,36 @@ def outcome(truth, verdict):
     Returns
     -------
     dict
-        One row of cases.csv.
+        Of the case: where it belongs, what was true, what was said. ``exact`` says that the names found are the true ones,
+        ``named_right`` that this was said without alternatives, ``holds_truth`` that as many effects were found as were made
+        and each true one is the name of another of them or among its alternatives, ``wrong_name`` that one wrong name was said
+        alone.
     """
-    case = truth["case"]
-    names = [effect["name"] for effect in verdict["effects"]]
-    alternatives = {key.split("@")[0].split("[")[0] for effect in verdict["effects"] for key in effect["alternatives"]}
-    true = set(case["effects"])
-    held = verdict["heldout"]
+    case, said = truth["case"], verdict["verdict"]
+    names, true = [effect["name"] for effect in verdict["effects"]], list(case["effects"])
+    stated = bool(true) and said in (NAMED, CLASS, SEVERAL)
+    right = stated and sorted(names) == sorted(true)
     return {
         "case": truth["campaign"],
         "group": case["group"],
         "robot": case["robot"],
+        "robots": TUNED if case["robot"] in TUNED_ON else PROOF,
         "setting": case["setting"],
-        "truth": " + ".join(case["effects"]) or "none",
+        "truth": " + ".join(true) or NONE,
         "level": max(case["levels"], default=0.0),
-        "verdict": verdict["verdict"],
-        "found": " + ".join(names) or "none",
-        "detected": verdict["verdict"] not in SILENT,
-        "exact": verdict["verdict"] in ("named", "class", "several") and set(names) == true,
-        "named_right": verdict["verdict"] == "named" and set(names) == true,
-        "holds_truth": bool(true) and true <= set(names) | alternatives,
-        "wrong_name": verdict["verdict"] == "named" and set(names) != true,
-        "worse_unwarned": held["after"]["rms_m"] > held["before"]["rms_m"] and not verdict["warnings"],
+        "verdict": said,
+        "found": " + ".join(names) or NONE,
+        "detected": said not in SILENT,
+        "exact": right,
+        "named_right": right and said == NAMED,
+        "holds_truth": stated and _each_is_held(true, verdict["effects"]),
+        "wrong_name": said == NAMED and names != true,
     }
 
 
-def summarized(cases):
-    """Rates with Clopper-Pearson intervals.
-
-    Parameters
-    ----------
-    cases : pandas.DataFrame
-        Of `outcome`.
-
-    Returns
-    -------
-    pandas.DataFrame
-    """
-    single = cases[(cases.group == "single") & (cases.truth != "force_scale")]
-    rows = [_rate("false alarms with no effect", cases[cases.truth.eq("none")], "detected", "upper limit < 0.08")]
-    for level, part in single.groupby("level"):
-        at, found = f"at non-centrality {level:g}", part[part.detected]
-        rows.append(_rate(f"detected {at}", part, "detected", _TARGETS.get(("detected", level), "")))
-        rows.append(
-            _rate(f"right name or class, given detection, {at}", found, "holds_truth", _TARGETS.get(("class", level), ""))
-        )
-        rows.append(_rate(f"right name alone {at}", part, "named_right", _TARGETS.get(("name", level), "")))
-    for level, part in cases[cases.group == "outside"].groupby("level"):
-        target = _TARGETS.get(("outside", level), "")
-        rows.append(_rate(f"wrong single name, truth outside, at {level:g}", part, "wrong_name", target))
-    for level, part in cases[cases.group == "pair"].groupby("level"):
-        rows.append(_rate(f"both of two effects at {level:g} each", part, "exact", _TARGETS.get(("pair", level), "")))
-    rows.append(_rate("held-out error worse without a warning", cases, "worse_unwarned", "none"))
-    return pd.DataFrame(rows)
-
-
-def confused(cases):
-    """Truth against what was said, as counts.
-
-    Returns
-    -------
-    pandas.DataFrame
-        One row a truth, one column a word of the verdict with what was found.
-    """
-    said = cases.verdict.where(~cases.verdict.isin(("named", "class")), cases.verdict + " " + cases.found)
-    truth = cases.truth.where(cases.group != "pair", "pair")
-    return pd.crosstab(truth, said).reset_index()
-
-
-def _rate(name, part, column, target):
-    hits, trials = int(part[column].sum()), len(part)
-    low, high = proportion_confint(hits, trials, 0.05, "beta") if trials else (0.0, 1.0)
-    return {
-        "quantity": name,
-        "hits": hits,
-        "cases": trials,
-        "rate": hits / trials if trials else float("nan"),
-        "low": 0.0 if hits == 0 else low,
-        "high": 1.0 if hits == trials else high,
-        "target": target,
-    }
+def _each_is_held(true, effects):
+    if len(true) != len(effects):
+        return False
+    meant = [{effect["name"], *(key.split("@")[0].split("[")[0] for key in effect["alternatives"])} for effect in effects]
+    held = np.array([[name in names for names in meant] for name in true], bool)
+    return bool(held[linear_sum_assignment(~held)].all())

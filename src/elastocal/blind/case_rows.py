@@ -1,0 +1,109 @@
+"""One row a case: what the verdict is worth, how large the effect was, which errors were left, and what the oracle did."""
+
+import numpy as np
+from scipy.stats import norm
+
+from elastocal.blind.scores import outcome
+from elastocal.plant.defects import KINDS
+
+# Effects that lie wholly within another effect or the joint compliances. The source is the list of exact aliases in section 1.2
+# of the methods brief; those of it are left out that a known frame, known targets and points at the elbow and wrist resolve:
+# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm. By effect
+# and joints of the truth, with what it cannot be told from.
+EXACT_ALIASES = {
+    ("force_scale", ()): "joint_compliance",
+    ("compensator_torque", (2,)): "transmission_harmonic",
+    ("transmission_harmonic", (2,)): "compensator_torque",
+    ("link_weight", (2,)): "compensator_torque",
+    ("compensator_stiffness", (2,)): "joint_dependent_stiffness",
+    ("joint_dependent_stiffness", (2,)): "compensator_stiffness",
+}
+_STD_ERRORS = 2.0
+_COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
+
+
+def case_row(truth, verdict, oracle):
+    """Everything that the scores count of a case.
+
+    Parameters
+    ----------
+    truth : dict
+        A sealed document.
+    verdict : dict
+        As verdict.json.
+    oracle : dict or None
+        Of `oracle.oracle`.
+
+    Returns
+    -------
+    dict
+        One row of cases.csv.
+    """
+    defects, unrecorded = truth["defects"], _COVARIATES - set(truth["design"]["covariates"])
+    return (
+        outcome(truth, verdict)
+        | {
+            "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
+            "right_place": _places(truth) == _found_places(verdict),
+            # By the truth alone.
+            "exact_alias": any((defect["effect"], tuple(defect["joints"])) in EXACT_ALIASES for defect in defects),
+            "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
+        }
+        | _size(truth)
+        | _errors(verdict)
+        | _of_oracle(oracle)
+    )
+
+
+def _size(truth):
+    """How large the effects are; for several the squares add up."""
+    defects, noise = truth["defects"], truth["noise"]
+    raw, retained = (sum(defect["signal"][kind] for defect in defects) for kind in ("raw", "retained"))
+    rms_m = float(np.sqrt(sum(defect["signal"]["rms_m"] ** 2 for defect in defects)))
+    return {
+        # Of what all these effects' levels are the non-centrality.
+        "level_of": "raw" if any(defect["of"] == "raw" for defect in defects) else "retained",
+        "raw": raw,
+        "retained": retained,
+        "signal_rms_m": rms_m,
+        "signal_over_noise": rms_m / (np.sqrt(3.0) * noise["sigma_m"]),
+        "times_plausible": max((defect["share_of_plausible"] for defect in defects), default=np.nan),
+    }
+
+
+def _places(truth):
+    return sorted((defect["effect"], tuple(defect["joints"])) for defect in truth["defects"])
+
+
+def _found_places(verdict):
+    return sorted((effect["name"], tuple(effect["joints"])) for effect in verdict["effects"])
+
+
+def _errors(verdict):
+    """Held-out errors, and whether they got worse by more than chance without a word."""
+    held = verdict["heldout"]
+    before, after = held["before"]["rms_m"], held["after"]["rms_m"]
+    low, high = held["reduction_ci95"]
+    reduction, std_error = 1.0 - after / before, (high - low) / (2.0 * norm.ppf(0.975))
+    warned = any("held-out" in warning for warning in verdict["warnings"])
+    worse = reduction + _STD_ERRORS * std_error < 0.0
+    return {
+        "before_rms_m": before,
+        "after_rms_m": after,
+        "noise_floor_rms_m": np.nan if held["noise_floor_rms_m"] is None else held["noise_floor_rms_m"],
+        "reduction": reduction,
+        "reduction_std_error": std_error,
+        "worse": worse,
+        "warned": warned,
+        "worse_unwarned": worse and not warned,
+    }
+
+
+def _of_oracle(oracle):
+    if oracle is None:
+        return {"oracle_p_value": np.nan, "oracle_detected": np.nan, "oracle_rms_m": np.nan}
+    return {
+        "oracle_p_value": oracle["p_value"],
+        "oracle_detected": float(oracle["detected"]),
+        "oracle_rms_m": oracle["heldout"]["rms_m"],
+    }

@@ -1,0 +1,41 @@
+"""Truth against what was said, as counts."""
+
+import pandas as pd
+
+from elastocal.effects.catalogue import effects
+from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
+
+PAIR = "pair"
+CLASS_WITH, CLASS_WITHOUT = "class with the truth", "class without the truth"
+FAULT = "named: fault of the data"
+WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE)
+
+
+def confused(cases):
+    """Truth against what was said.
+
+    Parameters
+    ----------
+    cases : pandas.DataFrame
+        Of `case_rows.case_row`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each kind of robots, setting (usual or hard), truth and level; one column for each name of the catalogue
+        said alone and for each other word, all of them always there, so that every row adds up to its cases.
+    """
+    names = [*effects()]
+    said = [_said(row, names) for row in cases.itertuples()]
+    setting = cases.setting.where(cases.setting == "usual", "hard")
+    truth = cases.truth.where(cases.group != PAIR, PAIR)
+    table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(said, cases.index, name="said"))
+    return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})
+
+
+def _said(row, names):
+    if row.verdict == NAMED:
+        return row.found if row.found in names else FAULT
+    if row.verdict == CLASS:
+        return CLASS_WITH if row.holds_truth else CLASS_WITHOUT
+    return row.verdict

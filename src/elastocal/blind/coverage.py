@@ -1,0 +1,108 @@
+"""How often 95 % intervals of parameters hold the truth."""
+
+import numpy as np
+import pandas as pd
+from scipy.stats import norm
+from scipy.stats import t as t_distribution
+
+from elastocal.blind.rates import rate
+from elastocal.blind.scores import NONE, PROOF, TUNED, TUNED_ON
+
+COMPLIANCE = "joint_compliance"
+EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"
+# How far a parameter of the plant is the catalogue's own; what is in neither list is it exactly.
+_FIRST_ORDER = ("link_geometry", "payload", "force_misalignment", "force_bias", "application_point", "base_compliance")
+_KEYS = ("kind", "effect", "comparable", "parameter", "level")
+_OTHER_LAW = ("lost_motion", "hysteresis")
+
+
+def intervals_of(truth, verdict):
+    """Every interval of a verdict that has a true value to hold.
+
+    Parameters
+    ----------
+    truth : dict
+        A sealed document.
+    verdict : dict
+        As verdict.json.
+
+    Returns
+    -------
+    list of dict
+        Joint compliances where there is no effect, whatever was said, or where the right one was found; parameters of an
+        effect where the right one was found at the right joints. A parameter that the data could not tell has no interval.
+    """
+    case, found = truth["case"], verdict["effects"]
+    right = sorted(effect["name"] for effect in found) == sorted(case["effects"])
+    if case["effects"] and not right:
+        return []
+    freedom = verdict["noise"]["degrees_of_freedom"]
+    width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
+    head = {
+        "robots": TUNED if case["robot"] in TUNED_ON else PROOF,
+        "setting": case["setting"],
+        "truth": " + ".join(case["effects"]) or NONE,
+        "level": max(case["levels"], default=0.0),
+    }
+    values = [
+        (COMPLIANCE, f"c{joint}", EXACT, true, value, error)
+        for joint, (true, value, error) in enumerate(_compliances(truth, verdict), 1)
+        if error > 0
+    ]
+    for defect in truth["defects"]:
+        for effect in found:
+            if (effect["name"], effect["joints"]) == (defect["effect"], defect["joints"]):
+                values += _comparable(defect, effect)
+    return [
+        head
+        | {"effect": effect, "parameter": name, "comparable": how, "true": true, "value": value, "std_error": error}
+        | {"holds": bool(abs(value - true) <= width * error)}
+        for effect, name, how, true, value, error in values
+    ]
+
+
+def covered(intervals):
+    """Shares of intervals that hold the truth.
+
+    Parameters
+    ----------
+    intervals : pandas.DataFrame
+        Rows of `intervals_of`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each kind of robots, effect, parameter and level, with ``all`` for parameters and levels together. Joint
+        compliances are apart: of cases without an effect in the usual setting, and of those in which the right one was found.
+    """
+    if not len(intervals):
+        return pd.DataFrame(columns=["robots", *_KEYS, *rate([])])
+    of_springs = intervals.effect == COMPLIANCE
+    kind = np.where(
+        ~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", "compliance, effect found")
+    )
+    rows = intervals.assign(kind=kind)[intervals.setting == "usual"]
+    whole = rows.assign(parameter="all")
+    together = pd.concat(
+        [rows.assign(level="all"), whole, whole.assign(level="all"), whole.assign(level="all", effect="all", comparable="all")]
+    )
+    together["level"] = [level if level == "all" else f"{level:g}" for level in together.level]
+    found = []
+    for keys, part in together.groupby(["robots", *_KEYS]):
+        found.append(dict(zip(("robots", *_KEYS), keys, strict=True)) | rate(part.holds))
+    return pd.DataFrame(found)
+
+
+def _compliances(truth, verdict):
+    stated = verdict["compliance_urad_per_Nm"]
+    return zip(truth["compliance_urad_per_Nm"], stated["after"], stated["std_error"], strict=True)
+
+
+def _comparable(defect, effect):
+    how = OTHER_LAW if defect["effect"] in _OTHER_LAW else FIRST_ORDER if defect["effect"] in _FIRST_ORDER else EXACT
+    found = []
+    for parameter in effect["parameters"]:
+        name = parameter["name"].rpartition(" ")[2]
+        if name in defect["parameters"] and not parameter["held"]:
+            found.append((defect["effect"], name, how, defect["parameters"][name], parameter["value"], parameter["std_error"]))
+    return found

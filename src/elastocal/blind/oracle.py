@@ -1,0 +1,130 @@
+"""The oracle: what the same fit does when it is told which effects there are and at which joints.
+
+It has the readings, the noise and the held-out poses of the diagnosis, so that what it does better is worth what the search for
+the effect has cost. It is told the effect by its name in the catalogue, not the plant's law; nor which variant of it (axes, by
+time or by temperature): of these it takes the one that the residual of the declared model speaks for.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from elastocal.fitting import fit
+from elastocal.loop.case import case_from, noise_from
+from elastocal.loop.intake import taken_in
+from elastocal.loop.judge import Step, judged
+from elastocal.loop.reading_columns import reading_columns
+from elastocal.plant.defects import OUTSIDE
+from elastocal.screening import directions
+from elastocal.selection import parameter_slice
+
+LEVEL = 0.05
+
+
+def oracle(truth, verdict, folder, robots_folder, seed):
+    """What knowing the effects is worth in one case.
+
+    Parameters
+    ----------
+    truth : dict
+        A sealed document.
+    verdict : dict
+        Of the same case; its noise is used again.
+    folder, robots_folder : str
+        As in `campaign.read_campaign`.
+    seed : int
+
+    Returns
+    -------
+    dict or None
+        ``candidates`` that the model was given; ``p_value`` of a Wald test of all their coefficients at once (chi-squared, with
+        the covariance of the fit; a fitted shape counts as one more degree of freedom, and the p-value is multiplied by the
+        number of variants), 1 where these data can tell none of them; ``detected`` at 5 %; ``heldout``, errors on the held-out
+        poses as in verdict.json. None where an effect is outside of the catalogue: no model of it has that effect.
+    """
+    effects = [(defect["effect"], tuple(defect["joints"])) for defect in truth["defects"]]
+    if any(effect.startswith(OUTSIDE) for effect, _ in effects):
+        return None
+    if not effects:
+        # Without an effect the declared model is the right one, and has been judged already.
+        return _told((), 1.0, verdict["heldout"]["before"])
+    descriptions, training, held_out = taken_in(folder, robots_folder)
+    case = case_from(descriptions, reading_columns(training))
+    unseen = case_from(descriptions["held_out"] or descriptions, reading_columns(held_out))
+    declared = fit(case.model, case.observations, noise_from(verdict))
+    fitted, members, variants = _with_effects(declared, case, effects)
+    p_value = min(variants * _wald(fitted, members), 1.0)
+    found = judged([Step("oracle", "declared", fitted)], case, unseen, seed)
+    return _told(members, p_value, found.heldout["before"])
+
+
+def members_of(effect, joints, candidates):
+    """Candidates that an effect at some joints consists of, for each of its variants.
+
+    Parameters
+    ----------
+    effect : str
+    joints : tuple of int
+        From 1; empty where the effect is no joint's.
+    candidates : iterable of Candidate
+
+    Returns
+    -------
+    list of list of Candidate
+        One variant each. Bands of orders of one joint are no variants but parts.
+    """
+    mine = [c for c in candidates if c.effect == effect and bool(c.joints) == bool(joints) and set(c.joints) <= set(joints)]
+    if joints:
+        return [mine] if mine else []
+    return [[candidate] for candidate in mine]
+
+
+def _with_effects(declared, case, effects):
+    """Fit with the effects, their candidates, and among how many variants these were chosen."""
+    chosen, variants = [], 1
+    for effect, joints in effects:
+        listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
+        seen = directions(declared, case.observations, listed, 0.0, 0.0)
+        # Each at the shape that fits best.
+        best = {}
+        for (candidate, shapes), columns in zip(seen.candidates, seen.columns, strict=True):
+            told = float(((columns.T @ seen.residual) ** 2).sum())
+            if told > best.get(candidate.key, (-1.0,))[0]:
+                best[candidate.key] = told, candidate, shapes
+        alternatives = [[best[m.key] for m in members if m.key in best] for members in members_of(effect, joints, listed)]
+        alternatives = [members for members in alternatives if members]
+        if alternatives:
+            variants *= len(alternatives)
+            chosen += max(alternatives, key=lambda members: sum(told for told, _, _ in members))
+    if not chosen:
+        return declared, (), 1
+    members = tuple(candidate for _, candidate, _ in chosen)
+    start = declared.estimate.with_effects(members)
+    start = replace(start, shapes=(*declared.estimate.shapes, *(np.array(shapes, float) for _, _, shapes in chosen)))
+    model = declared.model.with_effects(members)
+    return fit(model, case.observations, declared.noise, start, None, declared.discrepancy_m), members, variants
+
+
+def _wald(fitted, members):
+    coefficients, shapes = [], 0
+    for member in members:
+        mine = parameter_slice(fitted, member.key)
+        coefficients += [index for index in mine[: len(member.parameters)] if not fitted.held[index]]
+        shapes += int((~fitted.held[mine[len(member.parameters) :]]).sum())
+    if not coefficients:
+        return 1.0
+    keys = [effect.key for effect in fitted.model.effects]
+    values = np.concatenate([fitted.estimate.coefficients[keys.index(member.key)] for member in members])
+    free = np.concatenate([~fitted.held[parameter_slice(fitted, m.key)[: len(m.parameters)]] for m in members])
+    covariance = fitted.covariance[np.ix_(coefficients, coefficients)]
+    return float(chi2.sf(values[free] @ np.linalg.solve(covariance, values[free]), len(coefficients) + shapes))
+
+
+def _told(members, p_value, heldout):
+    return {
+        "candidates": [member.key for member in members],
+        "p_value": p_value,
+        "detected": p_value < LEVEL,
+        "heldout": heldout,
+    }

@@ -1,0 +1,33 @@
+"""Shares of cases with their intervals."""
+
+from statsmodels.stats.proportion import proportion_confint
+
+
+def rate(hits):
+    """A share with its Clopper-Pearson interval of 95 %.
+
+    Parameters
+    ----------
+    hits : iterable of bool
+        One a case.
+
+    Returns
+    -------
+    dict
+        ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the interval all there is.
+    """
+    hits = [bool(hit) for hit in hits]
+    count, cases = sum(hits), len(hits)
+    low, high = proportion_confint(count, cases, 0.05, "beta") if cases else (0.0, 1.0)
+    return {
+        "hits": count,
+        "cases": cases,
+        "rate": count / cases if cases else float("nan"),
+        "low": 0.0 if count == 0 else float(low),
+        "high": 1.0 if count == cases else float(high),
+    }
+
+
+def headed(head, found):
+    """The figures of a rate under a name: ``<head>``, ``<head>_low``, ``<head>_high``."""
+    return {head: found["rate"], f"{head}_low": found["low"], f"{head}_high": found["high"]}

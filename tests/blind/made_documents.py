@@ -1,0 +1,80 @@
+"""Truths, verdicts and oracles of blind cases as documents, without making any case."""
+
+import pandas as pd
+
+from elastocal.blind.case_rows import case_row
+
+JOINTS = 6
+
+
+def truth(*places, group="single", level=50.0, robot="fanuc", setting="usual", **changes):
+    """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
+    defects = [
+        {
+            "effect": effect,
+            "joints": list(joints),
+            "of": "retained",
+            "share_of_plausible": 0.5,
+            "signal": {"raw": 4 * level, "retained": level, "rms_m": 6e-5, "rms_rad": 6e-5},
+            "parameters": {},
+        }
+        for effect, *joints in places
+    ]
+    case = {
+        "group": group if places else "none",
+        "robot": robot,
+        "setting": setting,
+        "effects": [defect["effect"] for defect in defects],
+        "levels": [level] * len(defects),
+    }
+    return {
+        "campaign": "case_x",
+        "case": case,
+        "defects": defects,
+        "design": {"covariates": ["approach", "time", "temperature"]},
+        "noise": {"sigma_m": 6e-5, "sigma_m_per_m": 0.0, "sigma_rad": 6e-5},
+        "compliance_urad_per_Nm": [1.0] * JOINTS,
+    } | changes
+
+
+def effect(name, *joints, parameters=(), alternatives=()):
+    """An effect of a verdict; a parameter is a name with its value and its standard error."""
+    return {
+        "name": name,
+        "joints": list(joints),
+        "alternatives": list(alternatives),
+        "parameters": [
+            {"name": f"{name}@ {key}", "value": value, "std_error": error, "held": error == 0}
+            for key, value, error in parameters
+        ],
+    }
+
+
+def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warnings=(), compliance=1.0, freedom=0):
+    """What was said."""
+    return {
+        "verdict": word,
+        "effects": list(effects),
+        "heldout": {
+            "before": {"rms_m": before},
+            "after": {"rms_m": after},
+            "noise_floor_rms_m": 1e-4,
+            "reduction_ci95": list(reduction),
+        },
+        "noise": {"degrees_of_freedom": freedom},
+        "warnings": list(warnings),
+        "compliance_urad_per_Nm": {"after": [compliance] * JOINTS, "std_error": [0.1] * JOINTS},
+    }
+
+
+def silence(**changes):
+    return verdict("adequate", before=1e-4, after=1e-4, reduction=(0.0, 0.0), **changes)
+
+
+def oracle(p_value=1e-6, rms=1e-4):
+    return {"candidates": [], "p_value": p_value, "detected": p_value < 0.05, "heldout": {"rms_m": rms}}
+
+
+def frame(*entries):
+    """Rows of cases.csv of (truth, verdict, oracle)."""
+    return pd.DataFrame([case_row(*entry) for entry in entries])

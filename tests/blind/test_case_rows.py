@@ -1,0 +1,68 @@
+"""One row a case: sizes, aliases by the truth, and errors that got worse in silence."""
+
+import numpy as np
+import pytest
+from made_documents import effect, oracle, silence, truth, verdict
+
+from elastocal.blind.case_rows import EXACT_ALIASES, case_row
+
+
+def test_right_place_is_the_right_effect_at_the_right_joints():
+    document = truth(("joint_offset", 3))
+    assert case_row(document, verdict("named", effect("joint_offset", 3)), oracle())["right_place"]
+    assert not case_row(document, verdict("named", effect("joint_offset", 4)), oracle())["right_place"]
+
+
+@pytest.mark.parametrize(
+    ("said", "expected"),
+    [
+        (verdict("named", before=1e-4, after=1.1e-4, reduction=(-0.14, -0.06)), (True, False, True)),
+        (
+            verdict("named", before=1e-4, after=1.1e-4, reduction=(-0.14, -0.06), warnings=["the held-out rms grew"]),
+            (True, True, False),
+        ),
+        # A word about something else is no warning of this.
+        (verdict("named", before=1e-4, after=1.1e-4, reduction=(-0.14, -0.06), warnings=["few repeats"]), (True, False, True)),
+        (verdict("named", before=1e-4, after=1.1e-4, reduction=(-0.25, 0.05)), (False, False, False)),
+        (silence(), (False, False, False)),
+    ],
+)
+def test_worse_is_beyond_two_standard_errors(said, expected):
+    row = case_row(truth(("payload",)), said, oracle())
+    assert (row["worse"], row["warned"], row["worse_unwarned"]) == expected
+
+
+def test_standard_error_is_that_of_the_interval():
+    row = case_row(truth(("payload",)), verdict("named", reduction=(0.5 - 0.196, 0.5 + 0.196)), oracle())
+    assert row["reduction"] == pytest.approx(0.5)
+    assert row["reduction_std_error"] == pytest.approx(0.1, rel=1e-3)
+
+
+def test_exact_aliases_are_told_by_the_truth_and_its_joints():
+    rows = [
+        case_row(truth(place), said, oracle())["exact_alias"]
+        for place in (("transmission_harmonic", 2), ("transmission_harmonic", 3), ("link_weight", 2), ("link_weight", 2, 3))
+        for said in (silence(), verdict("named", effect(*place)))
+    ]
+    assert rows == [True, True, False, False, True, True, False, False]
+    assert ("force_scale", ()) in EXACT_ALIASES
+
+
+def test_size_is_given_against_the_noise():
+    row = case_row(truth(("payload",), level=50.0), silence(), oracle())
+    assert (row["raw"], row["retained"], row["level_of"]) == (200.0, 50.0, "retained")
+    # 60 µm in all directions together, against 60 µm in each.
+    assert row["signal_over_noise"] == pytest.approx(1 / np.sqrt(3))
+    pair = case_row(truth(("payload",), ("joint_tilt", 2), group="pair"), silence(), oracle())
+    assert pair["signal_over_noise"] == pytest.approx(np.sqrt(2 / 3))
+
+
+def test_an_effect_without_its_covariate_is_hidden():
+    blind = {"covariates": ["time", "temperature"]}
+    assert case_row(truth(("hysteresis", 1), design=blind), silence(), oracle())["hidden"]
+    assert not case_row(truth(("frame_drift",), design=blind), silence(), oracle())["hidden"]
+
+
+def test_outside_of_the_catalogue_there_is_no_oracle():
+    row = case_row(truth(("outside:refraction",), group="outside"), silence(), None)
+    assert np.isnan(row["oracle_rms_m"]) and np.isnan(row["oracle_detected"])

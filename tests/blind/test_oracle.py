@@ -1,0 +1,82 @@
+"""The oracle knows the effect and its joints, and is judged like the engine."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
+
+from elastocal.blind.cases import Case, make_case
+from elastocal.blind.oracle import members_of, oracle
+from elastocal.effects.catalogue import candidates_on
+from elastocal.loop.whole import diagnosed
+from elastocal.sites import sites_of
+
+ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
+
+
+def keys(effect, joints, chain):
+    return [[c.key for c in members] for members in members_of(effect, joints, candidates_on(sites_of(chain)).values())]
+
+
+def test_members_are_the_candidates_at_the_true_joints(kuka):
+    assert keys("joint_offset", (3,), kuka.chain) == [["joint_offset@3"]]
+    assert keys("cross_compliance", (2, 5), kuka.chain) == [["cross_compliance@2+5"]]
+    assert keys("link_weight", (2, 3), kuka.chain) == [["link_weight@2", "link_weight@3"]]
+    assert keys("link_elasticity", (2,), kuka.chain) == [["link_elasticity@2"]]
+
+
+def test_frames_of_a_load_error_are_variants_and_bands_of_orders_are_parts(kuka):
+    assert keys("force_bias", (), kuka.chain) == [["force_bias[base axes]"], ["force_bias[flange axes]"]]
+    (bands,) = keys("transmission_harmonic", (4,), kuka.chain)
+    assert len(bands) == 7
+
+
+def made(folder, *effects, level=200.0, setting="usual"):
+    """A case of a seed of its own: its truth and its folder."""
+    case = Case("/".join((*effects, setting)), "single", "kuka", effects, (level,) * len(effects), setting, 271828)
+    make_case(case, folder / "blind", folder / "sealed", ROBOTS)
+    truth = json.loads((folder / "sealed" / f"{case.name}.json").read_text(encoding="utf-8"))
+    return truth, (folder / "blind" / case.name).as_posix()
+
+
+@pytest.fixture(scope="module")
+def offset(tmp_path_factory):
+    truth, folder = made(tmp_path_factory.mktemp("offset"), "joint_offset")
+    return truth, folder, diagnosed(folder, ROBOTS.as_posix(), 200, 1)
+
+
+def test_what_the_engine_names_rightly_the_oracle_fits_the_same(offset):
+    truth, folder, verdict = offset
+    assert [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
+    found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
+    assert found["candidates"] == [f"joint_offset@{truth['defects'][0]['joints'][0]}"]
+    assert found["detected"] and found["p_value"] < 1e-6
+    assert found["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=1e-4)
+
+
+def test_without_an_effect_it_is_the_declared_model(offset):
+    _, folder, verdict = offset
+    found = oracle({"defects": []}, verdict, folder, ROBOTS.as_posix(), 1)
+    assert found["heldout"] == verdict["heldout"]["before"] and not found["detected"]
+
+
+def test_an_effect_that_is_not_there_is_seldom_detected(offset):
+    """At another joint the same effect explains nothing."""
+    truth, folder, verdict = offset
+    other = truth["defects"][0] | {"effect": "hysteresis", "joints": [6]}
+    assert oracle({"defects": [other]}, verdict, folder, ROBOTS.as_posix(), 1)["p_value"] > 1e-3
+
+
+def test_outside_of_the_catalogue_there_is_none(offset):
+    _, folder, verdict = offset
+    assert oracle({"defects": [{"effect": "outside:refraction", "joints": []}]}, verdict, folder, ROBOTS.as_posix(), 1) is None
+
+
+def test_without_its_covariate_not_even_the_oracle_sees_it(offset, tmp_path):
+    truth, folder = made(tmp_path, "hysteresis", setting="without_approach")
+    verdict = diagnosed(folder, ROBOTS.as_posix(), 200, 1)
+    found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
+    assert (found["candidates"], found["p_value"]) == ([], 1.0)
+    assert found["heldout"]["rms_m"] == pytest.approx(verdict["heldout"]["before"]["rms_m"], rel=1e-6)

@@ -1,0 +1,107 @@
+"""Every figure beside its target, over every case that belongs to it and no other."""
+
+import pandas as pd
+import pytest
+from made_documents import effect, frame, oracle, silence, truth, verdict
+from scipy.stats import beta
+
+from elastocal.blind.coverage import intervals_of
+from elastocal.blind.targets import by_setting, summarized
+
+PAYLOAD = verdict("named", effect("payload"))
+
+
+def summary(*entries):
+    intervals = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
+    return summarized(frame(*entries), intervals, 1).set_index(["robots", "quantity"])
+
+
+def test_rates_have_clopper_pearson_intervals_and_are_held_against_their_targets():
+    entries = [(truth(("payload",)), PAYLOAD, oracle())] * 7 + [(truth(("payload",)), silence(), oracle())] * 3
+    row = summary(*entries).loc[("proof", "detected at 50")]
+    assert (row.hits, row.cases, row.rate, row.target, row.holds) == (7, 10, 0.7, "at least 97 %", False)
+    assert row.low == pytest.approx(beta.ppf(0.025, 7, 4)) and row.high == pytest.approx(beta.ppf(0.975, 8, 3))
+    assert summary(*entries[:7]).loc[("proof", "detected at 50")].holds
+
+
+def test_false_alarms_are_held_against_their_upper_limit_and_leave_hard_settings_out():
+    hard = (truth(group="setting", setting="outliers_5_percent"), PAYLOAD, oracle(1.0))
+    hard[0]["case"]["group"] = "setting"
+    few = summary(*[(truth(), silence(), oracle(1.0))] * 20, hard)
+    row = few.loc[("proof", "false alarms with no effect")]
+    assert (row.hits, row.cases, row.holds) == (0, 20, False)
+    many = summary(*[(truth(), silence(), oracle(1.0))] * 60, hard)
+    assert many.loc[("proof", "false alarms with no effect")].holds
+
+
+def test_the_robot_of_tuning_is_shown_apart():
+    table = summary((truth(("payload",)), PAYLOAD, oracle()), (truth(("payload",), robot="kuka"), silence(), oracle()))
+    assert table.loc[("proof", "detected at 50")].hits == 1
+    assert table.loc[("tuned", "detected at 50")].hits == 0
+
+
+def test_aliases_are_aside_for_the_single_name_only():
+    alias = truth(("transmission_harmonic", 2), level=200.0)
+    confused = verdict("class", effect("compensator_torque", 2, alternatives=["transmission_harmonic@2[orders 1-2]"]))
+    right = (truth(("payload",), level=200.0), PAYLOAD, oracle())
+    table = summary((alias, confused, oracle()), right).loc["proof"]
+    assert table.loc["right name alone, exact aliases aside, at 200"].cases == 1
+    assert table.loc["right name, or class with it, given detection, at 200"].cases == 2
+    assert table.loc["right name, or class with it, of exact aliases, at 200"].hits == 1
+
+
+def test_what_is_absorbed_is_a_row_of_its_own():
+    scale = truth(("force_scale",))
+    scale["defects"][0]["of"] = "raw"
+    table = summary((scale, silence(), oracle(1.0)), (truth(("payload",)), PAYLOAD, oracle())).loc["proof"]
+    assert table.loc["detected at 50"].cases == 1
+    assert table.loc["detected though wholly absorbed (force scale)"].cases == 1
+
+
+def test_errors_are_held_against_the_oracle_where_something_was_detected():
+    table = summary(
+        (truth(("payload",)), verdict("named", effect("payload"), after=1.0e-4), oracle(rms=1e-4)),
+        (truth(("payload",)), verdict("named", effect("payload"), after=1.2e-4), oracle(rms=1e-4)),
+        (truth(("payload",)), verdict("adequate", after=9e-4), oracle(rms=1e-4)),
+        (truth(("outside:refraction",), group="outside"), PAYLOAD, None),
+    ).loc["proof"]
+    row = table.loc["held-out RMS after, over the oracle's, mean"]
+    assert (row.cases, row.rate, row.holds) == (2, pytest.approx(1.1), False)
+    assert row.low == pytest.approx(1.0) and row.high == pytest.approx(1.2)
+    assert table.loc["held-out RMS after within 5 % of the oracle's"].hits == 1
+
+
+def test_the_share_of_the_oracles_fall_counts_what_was_missed():
+    found = (truth(("payload",)), verdict("named", effect("payload"), before=2e-4, after=1e-4), oracle(rms=1e-4))
+    missed = (truth(("payload",)), verdict("adequate", before=2e-4, after=2e-4), oracle(rms=1e-4))
+    row = summary(found, missed).loc[("proof", "share of the oracle's fall of the held-out mean square that is reached, at 50")]
+    assert row.rate == pytest.approx(0.5)
+
+
+def test_one_case_that_gets_worse_in_silence_breaks_the_target():
+    worse = verdict("named", effect("payload"), before=1e-4, after=1.2e-4, reduction=(-0.22, -0.18))
+    quantity = "held-out RMS worse by over two standard errors without a warning"
+    fine = [(truth(("payload",)), PAYLOAD, oracle())] * 5
+    assert summary(*fine).loc[("proof", quantity)].holds
+    assert not summary(*fine, (truth(("payload",)), worse, oracle())).loc[("proof", quantity)].holds
+
+
+def test_settings_tell_false_alarms_effects_and_hidden_effects_apart():
+    design = {"covariates": []}
+    hidden = truth(("hysteresis", 1), group="setting", setting="without_covariates", level=200.0, design=design)
+    null = truth(setting="outliers_5_percent")
+    null["case"]["group"] = "setting"
+    table = by_setting(
+        frame(
+            (hidden, silence(), oracle(1.0)),
+            (null, PAYLOAD, oracle(1.0)),
+            (truth(("payload",), group="setting", setting="outliers_5_percent"), PAYLOAD, oracle()),
+            (truth(("payload",)), PAYLOAD, oracle()),
+        )
+    ).set_index(["setting", "kind"])
+    assert table.cases.to_dict() == {
+        ("outliers_5_percent", "effect"): 1,
+        ("outliers_5_percent", "no effect"): 1,
+        ("without_covariates", "hidden effect"): 1,
+    }
+    assert table.loc[("outliers_5_percent", "no effect"), "wrong"] == 1

@@ -1,0 +1,23 @@
+"""What the oracle does on a block of blind cases, once they are diagnosed."""
+
+import json
+from pathlib import Path
+
+from elastocal.blind.oracle import oracle
+from elastocal.blind.truths import opened_truths
+from elastocal.frames import write_text
+from elastocal.loop.opened import opened_json
+
+from job import run
+
+
+def oracle_cases(job):
+    truths = opened_truths(Path(job.input.sealed).glob("*.json"), job.input.manifest)
+    verdicts = {verdict["campaign"]: verdict for verdict in opened_json(job.input.verdicts)}
+    found = {}
+    for name, truth in truths.items():
+        found[name] = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", "config/robots", job.params.seed)
+    write_text(job.output.oracle, json.dumps(found, allow_nan=False) + "\n")
+
+
+run(oracle_cases, snakemake)
