@@ -1,7 +1,10 @@
-"""What comes after the verdicts of the blind proof: the oracle, the scores.
+"""What comes after the verdicts of the blind proof: the oracle, the scores, figures and the report.
 
-Needs data/blind/, data/sealed/ and the verdicts of results/blind/. Writes results/blind/oracle/ and reports/blind/.
+Needs data/blind/, data/sealed/, the verdicts of results/blind/ and reports/blind/follow_up.csv. Writes results/blind/oracle/ and
+reports/blind/.
 """
+
+BLIND_FIGURES = ["targets", "power", "confusion", "errors", "coverage"]
 
 
 rule oracle_cases:
@@ -48,6 +51,110 @@ rule score_cases:
         "../scripts/score_cases.py"
 
 
+rule draw_blind_targets:
+    input:
+        summary=rules.score_cases.output.summary,
+        sources=sources("draw_blind_targets.py"),
+    output:
+        pdf="reports/blind/figures/targets.pdf",
+        png="reports/blind/figures/targets.png",
+    log:
+        "results/logs/draw_blind_targets.log",
+    benchmark:
+        "results/timings/draw_blind_targets.tsv"
+    script:
+        "../scripts/draw_blind_targets.py"
+
+
+rule draw_blind_power:
+    input:
+        power=rules.score_cases.output.power,
+        sources=sources("draw_blind_power.py"),
+    output:
+        pdf="reports/blind/figures/power.pdf",
+        png="reports/blind/figures/power.png",
+    log:
+        "results/logs/draw_blind_power.log",
+    benchmark:
+        "results/timings/draw_blind_power.tsv"
+    script:
+        "../scripts/draw_blind_power.py"
+
+
+rule draw_blind_confusion:
+    input:
+        confusion=rules.score_cases.output.confusion,
+        sources=sources("draw_blind_confusion.py"),
+    output:
+        pdf="reports/blind/figures/confusion.pdf",
+        png="reports/blind/figures/confusion.png",
+    log:
+        "results/logs/draw_blind_confusion.log",
+    benchmark:
+        "results/timings/draw_blind_confusion.tsv"
+    script:
+        "../scripts/draw_blind_confusion.py"
+
+
+rule draw_blind_coverage:
+    input:
+        coverage=rules.score_cases.output.coverage,
+        sources=sources("draw_blind_coverage.py"),
+    output:
+        pdf="reports/blind/figures/coverage.pdf",
+        png="reports/blind/figures/coverage.png",
+    log:
+        "results/logs/draw_blind_coverage.log",
+    benchmark:
+        "results/timings/draw_blind_coverage.tsv"
+    script:
+        "../scripts/draw_blind_coverage.py"
+
+
+rule draw_blind_errors:
+    input:
+        cases=rules.score_cases.output.cases,
+        sources=sources("draw_blind_errors.py"),
+    output:
+        pdf="reports/blind/figures/errors.pdf",
+        png="reports/blind/figures/errors.png",
+    log:
+        "results/logs/draw_blind_errors.log",
+    benchmark:
+        "results/timings/draw_blind_errors.tsv"
+    script:
+        "../scripts/draw_blind_errors.py"
+
+
+rule compile_blind_report:
+    input:
+        summary=rules.score_cases.output.summary,
+        settings=rules.score_cases.output.settings,
+        power=rules.score_cases.output.power,
+        undetectable=rules.score_cases.output.undetectable,
+        confusion=rules.score_cases.output.confusion,
+        cases=rules.score_cases.output.cases,
+        follow_up=rules.score_follow_ups.output.rates,
+        manifest=rules.seal_cases.output.manifest,
+        figures=expand("reports/blind/figures/{figure}.pdf", figure=BLIND_FIGURES),
+        pages="src/elastocal/report/blind.typ",
+        sources=sources("compile_blind_report.py"),
+    output:
+        report="reports/blind/blind.pdf",
+    log:
+        "results/logs/compile_blind_report.log",
+    benchmark:
+        "results/timings/compile_blind_report.tsv"
+    params:
+        size=config["blind"],
+        seed=config["seed"],
+        replicates=config["loop"]["replicates"],
+    script:
+        "../scripts/compile_blind_report.py"
+
+
 rule blind:
     input:
         rules.score_cases.output,
+        expand("reports/blind/figures/{figure}.{format}", figure=BLIND_FIGURES, format=["pdf", "png"]),
+        rules.compile_blind_report.output.report,

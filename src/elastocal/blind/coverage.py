@@ -83,9 +83,8 @@ def covered(intervals):
     )
     rows = intervals.assign(kind=kind)[intervals.setting == "usual"]
     whole = rows.assign(parameter="all")
-    together = pd.concat(
-        [rows.assign(level="all"), whole, whole.assign(level="all"), whole.assign(level="all", effect="all", comparable="all")]
-    )
+    everything = whole[whole.kind == "effect"].assign(level="all", effect="all", comparable="all")
+    together = pd.concat([rows.assign(level="all"), whole, whole.assign(level="all"), everything])
     together["level"] = [level if level == "all" else f"{level:g}" for level in together.level]
     found = []
     for keys, part in together.groupby(["robots", *_KEYS]):

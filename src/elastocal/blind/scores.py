@@ -52,6 +52,11 @@ def outcome(truth, verdict):
     }
 
 
+def leading(robots):
+    """Which of the robots a figure shows: those of the proof, or where there is none the one that it was tuned on."""
+    return PROOF if PROOF in set(robots) else TUNED
+
+
 def _each_is_held(true, effects):
     if len(true) != len(effects):
         return False

@@ -1,6 +1,5 @@
 """The figures of the proof, each beside its target."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,34 +23,34 @@ class Target:
     Attributes
     ----------
     words : str
-    holds : callable
-        ``holds(row)`` of a row of the summary.
+    low, high : float
+        Range in which it shall lie.
+    of : {"rate", "high"}
+        Whether the figure itself shall, or the upper end of its interval.
     """
 
     words: str
-    holds: Callable
+    low: float
+    high: float
+    of: str = "rate"
 
 
 def _at_least(share):
-    return Target(f"at least {100 * share:g} %", lambda row: row["rate"] >= share)
-
-
-def _at_most(share):
-    return Target(f"at most {100 * share:g} %", lambda row: row["rate"] <= share)
+    return Target(f"at least {100 * share:g} %", share, 1.0)
 
 
 # As the issue sets them, by what is counted and the non-centrality.
 _TARGETS = {
-    ("false alarms", 0.0): Target("upper limit below 8 %", lambda row: row["high"] < 0.08),
+    ("false alarms", 0.0): Target("upper limit below 8 %", 0.0, 0.08, "high"),
     ("detected", 25.0): _at_least(0.80),
     ("detected", 50.0): _at_least(0.97),
     ("held", 50.0): _at_least(0.95),
     ("named", 200.0): _at_least(0.95),
-    ("outside", 200.0): _at_most(0.15),
+    ("outside", 200.0): Target("at most 15 %", 0.0, 0.15),
     ("pair", 200.0): _at_least(0.85),
-    ("ratio", None): Target("within 5 %", lambda row: row["rate"] <= WITHIN),
-    ("worse", None): Target("none", lambda row: row["hits"] == 0),
-    ("coverage", None): Target("92 to 98 %", lambda row: 0.92 <= row["rate"] <= 0.98),
+    ("ratio", None): Target("within 5 %", 0.0, WITHIN),
+    ("worse", None): Target("none", 0.0, 0.0),
+    ("coverage", None): Target("92 to 98 %", 0.92, 0.98),
 }
 
 
@@ -71,7 +70,8 @@ def summarized(cases, intervals, seed):
     -------
     pandas.DataFrame
         One row for each kind of robots and figure: rates with Clopper-Pearson intervals, ratios with bootstrap intervals over
-        cases. ``holds`` is empty where there is no target or no case.
+        cases. ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no
+        target or no case.
     """
     rows = []
     for robots in (PROOF, TUNED):
@@ -169,9 +169,10 @@ def _rated(name, hits, target):
 
 
 def _named(name, row, target):
-    aim = _TARGETS.get(target)
-    judged = aim is not None and row["cases"] > 0
-    return {"quantity": name} | row | {"target": aim.words if aim else "", "holds": bool(aim.holds(row)) if judged else None}
+    aim = _TARGETS.get(target, Target("", np.nan, np.nan))
+    judged = aim.words and row["cases"]
+    holds = bool(aim.low <= row[aim.of] <= aim.high) if judged else None
+    return {"quantity": name} | row | {"target": aim.words, "target_low": aim.low, "target_high": aim.high, "holds": holds}
 
 
 def _share(removed, removable, axis=-1):

@@ -1,0 +1,73 @@
+"""Held-out errors of the blind cases against those of the oracle that knows the effect."""
+
+import numpy as np
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator
+
+from elastocal.blind.scores import leading
+from elastocal.figures.style import PALETTE, panels, styled
+
+_MICRO = 1e6
+_GROUPS = ("single", "pair")
+_WITHIN = 1.05
+# Digits at which a logarithmic axis is marked, for a range of less than a decade and for others.
+_FINE, _COARSE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), (1.0, 2.0, 5.0)
+
+
+@styled
+def errors_against_oracle(cases):
+    """Held-out RMS after the diagnosis against the oracle's, case by case, and the ratio of the two by size.
+
+    Parameters
+    ----------
+    cases : pandas.DataFrame
+        Of reports/blind/cases.csv.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS) & cases.oracle_rms_m.notna()]
+    figure, axes = panels(1, 2, 82, width_ratios=(1, 1.1))
+    left, right = axes[0]
+    for detected, color, size in ((True, PALETTE[0], 5), (False, PALETTE[1], 7)):
+        part = mine[mine.detected.astype(bool) == detected]
+        left.scatter(_MICRO * part.oracle_rms_m, _MICRO * part.after_rms_m, s=size, color=color, alpha=0.5, linewidths=0)
+    values = _MICRO * mine[["oracle_rms_m", "after_rms_m"]].to_numpy()
+    low, high = (values.min() / 1.05, values.max() * 1.05) if len(mine) else (10.0, 1000.0)
+    ends = np.array([low, high])
+    left.plot(ends, ends, color="black", linewidth=0.8)
+    left.plot(ends, _WITHIN * ends, color="black", linewidth=0.8, linestyle=":")
+    left.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
+    left.set(xlabel="of the oracle (µm)", ylabel="after the diagnosis (µm)", title="held-out RMS, case by case")
+    for axis in (left.xaxis, left.yaxis):
+        axis.set_major_locator(LogLocator(subs=_FINE if high < 4 * low else _COARSE))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter("")
+    left.set_aspect("equal", adjustable="box")
+    for number, (level, part) in enumerate(mine[mine.group == "single"].groupby("level")):
+        _shares(right, part, PALETTE[number % len(PALETTE)], "-", f"one effect, non-centrality {level:g}")
+    for number, (level, part) in enumerate(mine[mine.group == "pair"].groupby("level")):
+        _shares(right, part, PALETTE[(number + 4) % len(PALETTE)], "--", f"two effects, {level:g} each")
+    right.axvline(1.0, color="black", linewidth=0.8)
+    right.axvline(_WITHIN, color="black", linewidth=0.8, linestyle=":")
+    ratio = (mine.after_rms_m / mine.oracle_rms_m).to_numpy()
+    if len(ratio):
+        right.set_xlim(min(0.97, np.quantile(ratio, 0.005)), max(1.12, np.quantile(ratio, 0.995)))
+    right.set(ylim=(0, 102), xlabel="RMS after the diagnosis over the oracle's", ylabel="cases with no larger ratio (%)")
+    right.set_title("by the size of the effect")
+    handles = [
+        Line2D([], [], linestyle="", marker="o", color=PALETTE[0], markersize=4, label="detected"),
+        Line2D([], [], linestyle="", marker="o", color=PALETTE[1], markersize=4, label="not detected"),
+        Line2D([], [], color="black", linewidth=0.8, label="as good as the oracle"),
+        Line2D([], [], color="black", linewidth=0.8, linestyle=":", label="5 % above it"),
+        *right.get_legend_handles_labels()[0],
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
+    return figure
+
+
+def _shares(axis, part, color, dashes, label):
+    ratio = np.sort((part.after_rms_m / part.oracle_rms_m).to_numpy())
+    steps = 100.0 * np.arange(1, len(ratio) + 1) / len(ratio)
+    axis.step(ratio, steps, where="post", color=color, linestyle=dashes, linewidth=1.2, label=label)

@@ -1,0 +1,240 @@
+"""Everything that the report of the blind proof states, worded, from the tables of reports/blind/."""
+
+import hashlib
+
+import pandas as pd
+
+from elastocal.blind.case_rows import EXACT_ALIASES
+from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
+from elastocal.blind.scores import NONE, PROOF, TUNED, leading
+from elastocal.plant.campaigns import Design
+from elastocal.report.wording import at_joints, counted, grouped, listed, plain, words
+
+_OUTSIDE = "outside:"
+_GROUPS = {
+    NONE: "no effect",
+    "single": "one effect of the catalogue",
+    "pair": "two effects of the catalogue",
+    "outside": "one effect outside of the catalogue",
+    "setting": "hard settings, with an effect and without",
+}
+_SAID_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
+_ABSENT = "–"
+
+
+def blind_facts(tables, manifest, size, seed, replicates):
+    """Facts for the report of the blind proof.
+
+    Parameters
+    ----------
+    tables : dict of str to pandas.DataFrame
+        ``summary``, ``settings``, ``power``, ``undetectable``, ``confusion``, ``cases`` and ``follow_up`` of reports/blind/.
+    manifest : str
+        Contents of the manifest.
+    size : str
+        Of the benchmark.
+    seed, replicates : int
+        Of everything that is drawn, and of the bootstrap behind each look.
+
+    Returns
+    -------
+    dict
+        JSON-serialisable; strings ready to print, lists for tables.
+    """
+    cases, summary = tables["cases"], tables["summary"]
+    robots = leading(cases.robots)
+    aimed = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
+    return {
+        "robots": {key: _robots(cases, key) for key in (PROOF, TUNED)},
+        "proof": robots == PROOF,
+        "verdict": _verdict(aimed, robots),
+        "missed": [_missed(row) for row in aimed.itertuples() if str(row.holds) == "False"],
+        "protocol": {
+            "cases": grouped(len(cases)),
+            "size": size,
+            "seed": str(seed),
+            "replicates": grouped(replicates),
+            "truths": grouped(len(manifest.splitlines())),
+            "digest": hashlib.sha256(manifest.encode()).hexdigest(),
+            "levels": listed(f"{level:g}" for level in sorted(cases[cases.group == "single"].level.unique())),
+            "outside": listed(
+                words(name.removeprefix(_OUTSIDE)) for name in sorted(set(cases[cases.group == "outside"].truth))
+            ),
+        },
+        "design": _design(Design()),
+        "aliases": listed(f"{words(effect)}{at_joints(effect, joints)}" for effect, joints in EXACT_ALIASES if joints),
+        "counts": _counts(cases),
+        "targets": {key: _targets(summary, key) for key in (PROOF, TUNED)},
+        "further": {key: _further(summary, key) for key in (PROOF, TUNED)},
+        "effects": _effects(tables["power"], robots),
+        "outside": _outside(tables["confusion"], robots),
+        "settings": _settings(tables["settings"], robots),
+        "undetectable": _undetectable(tables["undetectable"], robots),
+        "follow_up": _follow_up(tables["follow_up"]),
+    }
+
+
+def _design(design):
+    return {
+        "poses": f"{design.poses}",
+        "held_out": f"{design.held_out}",
+        "force": f"{design.force_N:g} N",
+        "ladder": listed(f"{share:+g}".replace("-", "−") if share else "0" for share in design.ladder),
+        "repeats": f"{design.repeats}",
+        "repeated": f"{design.repeated_poses}",
+    }
+
+
+def _robots(cases, key):
+    names = sorted(set(cases[cases.robots == key].robot))
+    return listed(names) if names else ""
+
+
+def _verdict(aimed, robots):
+    judged = aimed[aimed.holds.notna()]
+    held = int((judged.holds.astype(str) == "True").sum())
+    where = "the robots of the proof" if robots == PROOF else "the robot on which the method was tuned, which proves nothing"
+    return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
+
+
+def _missed(row):
+    return f"{row.quantity}: {_value(row)} ({_interval(row)}), target {row.target}"
+
+
+def _value(row):
+    if pd.isna(row.rate):
+        return _ABSENT
+    return plain(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
+
+
+def _interval(row):
+    if pd.isna(row.low):
+        return _ABSENT
+    if _is_ratio(row):
+        return f"{plain(row.low, 4)}–{plain(row.high, 4)}"
+    return f"{100 * row.low:.1f}–{100 * row.high:.1f} %"
+
+
+def _is_ratio(row):
+    return row.quantity.startswith("held-out RMS after, over")
+
+
+def _hits(row):
+    return grouped(int(row.cases)) if pd.isna(row.hits) else f"{grouped(int(row.hits))} of {grouped(int(row.cases))}"
+
+
+def _targets(summary, robots):
+    mine = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
+    said = {"True": "reached", "False": "missed"}
+    return [
+        [row.quantity, _hits(row), _value(row), _interval(row), row.target, said.get(str(row.holds), "no case")]
+        for row in mine.itertuples()
+    ]
+
+
+def _further(summary, robots):
+    mine = summary[(summary.robots == robots) & summary.target.fillna("").eq("")]
+    return [[row.quantity, _hits(row), _value(row), _interval(row)] for row in mine.itertuples()]
+
+
+def _counts(cases):
+    table = pd.crosstab(cases.group, cases.robot)
+    heads = ["cases", *table.columns]
+    rows = [
+        [title, *(grouped(int(number)) for number in table.loc[key])] for key, title in _GROUPS.items() if key in table.index
+    ]
+    return {"heads": heads, "rows": [*rows, ["all", *(grouped(int(number)) for number in table.sum())]]}
+
+
+def _effects(power, robots):
+    """Per effect at the largest level and the one before: what the heat map shows, with intervals and sizes."""
+    mine = power[(power.robots == robots) & (power.group == "single") & (power.effect != "all")]
+    rows = []
+    for effect, part in mine.groupby("effect"):
+        for row in part.sort_values("level").tail(2).itertuples():
+            rows.append(
+                [
+                    words(effect),
+                    f"{row.level:g}" + (" before absorption" if row.level_of == "raw" else ""),
+                    f"{row.cases}",
+                    _share(row, "detected"),
+                    _share(row, "held"),
+                    _share(row, "named"),
+                    _share(row, "oracle_detected"),
+                    f"{plain(row.signal_rms_um)} µm",
+                    f"{row.times_plausible:.2f}",
+                ]
+            )
+    return rows
+
+
+def _share(row, name):
+    rate, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low", "_high"))
+    return _ABSENT if pd.isna(rate) else f"{100 * rate:.0f} ({100 * low:.0f}–{100 * high:.0f})"
+
+
+def _outside(confusion, robots):
+    """What is said of effects outside of the catalogue, in % of their cases at the largest size."""
+    mine = confusion[(confusion.robots == robots) & confusion.truth.str.startswith(_OUTSIDE)]
+    rows = []
+    for truth, part in mine.groupby("truth"):
+        counts = part.loc[part.level.idxmax()].drop(["robots", "settings", "truth"])
+        level, counts = counts["level"], counts.drop("level").astype(float)
+        said = {
+            "class": counts[CLASS_WITH] + counts[CLASS_WITHOUT],
+            "several": counts["several"],
+            "unexplained": counts["unexplained"],
+            "adequate": counts["adequate"] + counts["not_testable"],
+        }
+        said["wrong name"] = counts.sum() - sum(said.values())
+        shares = [f"{100 * said[word] / counts.sum():.0f}" for word in _SAID_OUTSIDE]
+        rows.append([words(truth.removeprefix(_OUTSIDE)), f"{level:g}", f"{counts.sum():.0f}", *shares])
+    return rows
+
+
+def _settings(settings, robots):
+    mine = settings[settings.robots == robots]
+    return [
+        [
+            words(row.setting),
+            row.kind + (f" at {row.level:g}" if row.level else ""),
+            f"{row.cases}",
+            f"{100 * row.rate:.0f} ({100 * row.low:.0f}–{100 * row.high:.0f})",
+            _ABSENT if row.kind == "no effect" else f"{100 * row.held / row.cases:.0f}",
+            f"{100 * row.wrong / row.cases:.0f}",
+        ]
+        for row in mine.itertuples()
+    ]
+
+
+def _undetectable(undetectable, robots):
+    if "rate" not in undetectable:
+        return []
+    rows = []
+    for row in undetectable[undetectable.robots == robots].itertuples():
+        rows.append(
+            [
+                words(row.effect),
+                words(row.setting),
+                f"{row.level:g}",
+                row.reason,
+                f"{row.hits} of {row.cases}",
+                f"{100 * row.retained_share:.2g} %",
+                f"{row.times_plausible:.2g}",
+            ]
+        )
+    return rows
+
+
+def _follow_up(follow_up):
+    return [
+        [
+            {PROOF: "proof", TUNED: "tuned on"}[row.robots],
+            row.arm,
+            f"{row.poses_added}",
+            f"{row.cases}",
+            f"{100 * row.right_name:.0f} %",
+            f"{100 * row.low:.0f}–{100 * row.high:.0f} %",
+        ]
+        for row in follow_up.itertuples()
+    ]

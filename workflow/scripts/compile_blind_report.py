@@ -1,0 +1,23 @@
+"""The report of the blind proof as PDF."""
+
+from pathlib import Path
+
+import pandas as pd
+
+from elastocal.report.blind_facts import blind_facts
+from elastocal.report.blind_pages import write_blind_report
+
+from job import run
+
+TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up")
+
+
+def compile_blind_report(job):
+    settings = job.params
+    tables = {name: pd.read_csv(job.input[name]) for name in TABLES}
+    manifest = Path(job.input.manifest).read_text(encoding="utf-8")
+    facts = blind_facts(tables, manifest, settings.size, settings.seed, settings.replicates)
+    write_blind_report(job.output.report, facts, job.input.figures)
+
+
+run(compile_blind_report, snakemake)

@@ -1,0 +1,15 @@
+"""What was said for what was true."""
+
+import pandas as pd
+
+from elastocal.figures.blind_power import confusion_map
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_confusion(job):
+    save(confusion_map(pd.read_csv(job.input.confusion)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_confusion, snakemake)

@@ -1,0 +1,15 @@
+"""How often intervals of parameters hold the truth."""
+
+import pandas as pd
+
+from elastocal.figures.blind_rates import coverage_by_effect
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_coverage(job):
+    save(coverage_by_effect(pd.read_csv(job.input.coverage)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_coverage, snakemake)

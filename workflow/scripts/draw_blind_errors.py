@@ -1,0 +1,15 @@
+"""Held-out errors of blind cases against the oracle's."""
+
+import pandas as pd
+
+from elastocal.figures.blind_errors import errors_against_oracle
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_errors(job):
+    save(errors_against_oracle(pd.read_csv(job.input.cases)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_errors, snakemake)

@@ -1,0 +1,15 @@
+"""What is found at which size, beside the oracle."""
+
+import pandas as pd
+
+from elastocal.figures.blind_power import power_map
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_power(job):
+    save(power_map(pd.read_csv(job.input.power)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_power, snakemake)

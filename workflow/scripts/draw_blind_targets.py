@@ -1,0 +1,15 @@
+"""Figures of the blind proof against their targets."""
+
+import pandas as pd
+
+from elastocal.figures.blind_rates import rates_and_targets
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_targets(job):
+    save(rates_and_targets(pd.read_csv(job.input.summary)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_targets, snakemake)
