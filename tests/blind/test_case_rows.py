@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_documents import effect, oracle, silence, truth, verdict
+from made_blind_documents import effect, oracle, silence, truth, verdict
 
 from elastocal.blind.case_rows import EXACT_ALIASES, case_row
 

@@ -1,6 +1,6 @@
 """Every case is in the confusion table once."""
 
-from made_documents import effect, frame, oracle, silence, truth, verdict
+from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
 from elastocal.blind.confusion import confused
 

@@ -1,7 +1,7 @@
 """Intervals are held against the truth that they can be compared with."""
 
 import pandas as pd
-from made_documents import effect, silence, truth, verdict
+from made_blind_documents import effect, silence, truth, verdict
 
 from elastocal.blind.coverage import covered, intervals_of
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_documents import effect, frame, oracle, silence, truth, verdict
+from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
 from elastocal.blind.power import powers, undetectable
 

@@ -2,7 +2,7 @@
 
 import pandas as pd
 import pytest
-from made_documents import effect, frame, oracle, silence, truth, verdict
+from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 from scipy.stats import beta
 
 from elastocal.blind.coverage import intervals_of

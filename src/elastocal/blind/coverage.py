@@ -75,8 +75,9 @@ def covered(intervals):
         One row for each kind of robots, effect, parameter and level, with ``all`` for parameters and levels together. Joint
         compliances are apart: of cases without an effect in the usual setting, and of those in which the right one was found.
     """
+    columns = ["robots", *_KEYS, *rate([])]
     if not len(intervals):
-        return pd.DataFrame(columns=["robots", *_KEYS, *rate([])])
+        return pd.DataFrame(columns=columns)
     of_springs = intervals.effect == COMPLIANCE
     kind = np.where(
         ~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", "compliance, effect found")
@@ -89,7 +90,7 @@ def covered(intervals):
     found = []
     for keys, part in together.groupby(["robots", *_KEYS]):
         found.append(dict(zip(("robots", *_KEYS), keys, strict=True)) | rate(part.holds))
-    return pd.DataFrame(found)
+    return pd.DataFrame(found, columns=columns)
 
 
 def _compliances(truth, verdict):

@@ -7,6 +7,12 @@ from elastocal.plant.defects import KINDS
 
 ALL = "all"
 _GROUPS = ("single", "outside")
+_SHARES = ("detected", "held", "named", "oracle_detected")
+_SIZES = ["signal_rms_um", "signal_over_noise", "times_plausible"]
+_COLUMNS = ["robots", "group", "effect", "level", "level_of", "cases", "oracle_cases"]
+_COLUMNS += [f"{name}{end}" for name in _SHARES for end in ("", "_low", "_high")] + _SIZES
+_UNDETECTABLE = ["robots", "effect", "setting", "level", "reason", "hits", "cases", "rate", "low", "high"]
+_UNDETECTABLE += ["wrong_name", "retained_share", "times_plausible"]
 
 
 def powers(cases):
@@ -30,11 +36,10 @@ def powers(cases):
         known = part.oracle_detected.dropna()
         rows.append(
             dict(zip(("robots", "group", "effect", "level"), keys, strict=True))
-            | {"level_of": part.level_of.iloc[0], "cases": len(part)}
+            | {"level_of": part.level_of.iloc[0], "cases": len(part), "oracle_cases": len(known)}
             | headed("detected", rate(part.detected))
             | headed("held", rate(part.holds_truth))
             | headed("named", rate(part.named_right))
-            | {"oracle_cases": len(known)}
             | headed("oracle_detected", rate(known))
             | {
                 "signal_rms_um": 1e6 * part.signal_rms_m.median(),
@@ -42,7 +47,7 @@ def powers(cases):
                 "times_plausible": part.times_plausible.median(),
             }
         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_COLUMNS)
 
 
 def undetectable(cases):
@@ -74,8 +79,7 @@ def undetectable(cases):
                     "times_plausible": part.times_plausible.median(),
                 }
             )
-    columns = ["robots", "effect", "setting", "level", "reason"]
-    return pd.DataFrame(rows) if rows else pd.DataFrame(columns=columns)
+    return pd.DataFrame(rows, columns=_UNDETECTABLE)
 
 
 def _reason(part):

@@ -14,6 +14,7 @@ _RESAMPLES = 2000
 # Held-out errors this near to the oracle's count as its own.
 WITHIN = 1.05
 _SEVERAL_AT_ONCE = 200
+_SETTING_COLUMNS = ["robots", "setting", "kind", "level", *rate([]), "held", "named", "wrong"]
 
 
 @dataclass(frozen=True)
@@ -106,7 +107,7 @@ def by_setting(cases):
             | rate(part.detected)
             | {"held": int(part.holds_truth.sum()), "named": int(part.named_right.sum()), "wrong": int(part.wrong_name.sum())}
         )
-    return pd.DataFrame(rows)
+    return pd.DataFrame(rows, columns=_SETTING_COLUMNS)
 
 
 def _of_cases(cases):

@@ -6,7 +6,7 @@ from matplotlib.patches import Rectangle
 
 from elastocal.blind.confusion import PAIR, WORDS
 from elastocal.blind.scores import leading
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, styled
 
 PANELS = {
     "oracle_detected": "the oracle\ndetects",
@@ -36,11 +36,13 @@ def power_map(power):
     matplotlib.figure.Figure
     """
     single = power[(power.robots == leading(power.robots)) & (power.group == "single")]
+    if single.empty:
+        return note("This run has no case with one effect.")
     levels = sorted(single.level.unique())
-    at_largest = single[single.level == max(levels, default=0.0)].set_index("effect")["named"]
+    at_largest = single[single.level == max(levels)].set_index("effect")["named"]
     effects = sorted((name for name in at_largest.index if name != _ALL), key=lambda name: (-at_largest[name], name))
     effects += [name for name in (_ALL,) if name in set(single.effect)]
-    figure, axes = panels(1, len(PANELS), 34 + 4.6 * max(len(effects), 4), sharey=True)
+    figure, axes = panels(1, len(PANELS), 34 + 4.6 * len(effects), sharey=True)
     table = single.set_index(["effect", "level"])
     for axis, (column, title) in zip(axes[0], PANELS.items(), strict=True):
         shares = np.array([[_at(table, effect, level, column) for level in levels] for effect in effects])
@@ -51,10 +53,10 @@ def power_map(power):
             axis.axhline(len(effects) - 1.5, color="black", linewidth=0.8)
     raw = set(single[single.level_of == "raw"].effect)
     axes[0, 0].set_yticklabels([_name(name) + (" *" if name in raw else "") for name in effects], fontsize=7)
-    note = "Numbers are shares of cases in %."
+    words = "Numbers are shares of cases in %."
     if raw:
-        note += "\n* Wholly absorbed by the joint compliances: the size is that before absorption; not among all effects."
-    figure.supxlabel(note, fontsize=7)
+        words += "\n* Wholly absorbed by the joint compliances: the size is that before absorption; not among all effects."
+    figure.supxlabel(words, fontsize=7)
     return figure
 
 
@@ -72,6 +74,8 @@ def confusion_map(confusion):
     matplotlib.figure.Figure
     """
     usual = confusion[(confusion.robots == leading(confusion.robots)) & (confusion.settings == "usual")]
+    if usual.empty:
+        return note("This run has no case in the usual setting.")
     largest = usual[usual.level == usual.groupby("truth")["level"].transform("max")].set_index("truth")
     counts = largest.drop(columns=["robots", "settings", "level"])
     named, words = [column for column in counts if column not in WORDS], [*WORDS]

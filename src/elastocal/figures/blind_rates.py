@@ -7,7 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from elastocal.blind.scores import PROOF, TUNED, leading
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, styled
 
 LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robot on which it was tuned")}
 _COMPARABLE = {
@@ -69,6 +69,8 @@ def coverage_by_effect(coverage):
     """
     whole = coverage[(coverage.parameter == "all") & (coverage.level.astype(str) == "all")]
     rows = whole[whole.robots == leading(whole.robots)]
+    if rows.empty:
+        return note("This run has no interval that a truth can be compared with.")
     of_effects = rows[rows.kind == "effect"].sort_values(["effect"])
     order = [
         *rows[rows.kind != "effect"].itertuples(),
@@ -84,7 +86,7 @@ def coverage_by_effect(coverage):
         axis.plot([_PER_CENT * row.low, _PER_CENT * row.high], [place, place], color=PALETTE[0], linewidth=1.2)
         axis.plot(_PER_CENT * row.rate, place, marker, color=PALETTE[0], markersize=4.5)
         axis.annotate(f"{row.cases}", (1.01, place), xycoords=("axes fraction", "data"), va="center", fontsize=6.5)
-    lowest = min([_PER_CENT * row.low for row in order], default=0.0)
+    lowest = min([_PER_CENT * row.low for row in order])
     axis.set(yticks=range(len(order)), ylim=(len(order) - 0.5, -0.5), xlim=(min(80.0, lowest - 2), 100.5))
     axis.set_yticklabels([_coverage_name(row) for row in order], fontsize=7)
     axis.set_xlabel("95 % intervals that hold the truth (%)")

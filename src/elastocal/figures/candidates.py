@@ -6,7 +6,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, styled
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # As in selection.FAMILY_WISE_LEVEL, which a drawing job should not have to import all of the search for; a test compares them.
@@ -190,11 +190,7 @@ def short_name(key, longest=38):
 
 
 def _nothing_tested(table):
-    figure, axes = panels(1, 1, 25)
-    axes[0, 0].set_axis_off()
-    note = f"None of {len(set(table['candidate']))} candidates can be tested with these data."
-    axes[0, 0].text(0.5, 0.5, note, ha="center", va="center")
-    return figure
+    return note(f"None of {len(set(table['candidate']))} candidates can be tested with these data.")
 
 
 def _colours(table, indices):
@@ -221,11 +217,11 @@ def _families_legend(figure, table, order, mark):
         label = f"family-wise {100 * FAMILY_WISE_LEVEL:g} %"
         handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1, label=label))
     untestable = len(set(table["candidate"])) - len(order)
-    note = f"{len(order)} candidates tested, {untestable} more cannot be tested with these data"
+    words = f"{len(order)} candidates tested, {untestable} more cannot be tested with these data"
     if mark is None:
         none = not len(order) or table["p_family"][order].min() >= FAMILY_WISE_LEVEL
-        note += f"; {'none stands' if none else 'all stand'} out at the family-wise {100 * FAMILY_WISE_LEVEL:g} % level"
-    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=4, title_fontsize=7.5)
+        words += f"; {'none stands' if none else 'all stand'} out at the family-wise {100 * FAMILY_WISE_LEVEL:g} % level"
+    figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4, title_fontsize=7.5)
 
 
 def _frame(number, count):

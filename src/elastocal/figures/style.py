@@ -47,6 +47,14 @@ def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
+def note(text, height_mm=25):
+    """A figure that says in words why there is nothing to draw."""
+    figure, axes = panels(1, 1, height_mm)
+    axes[0, 0].set_axis_off()
+    axes[0, 0].text(0.5, 0.5, text, ha="center", va="center")
+    return figure
+
+
 def line_style(index):
     """Colour and dashes of the strategy with this place in the list; lines that coincide remain visible through the gaps."""
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}

@@ -155,7 +155,7 @@ def _effects(power, robots):
             rows.append(
                 [
                     words(effect),
-                    f"{row.level:g}" + (" before absorption" if row.level_of == "raw" else ""),
+                    f"{row.level:g}" + (" raw" if row.level_of == "raw" else ""),
                     f"{row.cases}",
                     _share(row, "detected"),
                     _share(row, "held"),
@@ -208,8 +208,6 @@ def _settings(settings, robots):
 
 
 def _undetectable(undetectable, robots):
-    if "rate" not in undetectable:
-        return []
     rows = []
     for row in undetectable[undetectable.robots == robots].itertuples():
         rows.append(
