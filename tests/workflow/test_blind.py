@@ -1,0 +1,96 @@
+"""The blind proof as a workflow: no truth is read before the diagnosis, scores do not rerun it, a changed truth is refused."""
+
+import re
+
+import pytest
+from study_folder import Study
+
+BLIND = ("blind", "--config", "blind=smoke")
+# All that an analyst does: none of these may have a truth among its inputs.
+ANALYSIS = {"diagnose_cases", "propose_follow_ups", "diagnose_follow_ups"}
+AFTERWARDS = {"seal_cases", "oracle_cases", "score_cases", "score_follow_ups"}
+SEALED = "data/sealed/smoke_1"
+
+
+@pytest.fixture(scope="module")
+def scored(tmp_path_factory):
+    """The smallest blind proof, finished."""
+    study = Study.of_sources(tmp_path_factory.mktemp("blind") / "study")
+    # Not the seed of the proof: what is looked at here is not part of it.
+    study.configure({"seed": 31})
+    study.run(*BLIND)
+    return study
+
+
+@pytest.fixture
+def copy(scored, tmp_path):
+    """A copy, to be changed."""
+    return scored.copied_to(tmp_path / "study")
+
+
+def rules(planned):
+    return {job[0] for job in planned}
+
+
+def inputs_by_rule(study):
+    plan = study.snakemake("-n", "--forceall", *BLIND)
+    assert plan.returncode == 0, plan.stderr[-2000:]
+    found = re.findall(r"^(?:local)?rule (\w+):\n    input: (.*)$", plan.stdout, re.MULTILINE)
+    return {rule: set(files.split(", ")) for rule, files in found}
+
+
+def test_no_diagnosing_rule_has_a_sealed_file_among_its_inputs(scored):
+    inputs = inputs_by_rule(scored)
+    readers = {rule for rule, files in inputs.items() if any("sealed" in file for file in files if not file.startswith("src/"))}
+    assert readers - {"make_cases"} == AFTERWARDS
+    assert set(inputs) >= ANALYSIS and not readers & ANALYSIS
+    # Nor anything that was made of one, but the manifest.
+    assert not any("oracle" in file for rule in ANALYSIS for file in inputs[rule])
+    assert "reports/blind/manifest.sha256" in inputs["diagnose_cases"]
+    assert {"results/blind/smoke_1.json", "reports/blind/manifest.sha256"} <= inputs["oracle_cases"]
+
+
+def test_a_finished_proof_has_nothing_to_do(scored):
+    assert scored.planned(*BLIND) == set()
+
+
+def test_every_table_and_figure_is_there(scored):
+    tables = ["cases", "confusion", "coverage", "power", "settings", "summary", "undetectable"]
+    assert set(scored.files("reports/blind/*.csv")) >= {f"reports/blind/{name}.csv" for name in tables}
+    assert len(scored.files("reports/blind/figures/*.pdf")) == len(scored.files("reports/blind/figures/*.png")) == 5
+    assert scored.path("reports/blind/blind.pdf").read_bytes().startswith(b"%PDF")
+    assert len(scored.path("reports/blind/cases.csv").read_text(encoding="utf-8").splitlines()) == 1 + 4
+
+
+EDITS = {
+    "the scores": ("src/elastocal/blind/scores.py", {"score_cases", "compile_blind_report"}),
+    "the targets": ("src/elastocal/blind/targets.py", {"score_cases", "draw_blind_targets", "compile_blind_report"}),
+    "the oracle": ("src/elastocal/blind/oracle.py", {"oracle_cases", "score_cases"}),
+}
+
+
+@pytest.mark.parametrize("edit", EDITS)
+def test_edit_reruns_scores_and_no_diagnosis_of(edit, copy):
+    path, expected = EDITS[edit]
+    copy.append(path, "# an edit\n")
+    planned = rules(copy.planned(*BLIND))
+    assert planned >= expected
+    assert not planned & ({"make_cases", "seal_cases"} | ANALYSIS)
+
+
+def test_a_figure_reruns_itself_and_the_report(copy):
+    copy.append("src/elastocal/figures/blind_errors.py", "# an edit\n")
+    assert rules(copy.planned(*BLIND)) == {"draw_blind_errors", "compile_blind_report", "blind"}
+
+
+@pytest.mark.parametrize("module", ["oracle", "targets"])
+def test_a_truth_that_was_edited_ends_in_one_line_with_its_file(copy, module):
+    truth = copy.files(f"{SEALED}/*.json")[0]
+    copy.append(truth, "\n")
+    # It is not sealed anew: what reads it next refuses it.
+    copy.append(f"src/elastocal/blind/{module}.py", "# an edit\n")
+    ended = copy.snakemake("-j1", *BLIND)
+    assert ended.returncode != 0
+    said = [line for line in ended.stderr.splitlines() if line.startswith(truth)]
+    assert len(said) == 1 and said[0].endswith("as sealed"), ended.stderr[-3000:]
+    assert "Traceback" not in ended.stderr
