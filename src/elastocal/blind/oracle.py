@@ -97,8 +97,6 @@ def _with_effects(declared, case, effects):
         if alternatives:
             variants *= len(alternatives)
             chosen += max(alternatives, key=lambda members: sum(told for told, _, _ in members))
-    if not chosen:
-        return declared, (), 1
     members = tuple(candidate for _, candidate, _ in chosen)
     start = declared.estimate.with_effects(members)
     start = replace(start, shapes=(*declared.estimate.shapes, *(np.array(shapes, float) for _, _, shapes in chosen)))

@@ -135,7 +135,7 @@ def _of_cases(cases):
 
 
 def _of_errors(cases, seed):
-    known = cases[cases.group.isin(["single", "pair"]) & cases.detected & cases.oracle_rms_m.notna()]
+    known = cases[cases.group.isin(["single", "pair"]) & cases.detected]
     ratio = (known.after_rms_m / known.oracle_rms_m).to_numpy()
     for name, statistic in (("median", np.median), ("mean", np.mean)):
         low, high = _bootstrapped((ratio,), statistic, stream(seed, "blind", f"{name} ratio", 0))

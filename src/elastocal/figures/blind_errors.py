@@ -27,7 +27,7 @@ def errors_against_oracle(cases):
     -------
     matplotlib.figure.Figure
     """
-    mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS) & cases.oracle_rms_m.notna()]
+    mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS)]
     figure, axes = panels(1, 2, 82, width_ratios=(1, 1.1))
     left, right = axes[0]
     for detected, color, size in ((True, PALETTE[0], 5), (False, PALETTE[1], 7)):

@@ -1,0 +1,66 @@
+"""The aliases that the scores set aside are exact on the design of the blind cases, and no others are."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
+
+from elastocal.blind.case_rows import EXACT_ALIASES
+from elastocal.blind.cases import Case, make_case
+from elastocal.fitting import fit
+from elastocal.loop.case import case_from, noise_from
+from elastocal.loop.declared import noise_of
+from elastocal.loop.intake import taken_in
+from elastocal.loop.reading_columns import reading_columns
+from elastocal.model import circumstances
+from elastocal.screening import directions
+
+ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
+_SINE = 1e-6
+
+
+@pytest.fixture(scope="module", params=["fanuc", "abb"])
+def seen(request, tmp_path_factory):
+    """What every candidate makes of the readings of a robot without an effect, off the declared model."""
+    folder = tmp_path_factory.mktemp(request.param)
+    made = Case("aliases", "none", request.param, (), (), "usual", 314159)
+    make_case(made, folder / "blind", folder / "sealed", ROBOTS)
+    descriptions, training, _ = taken_in((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
+    case = case_from(descriptions, reading_columns(training))
+    declared = fit(case.model, case.observations, noise_from(noise_of(case)))
+    candidates = [c for c in case.candidates.values() if not c.shapes]
+    return declared, case.observations, directions(declared, case.observations, candidates, 0.0, 0.0)
+
+
+def test_effects_with_the_same_span_are_those_set_aside(seen):
+    _, _, found = seen
+    same = set()
+    for (one, _), columns in zip(found.candidates, found.columns, strict=True):
+        for (other, _), others in zip(found.candidates, found.columns, strict=True):
+            within = columns.shape[1] and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
+            if one.effect != other.effect and within and columns.shape == others.shape:
+                same.add(((one.effect, one.joints), other.effect))
+    told = {(place, other) for place, other in EXACT_ALIASES.items() if place[0] not in ("force_scale", "link_weight")}
+    assert same == told
+
+
+def test_nothing_of_a_wrong_force_scale_is_left_off_the_compliances(seen):
+    _, _, found = seen
+    columns = [
+        c for (candidate, _), c in zip(found.candidates, found.columns, strict=True) if candidate.effect == "force_scale"
+    ]
+    assert not sum(part.shape[1] for part in columns)
+
+
+def test_the_weight_of_the_upper_arm_turns_joint_2_as_a_compensator_does(seen):
+    declared, observations, _ = seen
+    states = circumstances(declared.model, declared.estimate, observations.states)
+    angle = states.joint_angles[:, 1]
+    waves = np.linalg.qr(np.array([np.cos(angle), np.sin(angle)]).T)[0]
+    torque = states.weight[2][:, 1]
+    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) < _SINE * np.linalg.norm(torque)
+    # The weight of the forearm does not.
+    torque = states.weight[3][:, 1]
+    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) > 0.01 * np.linalg.norm(torque)
