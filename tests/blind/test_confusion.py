@@ -35,3 +35,5 @@ def test_each_case_is_counted_where_it_belongs():
 def test_hard_settings_are_apart():
     table = confused(frame(tuple(ENTRIES[0][:3]), (truth(setting="outliers_5_percent"), silence(), oracle(1.0))))
     assert sorted(table.settings) == ["hard", "usual"]
+    swept = truth(("payload",), group="sweep", setting="flange, one load, narrow")
+    assert confused(frame((swept, silence(), oracle(0.2)))).settings.tolist() == ["sweep"]

@@ -12,8 +12,10 @@ from elastocal.figures.style import panels, save
 from elastocal.report.blind_facts import blind_facts
 from elastocal.report.blind_pages import write_blind_report
 
-FIGURES = ("targets", "power", "confusion", "errors", "coverage")
+FIGURES = ("targets", "power", "confusion", "errors", "coverage", "sweep")
 PAYLOAD = verdict("named", effect("payload"))
+SWEEP = ["pair", "angle_up_to_deg", "cases"]
+SWEEP += [f"{name}{end}" for name in ("right", "class", "wrong", "other") for end in ("", "_low", "_high")]
 FOLLOW_UP = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high"]
 
 
@@ -23,7 +25,7 @@ def scale():
     return document
 
 
-def tables(folder, *entries, follow_up=()):
+def tables(folder, *entries, follow_up=(), sweep=()):
     """As the pipeline has them: written and read again."""
     cases = frame(*entries)
     intervals = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
@@ -36,6 +38,7 @@ def tables(folder, *entries, follow_up=()):
         "coverage": covered(intervals),
         "undetectable": undetectable(cases),
         "follow_up": pd.DataFrame(follow_up, columns=FOLLOW_UP),
+        "sweep": pd.DataFrame(sweep, columns=SWEEP),
     }
     for name, table in made.items():
         table.to_csv(folder / f"{name}.csv", index=False)
@@ -92,6 +95,13 @@ def test_what_is_absorbed_is_listed_with_its_reason(tmp_path):
 
 def test_follow_up_rows_are_worded(tmp_path):
     assert facts_of(tmp_path, *PROOF, follow_up=MEASURED)["follow_up"] == [["proof", "proposed", "5", "12", "75 %", "43–95 %"]]
+
+
+def test_near_relatives_are_told_for_all_pairs_together(tmp_path):
+    shares = [0.5, 0.2, 0.8, 0.25, 0.1, 0.4, 0.25, 0.1, 0.4, 0.0, 0.0, 0.2]
+    rows = [("all", 20.0, 4, *shares), ("payload / link_weight", 20.0, 4, *shares)]
+    found = facts_of(tmp_path, *PROOF, sweep=rows)["sweep"]
+    assert found == [["20°", "4", "50 (20–80)", "25 (10–40)", "25 (10–40)", "0 (0–20)"]]
 
 
 @pytest.mark.parametrize("entries", [PROOF, ((truth(robot="kuka"), silence(), oracle(1.0)),)])

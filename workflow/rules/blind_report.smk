@@ -1,7 +1,7 @@
 """What comes after the verdicts of the blind proof: the oracle, the scores, figures and the report.
 
-Needs data/blind/, data/sealed/, the verdicts of results/blind/ and reports/blind/follow_up.csv. Writes results/blind/oracle/ and
-reports/blind/.
+Needs data/blind/, data/sealed/, the verdicts of results/blind/ and what blind_follow_up.smk makes. Writes results/blind/oracle/
+and reports/blind/.
 """
 
 BLIND_FIGURES = ["targets", "power", "confusion", "errors", "coverage"]
@@ -135,8 +135,9 @@ rule compile_blind_report:
         confusion=rules.score_cases.output.confusion,
         cases=rules.score_cases.output.cases,
         follow_up=rules.score_follow_ups.output.rates,
+        sweep=rules.score_sweep.output.table,
         manifest=rules.seal_cases.output.manifest,
-        figures=expand("reports/blind/figures/{figure}.pdf", figure=BLIND_FIGURES),
+        figures=[*expand("reports/blind/figures/{figure}.pdf", figure=BLIND_FIGURES), rules.score_sweep.output.pdf],
         pages="src/elastocal/report/blind.typ",
         sources=sources("compile_blind_report.py"),
     output:

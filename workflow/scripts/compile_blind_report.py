@@ -9,7 +9,7 @@ from elastocal.report.blind_pages import write_blind_report
 
 from job import run
 
-TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up")
+TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up", "sweep")
 
 
 def compile_blind_report(job):

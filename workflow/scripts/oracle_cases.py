@@ -1,23 +1,21 @@
 """What the oracle does on a block of blind cases, once they are diagnosed."""
 
-import json
 from pathlib import Path
 
 from elastocal.blind.oracle import oracle
 from elastocal.blind.truths import opened_truths
-from elastocal.frames import write_text
-from elastocal.loop.opened import opened_json
+from elastocal.json_files import read_json, write_json
 
 from job import run
 
 
 def oracle_cases(job):
     truths = opened_truths(Path(job.input.sealed).glob("*.json"), job.input.manifest)
-    verdicts = {verdict["campaign"]: verdict for verdict in opened_json(job.input.verdicts)}
+    verdicts = {verdict["campaign"]: verdict for verdict in read_json(job.input.verdicts)}
     found = {}
     for name, truth in truths.items():
         found[name] = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", "config/robots", job.params.seed)
-    write_text(job.output.oracle, json.dumps(found, allow_nan=False) + "\n")
+    write_json(job.output.oracle, found, allow_nan=False)
 
 
 run(oracle_cases, snakemake)

@@ -5,7 +5,7 @@ import pandas as pd
 from elastocal.effects.catalogue import effects
 from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 
-PAIR = "pair"
+PAIR, SWEEP = "pair", "sweep"
 CLASS_WITH, CLASS_WITHOUT = "class with the truth", "class without the truth"
 FAULT = "named: fault of the data"
 WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE)
@@ -22,12 +22,12 @@ def confused(cases):
     Returns
     -------
     pandas.DataFrame
-        One row for each kind of robots, setting (usual or hard), truth and level; one column for each name of the catalogue
-        said alone and for each other word, all of them always there, so that every row adds up to its cases.
+        One row for each kind of robots, settings (usual, hard, or the designs of a sweep), truth and level; one column for each
+        name of the catalogue said alone and for each other word, all of them always there: every row adds up to its cases.
     """
     names = [*effects()]
     said = [_said(row, names) for row in cases.itertuples()]
-    setting = cases.setting.where(cases.setting == "usual", "hard")
+    setting = cases.setting.where(cases.setting == "usual", "hard").where(cases.group != SWEEP, SWEEP)
     truth = cases.truth.where(cases.group != PAIR, PAIR)
     table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(said, cases.index, name="said"))
     return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})

@@ -6,7 +6,8 @@ from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from elastocal.blind.rates import rate
-from elastocal.blind.scores import NONE, PROOF, TUNED, TUNED_ON
+from elastocal.blind.robots import kind_of
+from elastocal.blind.scores import NONE
 
 COMPLIANCE = "joint_compliance"
 EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"
@@ -39,7 +40,7 @@ def intervals_of(truth, verdict):
     freedom = verdict["noise"]["degrees_of_freedom"]
     width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
     head = {
-        "robots": TUNED if case["robot"] in TUNED_ON else PROOF,
+        "robots": kind_of(case["robot"]),
         "setting": case["setting"],
         "truth": " + ".join(case["effects"]) or NONE,
         "level": max(case["levels"], default=0.0),

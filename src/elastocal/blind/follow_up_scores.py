@@ -8,9 +8,6 @@ from elastocal.blind.follow_up import ARMS, POSES
 from elastocal.blind.scores import outcome
 from elastocal.verdict import CLASS
 
-# The robot on which the method was tuned, apart from those on which it is proved.
-TUNED_ON = ("kuka",)
-TUNED, PROOF = "tuned", "proof"
 _CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "foreseen", "arm", "poses_added"]
 _CASE_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
 _COLUMNS = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high", "still_class", "wrong_name", "other_verdict"]
@@ -44,7 +41,6 @@ def followed(truths, first, anew, foreseen):
             for poses in (0, *POSES):
                 verdict = said.get((name, arm, poses), verdict)
                 rows.append({"arm": arm, "poses_added": poses, "foreseen": foreseen[name]} | outcome(truths[name], verdict))
-                rows[-1]["robots"] = TUNED if rows[-1]["robot"] in TUNED_ON else PROOF
     return pd.DataFrame(rows, columns=_CASE_COLUMNS)
 
 

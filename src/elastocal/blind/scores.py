@@ -3,11 +3,9 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from elastocal.blind.robots import kind_of
 from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 
-# The robot on which the method was tuned, apart from those on which it is proved.
-TUNED_ON = ("kuka",)
-TUNED, PROOF = "tuned", "proof"
 NONE = "none"
 SILENT = (ADEQUATE, NOT_TESTABLE)
 
@@ -38,7 +36,7 @@ def outcome(truth, verdict):
         "case": truth["campaign"],
         "group": case["group"],
         "robot": case["robot"],
-        "robots": TUNED if case["robot"] in TUNED_ON else PROOF,
+        "robots": kind_of(case["robot"]),
         "setting": case["setting"],
         "truth": " + ".join(true) or NONE,
         "level": max(case["levels"], default=0.0),
@@ -50,11 +48,6 @@ def outcome(truth, verdict):
         "holds_truth": stated and _each_is_held(true, verdict["effects"]),
         "wrong_name": said == NAMED and names != true,
     }
-
-
-def leading(robots):
-    """Which of the robots a figure shows: those of the proof, or where there is none the one that it was tuned on."""
-    return PROOF if PROOF in set(robots) else TUNED
 
 
 def _each_is_held(true, effects):

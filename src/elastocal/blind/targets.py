@@ -7,7 +7,8 @@ import pandas as pd
 from scipy.stats import bootstrap
 
 from elastocal.blind.rates import rate
-from elastocal.blind.scores import NONE, PROOF, TUNED
+from elastocal.blind.robots import PROOF, TUNED
+from elastocal.blind.scores import NONE
 from elastocal.random_streams import stream
 
 _RESAMPLES = 2000

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from elastocal.blind.scores import leading
+from elastocal.blind.robots import leading
 from elastocal.figures.style import PALETTE, panels, styled
 
 _MICRO = 1e6

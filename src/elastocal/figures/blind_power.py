@@ -5,7 +5,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Rectangle
 
 from elastocal.blind.confusion import PAIR, WORDS
-from elastocal.blind.scores import leading
+from elastocal.blind.robots import leading
 from elastocal.figures.style import PALETTE, note, panels, styled
 
 PANELS = {

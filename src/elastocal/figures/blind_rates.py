@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from elastocal.blind.scores import PROOF, TUNED, leading
+from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.figures.style import PALETTE, note, panels, styled
 
 LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robot on which it was tuned")}

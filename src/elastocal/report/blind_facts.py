@@ -6,7 +6,8 @@ import pandas as pd
 
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
-from elastocal.blind.scores import NONE, PROOF, TUNED, leading
+from elastocal.blind.robots import PROOF, TUNED, leading
+from elastocal.blind.scores import NONE
 from elastocal.plant.campaigns import Design
 from elastocal.report.wording import at_joints, counted, grouped, listed, plain, words
 
@@ -17,8 +18,10 @@ _GROUPS = {
     "pair": "two effects of the catalogue",
     "outside": "one effect outside of the catalogue",
     "setting": "hard settings, with an effect and without",
+    "sweep": "near relatives under other designs",
 }
 _SAID_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
+_SAID_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
 
 
@@ -28,7 +31,8 @@ def blind_facts(tables, manifest, size, seed, replicates):
     Parameters
     ----------
     tables : dict of str to pandas.DataFrame
-        ``summary``, ``settings``, ``power``, ``undetectable``, ``confusion``, ``cases`` and ``follow_up`` of reports/blind/.
+        ``summary``, ``settings``, ``power``, ``undetectable``, ``confusion``, ``cases``, ``follow_up`` and
+        ``sweep`` of reports/blind/.
     manifest : str
         Contents of the manifest.
     size : str
@@ -70,6 +74,7 @@ def blind_facts(tables, manifest, size, seed, replicates):
         "outside": _outside(tables["confusion"], robots),
         "settings": _settings(tables["settings"], robots),
         "undetectable": _undetectable(tables["undetectable"], robots),
+        "sweep": _sweep(tables["sweep"]),
         "follow_up": _follow_up(tables["follow_up"]),
     }
 
@@ -151,25 +156,25 @@ def _effects(power, robots):
     mine = power[(power.robots == robots) & (power.group == "single") & (power.effect != "all")]
     rows = []
     for effect, part in mine.groupby("effect"):
-        for row in part.sort_values("level").tail(2).itertuples():
+        for row in part.sort_values("level").tail(2).to_dict("records"):
             rows.append(
                 [
                     words(effect),
-                    f"{row.level:g}" + (" raw" if row.level_of == "raw" else ""),
-                    f"{row.cases}",
+                    f"{row['level']:g}" + (" raw" if row["level_of"] == "raw" else ""),
+                    f"{row['cases']}",
                     _share(row, "detected"),
                     _share(row, "held"),
                     _share(row, "named"),
                     _share(row, "oracle_detected"),
-                    f"{plain(row.signal_rms_um)} µm",
-                    f"{row.times_plausible:.2f}",
+                    f"{plain(row['signal_rms_um'])} µm",
+                    f"{row['times_plausible']:.2f}",
                 ]
             )
     return rows
 
 
 def _share(row, name):
-    rate, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low", "_high"))
+    rate, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
     return _ABSENT if pd.isna(rate) else f"{100 * rate:.0f} ({100 * low:.0f}–{100 * high:.0f})"
 
 
@@ -222,6 +227,13 @@ def _undetectable(undetectable, robots):
             ]
         )
     return rows
+
+
+def _sweep(sweep):
+    return [
+        [f"{row['angle_up_to_deg']:g}°", f"{row['cases']}", *(_share(row, name) for name in _SAID_OF_RELATIVES)]
+        for row in sweep[sweep.pair == "all"].to_dict("records")
+    ]
 
 
 def _follow_up(follow_up):
