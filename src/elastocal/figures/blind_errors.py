@@ -2,7 +2,7 @@
 
 import numpy as np
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from elastocal.blind.robots import leading
 from elastocal.figures.style import PALETTE, panels, styled
@@ -10,8 +10,11 @@ from elastocal.figures.style import PALETTE, panels, styled
 _MICRO = 1e6
 _GROUPS = ("single", "pair")
 _WITHIN = 1.05
-# Digits at which a logarithmic axis is marked, for a range of less than a decade and for others.
-_FINE, _COARSE = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0), (1.0, 2.0, 5.0)
+# A logarithmic axis of less is marked like a linear one.
+_DECADE = 4.0
+# Smaller excesses over the oracle, in per cent, are shown to scale, larger ones by their logarithm.
+_TO_SCALE = 0.1
+_MARKS = (-10, -1, -0.1, 0, 0.1, 1, 5, 20, 100)
 
 
 @styled
@@ -41,20 +44,24 @@ def errors_against_oracle(cases):
     left.set(xscale="log", yscale="log", xlim=ends, ylim=ends)
     left.set(xlabel="of the oracle (µm)", ylabel="after the diagnosis (µm)", title="held-out RMS, case by case")
     for axis in (left.xaxis, left.yaxis):
-        axis.set_major_locator(LogLocator(subs=_FINE if high < 4 * low else _COARSE))
+        axis.set_major_locator(MaxNLocator(5) if high < _DECADE * low else LogLocator(subs=(1.0, 2.0, 5.0)))
         axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter("")
+        axis.set_minor_locator(NullLocator())
     left.set_aspect("equal", adjustable="box")
     for number, (level, part) in enumerate(mine[mine.group == "single"].groupby("level")):
         _shares(right, part, PALETTE[number % len(PALETTE)], "-", f"one effect, non-centrality {level:g}")
     for number, (level, part) in enumerate(mine[mine.group == "pair"].groupby("level")):
         _shares(right, part, PALETTE[(number + 4) % len(PALETTE)], "--", f"two effects, {level:g} each")
-    right.axvline(1.0, color="black", linewidth=0.8)
-    right.axvline(_WITHIN, color="black", linewidth=0.8, linestyle=":")
-    ratio = (mine.after_rms_m / mine.oracle_rms_m).to_numpy()
-    if len(ratio):
-        right.set_xlim(min(0.97, np.quantile(ratio, 0.005)), max(1.12, np.quantile(ratio, 0.995)))
-    right.set(ylim=(0, 102), xlabel="RMS after the diagnosis over the oracle's", ylabel="cases with no larger ratio (%)")
+    right.axvline(0.0, color="black", linewidth=0.8)
+    right.axvline(_percent(_WITHIN), color="black", linewidth=0.8, linestyle=":")
+    excess = _percent(mine.after_rms_m / mine.oracle_rms_m)
+    limits = (min(-_TO_SCALE, excess.min()), max(10.0, excess.max())) if len(mine) else (-1.0, 10.0)
+    right.set_xscale("symlog", linthresh=_TO_SCALE)
+    right.set(xlim=(1.1 * limits[0], 1.1 * limits[1]), ylim=(0, 102))
+    right.set_xticks([mark for mark in _MARKS if 1.1 * limits[0] <= mark <= 1.1 * limits[1]])
+    right.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    right.xaxis.set_minor_locator(NullLocator())
+    right.set(xlabel="RMS after the diagnosis above the oracle's (%)", ylabel="cases with no larger excess (%)")
     right.set_title("by the size of the effect")
     handles = [
         Line2D([], [], linestyle="", marker="o", color=PALETTE[0], markersize=4, label="detected"),
@@ -67,7 +74,11 @@ def errors_against_oracle(cases):
     return figure
 
 
+def _percent(ratio):
+    return 100.0 * (ratio - 1.0)
+
+
 def _shares(axis, part, color, dashes, label):
-    ratio = np.sort((part.after_rms_m / part.oracle_rms_m).to_numpy())
-    steps = 100.0 * np.arange(1, len(ratio) + 1) / len(ratio)
-    axis.step(ratio, steps, where="post", color=color, linestyle=dashes, linewidth=1.2, label=label)
+    excess = np.sort(_percent(part.after_rms_m / part.oracle_rms_m).to_numpy())
+    steps = 100.0 * np.arange(len(excess) + 1) / len(excess)
+    axis.step([*excess, excess[-1]], steps, where="pre", color=color, linestyle=dashes, linewidth=1.2, label=label)
