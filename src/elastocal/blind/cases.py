@@ -9,7 +9,6 @@ from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations, product
 from pathlib import Path
 
-from elastocal.blind.robots import PROVED_ON, TUNED_ON
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
@@ -21,7 +20,8 @@ from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import Tracker
 from elastocal.whole_files import appearing_whole
 
-ROBOTS = (*TUNED_ON, *PROVED_ON)
+PROOF, TUNED = ("fanuc", "abb"), ("kuka",)
+ROBOTS = (*TUNED, *PROOF)
 LEVELS = (10.0, 25.0, 50.0, 200.0)
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
 FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
@@ -146,7 +146,7 @@ class Counts:
 
 SIZES = {
     "smoke": Counts(none=2, single=0, outside=0, pair=1, setting=0, robots=("kuka",)),
-    "quick": Counts(none=20, single=1, outside=1, pair=5, setting=1, levels=(50.0, 200.0), robots=PROVED_ON),
+    "quick": Counts(none=20, single=1, outside=1, pair=5, setting=1, levels=(50.0, 200.0), robots=PROOF),
     # On the two robots of the proof together 520 nulls, at a true rate of 5 % a 95 % interval of 3.3 to 7.2 %; 40 cases of each
     # effect at each level, 150 pairs at each. On the robot on which the method was tuned a few of each, to compare.
     "full": Counts(
@@ -157,8 +157,8 @@ SIZES = {
         setting=8,
         sweep=1,
         outside_levels=(200.0,),
-        robots=PROVED_ON,
-        also=(Counts(none=60, single=3, outside=4, pair=12, setting=2, outside_levels=(200.0,), robots=TUNED_ON),),
+        robots=PROOF,
+        also=(Counts(none=60, single=3, outside=4, pair=12, setting=2, outside_levels=(200.0,), robots=TUNED),),
     ),
 }
 

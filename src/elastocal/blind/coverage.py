@@ -6,8 +6,7 @@ from scipy.stats import norm
 from scipy.stats import t as t_distribution
 
 from elastocal.blind.rates import rate
-from elastocal.blind.robots import kind_of
-from elastocal.blind.scores import NONE
+from elastocal.blind.scores import NONE, kind_of
 
 COMPLIANCE = "joint_compliance"
 EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"

@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from elastocal.blind.robots import kind_of
+from elastocal.blind.cases import TUNED as TUNED_ON
+from elastocal.blind.robots import PROOF, TUNED
 from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 
 NONE = "none"
@@ -48,6 +49,11 @@ def outcome(truth, verdict):
         "holds_truth": stated and _each_is_held(true, verdict["effects"]),
         "wrong_name": said == NAMED and names != true,
     }
+
+
+def kind_of(robot):
+    """Whether a robot belongs to the proof or was tuned on."""
+    return TUNED if robot in TUNED_ON else PROOF
 
 
 def _each_is_held(true, effects):
