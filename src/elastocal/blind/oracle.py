@@ -39,9 +39,10 @@ def oracle(truth, verdict, folder, robots_folder, seed):
     -------
     dict or None
         ``candidates`` that the model was given; ``p_value`` of a Wald test of all their coefficients at once (chi-squared, with
-        the covariance of the fit; a fitted shape counts as one more degree of freedom, and the p-value is multiplied by the
-        number of variants), 1 where these data can tell none of them; ``detected`` at 5 %; ``heldout``, errors on the held-out
-        poses as in verdict.json. None where an effect is outside of the catalogue: no model of it has that effect.
+        the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the p-value is
+        multiplied by the number of variants), 1 where these data can tell none of them; ``detected`` at 5 %; ``heldout``,
+        errors on the held-out poses as in verdict.json. None where an effect is outside of the catalogue: no model of it has
+        that effect.
     """
     effects = [(defect["effect"], tuple(defect["joints"])) for defect in truth["defects"]]
     if any(effect.startswith(OUTSIDE) for effect, _ in effects):
@@ -105,18 +106,17 @@ def _with_effects(declared, case, effects):
 
 
 def _wald(fitted, members):
-    coefficients, shapes = [], 0
-    for member in members:
-        mine = parameter_slice(fitted, member.key)
-        coefficients += [index for index in mine[: len(member.parameters)] if not fitted.held[index]]
-        shapes += int((~fitted.held[mine[len(member.parameters) :]]).sum())
-    if not coefficients:
+    """Of all coefficients at once, given the shapes."""
+    places = [np.split(parameter_slice(fitted, member.key), [len(member.parameters)]) for member in members]
+    linear, shapes = (np.concatenate([place[part] for place in places] or [[]]) for part in (0, 1))
+    free = np.flatnonzero(~fitted.held)
+    tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
+    if not tested.any():
         return 1.0
-    keys = [effect.key for effect in fitted.model.effects]
-    values = np.concatenate([fitted.estimate.coefficients[keys.index(member.key)] for member in members])
-    free = np.concatenate([~fitted.held[parameter_slice(fitted, m.key)[: len(m.parameters)]] for m in members])
-    covariance = fitted.covariance[np.ix_(coefficients, coefficients)]
-    return float(chi2.sf(values[free] @ np.linalg.solve(covariance, values[free]), len(coefficients) + shapes))
+    values = np.concatenate([fitted.values_of(member.key)[0] for member in members])[np.isin(linear, free)]
+    information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
+    covariance = np.linalg.inv(information[np.ix_(kept, kept)])[np.ix_(tested[kept], tested[kept])]
+    return float(chi2.sf(values @ np.linalg.solve(covariance, values), tested.sum() + (~kept).sum()))
 
 
 def _told(members, p_value, heldout):
