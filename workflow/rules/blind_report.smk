@@ -154,6 +154,19 @@ rule compile_blind_report:
         "../scripts/compile_blind_report.py"
 
 
+rule blind_pictures:
+    input:
+        figures=expand("reports/blind/figures/{figure}.png", figure=["targets", "power"]),
+    output:
+        figures=expand("docs/blind_{figure}.png", figure=["targets", "power"]),
+    log:
+        "results/logs/blind_pictures.log",
+    benchmark:
+        "results/timings/blind_pictures.tsv"
+    shell:
+        "(for one in {input.figures}; do cp $one docs/blind_$(basename $one); done) 2> {log}"
+
+
 rule blind:
     input:
         rules.score_cases.output,
