@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_folders import made_folder, made_table
+from made_folders import PLAN, made_folder, made_table
 
 from elastocal.attribution import Attribution
 from elastocal.fitting import fit
@@ -161,6 +161,22 @@ def test_unknown_noise_is_null_and_not_a_number_nowhere(case, fits):
     verdict = said(case, [replace(fitted, noise=unknown) for fitted in fits], noise=unknown)
     assert verdict["lack_of_fit"]["before"] == {"mean_square_over_noise": None, "p_value": None, "rejected": False}
     assert verdict["noise"]["source"] == "residual"
+
+
+def test_a_wild_repeat_is_not_in_the_means(kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made", plan=replace(PLAN, repeats=4))
+    repeated = np.flatnonzero(table["repeat"] == 3)
+    observations = []
+    for name, off in (("clean", 0.0), ("wild", 0.01)):
+        moved = table["x"].copy()
+        moved[repeated] += off * (np.arange(len(repeated)) % 4 == 0)
+        made_folder(tmp_path / name, kuka, table=table | {"x": moved})
+        descriptions, training, _ = taken_in(tmp_path / name, config_folder / "robots")
+        observations.append(case_from(descriptions, reading_columns(training)).observations)
+    clean, wild = observations
+    shifted = np.abs(wild.position - clean.position).max(axis=1)
+    # The means lose one of four repeats, each 60 µm off or so, and not a share of ten millimetres.
+    assert 2 <= np.count_nonzero(shifted) < len(shifted) and shifted.max() < 2e-4
 
 
 def test_noise_is_of_repeats_as_declared_or_of_the_residual(case):
