@@ -102,8 +102,10 @@ def experiment_rows(effect="link_elasticity", count=10):
     return rows
 
 
-def effect_entry(name="lost_motion", members=("lost_motion@3",), joints=(3,), parameters=("half_play",), alternatives=()):
-    """An entry of the effects of verdict.json."""
+def effect_entry(
+    name="lost_motion", members=("lost_motion@3",), joints=(3,), parameters=("half_play",), alternatives=(), doubted=()
+):
+    """An entry of the effects of verdict.json; its first member goes with what is `doubted`."""
     named = [
         {"name": f"{member} {parameter}", "value": 1.2e-4 * (1 + number), "std_error": 3e-6, "unit": "rad", "held": False}
         for number, (member, parameter) in enumerate((m, p) for m in members for p in parameters)
@@ -117,6 +119,7 @@ def effect_entry(name="lost_motion", members=("lost_motion@3",), joints=(3,), pa
         "p_value": 0.0005,
         "heldout_gain": 0.24,
         "alternatives": list(alternatives),
+        "doubts": [{"effect": members[0], "circumstance": circumstance, "p_value": 0.01} for circumstance in doubted],
         "angle_to_nearest_deg": 49.0,
     }
 
@@ -132,6 +135,7 @@ def fault_entry():
         "p_value": None,
         "heldout_gain": None,
         "alternatives": [],
+        "doubts": [],
         "angle_to_nearest_deg": None,
     }
 

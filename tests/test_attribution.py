@@ -63,6 +63,28 @@ def test_what_makes_something_of_its_own_has_no_alternative(fanuc):
     assert len(set(attribution.rivals)) == len(attribution.rivals)
 
 
+FORMS = {
+    "payload[mass]": ("payload", "payload[mass]"),
+    "payload": ("payload", "payload[mass]"),
+    "compensator_torque@2[first order]": ("compensator_torque@2", "compensator_torque@2[first order]"),
+    "transmission_harmonic@3[orders 1-2]": tuple(f"transmission_harmonic@3[orders {band}]" for band in ("1-2", "3-6", "7-12")),
+    "link_weight@2": ("link_weight@2",),
+}
+
+
+@pytest.mark.parametrize("found", FORMS)
+def test_another_form_of_the_same_effect_at_the_same_joints_is_no_alternative(found, fanuc):
+    """Its other joints may be."""
+    campaign = planted(fanuc, {found: share(fanuc, found, 0.5)}, seed=6)
+    (attribution,) = attributed(campaign, found)
+    assert not set(FORMS[found]) & {*attribution.rivals, *attribution.alternatives}
+    effect, joints = campaign.candidates[found].effect, campaign.candidates[found].joints
+    others = [c for c in campaign.all_candidates if c.effect != effect or c.joints != joints]
+    bare = without(found_in(campaign, found)[0], {found}, campaign.observations)
+    testable = {candidate.key for candidate, _ in directions(bare, campaign.observations, others).candidates}
+    assert set(attribution.rivals) == testable and len(testable) > 50
+
+
 def test_angles_and_criteria_are_those_of_least_squares(fanuc):
     """Against the residual of the fit without what was found, at the noise of the fit with it."""
     key = "link_weight@3"

@@ -311,3 +311,66 @@ def test_parameters_are_held_given_those_before_them():
     gram = 1e4 * np.array([[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), [True, False, True])
     np.testing.assert_array_equal(identifiable(gram, np.array([True, False, False]), np.zeros(3, bool)), [False, True, True])
+
+
+# Both can be told, one after the other; together the first is told worse than the other, to which it is bound.
+BOUND = np.linalg.inv(np.array([[4.0, 1.9], [1.9, 0.95]]))
+
+
+def test_a_shape_is_given_up_before_the_parameter_that_it_is_bound_to():
+    nobody = np.zeros(2, bool)
+    np.testing.assert_array_equal(identifiable(BOUND, nobody, np.array([False, True])), [True, False])
+    np.testing.assert_array_equal(identifiable(BOUND, nobody, nobody), [False, True])
+
+
+def test_a_shape_that_is_bound_to_nothing_is_kept():
+    gram = np.diag([9.0, 0.0, 0.0, 4.0])
+    gram[1:3, 1:3] = BOUND
+    nobody = np.zeros(4, bool)
+    np.testing.assert_array_equal(identifiable(gram, nobody, np.arange(4) == 3), [True, False, True, True])
+    # A shape is no better than others where it is what can be told worst.
+    worst = np.linalg.inv(np.array([[0.95, 1.9], [1.9, 4.0]]))
+    np.testing.assert_array_equal(identifiable(worst, nobody[:2], np.array([False, True])), [True, False])
+
+
+@pytest.mark.parametrize("half_play", [1e-4, 3e-4, 1e-3])
+def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_shape(fanuc, half_play):
+    """Play that the load never crosses but a little: half the play over the torque is all that shows."""
+    model = model_of(fanuc, "lost_motion@2")
+    true = made_estimate(model, seed=46)
+    true = replace(true, coefficients=(np.array([half_play]),), shapes=(np.array([390.0]),))
+    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=47, force=50.0)), np.random.default_rng(48))
+    found = fit(model, seen, NOISE)
+    assert names_held(found) == ["lost_motion@2 torque"]
+    (value,), (torque,) = found.estimate.coefficients[0], found.estimate.shapes[0]
+    number = [owner for owner, _ in found.parameters].index("lost_motion@2")
+    deviation = np.sqrt(found.covariance[number, number])
+    # Given the torque; of the straight line within four standard errors.
+    assert value > 5 * deviation
+    assert abs(value / torque - half_play / 390.0) < 4 * deviation / torque
+
+
+def test_wild_observations_are_those_of_little_weight_and_do_not_count(fanuc):
+    model = model_of(fanuc, "joint_offset@3")
+    true = made_estimate(model, seed=49)
+    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=50)), np.random.default_rng(51))
+    moved = seen.position.copy()
+    moved[[3, 20, 41]] += 40 * 60e-6 * np.eye(3)
+    found, clean = (fit(model, replace(seen, position=position), NOISE) for position in (moved, seen.position))
+    np.testing.assert_array_equal(np.flatnonzero(~found.tame), [3, 20, 41])
+    assert clean.tame.all() and clean.tame_freedom == clean.degrees_of_freedom == 180 - 10
+    assert found.tame_freedom == found.degrees_of_freedom - 9 == 180 - 10 - 9
+    # Nor are they taken for something that the model lacks.
+    assert found.discrepancy_m == pytest.approx(clean.discrepancy_m, abs=10e-6)
+
+
+def test_a_discrepancy_is_found_beside_wild_observations(fanuc):
+    model = model_of(fanuc)
+    seen = seen_exactly(model, made_estimate(model, seed=52), made_states(6, 150, seed=53))
+    seen = with_noise(seen, np.random.default_rng(54), position_m=np.hypot(60e-6, 200e-6))
+    moved = seen.position.copy()
+    moved[::30] += 0.02
+    found = fit(model, replace(seen, position=moved), NOISE)
+    assert found.discrepancy_m == pytest.approx(200e-6, rel=0.15)
+    tame = found.residual * found.tame[:, None]
+    assert (found.whitened(tame) ** 2).sum() == pytest.approx(found.tame_freedom, rel=5e-3)

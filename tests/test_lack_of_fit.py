@@ -7,6 +7,7 @@ import pytest
 from planted import planted
 from scipy.stats import binom, f, kstest
 
+from elastocal.fitting import fit
 from elastocal.lack_of_fit import LEVEL, lack_of_fit
 from elastocal.noise import Noise
 
@@ -42,6 +43,37 @@ def test_a_planted_effect_is_lack_of_fit_and_the_fit_with_it_is_not(fanuc):
     assert found.ratio > 5 and found.excess == found.ratio - 1
     # The discrepancy that the fit made up for its weights is no excuse.
     assert campaign.declared.discrepancy_m > 0
+
+
+def some_wild(campaign, seed, share=0.03, deviations=(6.0, 60.0)):
+    """The campaign with single readings off, and its declared model fitted anew."""
+    rng = np.random.default_rng((12, seed))
+    position = campaign.observations.position.copy()
+    wild = rng.permutation(len(position))[: round(share * len(position))]
+    off = rng.standard_normal((len(wild), 3))
+    size = campaign.declared.noise.position_m * rng.uniform(*deviations, (len(wild), 1))
+    position[wild] += size * off / np.linalg.norm(off, axis=1, keepdims=True)
+    seen = replace(campaign.observations, position=position)
+    return fit(campaign.declared.model, seen, campaign.declared.noise, campaign.declared.estimate), seen
+
+
+def test_single_wild_readings_are_no_lack_of_fit(fanuc):
+    campaigns = [planted(fanuc, {}, seed=300 + seed, poses=30) for seed in range(8)]
+    certain = [
+        [lack_of_fit(with_noise(fitted, degrees_of_freedom=10**7), seen) for fitted, seen in pair]
+        for pair in [((c.declared, c.observations), some_wild(c, seed)) for seed, c in enumerate(campaigns)]
+    ]
+    for clean, found in certain:
+        assert not found.rejected
+        # Of 120 readings four are left out with their three rows each, or some of them.
+        assert clean.residual_freedom - 12 <= found.residual_freedom < clean.residual_freedom
+        assert found.ratio == pytest.approx(clean.ratio, abs=0.08)
+
+
+def test_wild_readings_do_not_hide_what_is_missing(fanuc):
+    campaign = planted(fanuc, {"joint_offset@3": [5e-4]}, seed=1)
+    found = lack_of_fit(*some_wild(campaign, 1))
+    assert found.rejected and found.ratio == pytest.approx(lack_of_fit(campaign.declared, campaign.observations).ratio, rel=0.1)
 
 
 def test_ratio_is_the_mean_square_over_the_noise(fanuc):

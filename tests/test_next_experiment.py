@@ -105,7 +105,8 @@ def separations_by_least_squares(campaign, final, found, rivals, proposal, share
 CONTESTS = {
     "bearing against link": ("link_elasticity@2", ["joint_tilt@2"]),
     "several rivals": ("link_elasticity@2", ["joint_tilt@2", "joint_tilt@1", "base_compliance"]),
-    "a law with a shape": ("stiffening@2", ["lost_motion@2"]),
+    "a rival with a shape": ("stiffening@2", ["lost_motion@2"]),
+    "a law with a shape": ("lost_motion@2", ["stiffening@2"]),
     # Four parameters: what the present poses do not say of them is unknown, and not known to be nothing.
     "orders of which three poses tell three": ("joint_offset@3", ["transmission_harmonic@3[orders 1-2]"]),
 }

@@ -124,6 +124,24 @@ def test_repeats_missing_a_target_are_left_out_and_the_others_kept(fanuc):
     assert found.degrees_of_freedom == (9 * 2 + 1) * 9
 
 
+@pytest.mark.parametrize("rows", [3, 6])
+def test_a_few_wild_repeats_do_not_raise_the_noise(fanuc, rows):
+    """Two in a hundred, each thirty standard deviations off: of the mean square they would make nineteen times the noise."""
+    model, estimate, readings = drawn(fanuc, 13, poses=40, rows=rows, joint_rad=20e-6)
+    rng = np.random.default_rng(14)
+    wild = rng.permutation(len(readings))[: len(readings) // 50]
+    off = rng.standard_normal((len(wild), 3))
+    moved = readings.position.copy()
+    moved[wild] += 30 * SENSOR_M * off / np.linalg.norm(off, axis=1, keepdims=True)
+    clean, found = (noise_from_repeats(model, estimate, replace(readings, position=p)) for p in (readings.position, moved))
+    assert found.position_m == pytest.approx(clean.position_m, rel=0.03)
+    assert found.orientation_rad == pytest.approx(clean.orientation_rad, rel=0.03)
+    # What is left of a state without one of its readings tells a little less.
+    assert 0.85 * clean.degrees_of_freedom < found.degrees_of_freedom < clean.degrees_of_freedom
+    # These targets tell little of the joints of the wrist.
+    np.testing.assert_allclose(found.joint_rad[:3], clean.joint_rad[:3], rtol=0.15)
+
+
 def test_declared_noise_is_that_of_the_campaign(fanuc):
     assert declared_noise(campaign(fanuc)) is None
     found = declared_noise(campaign(fanuc, position_m=1e-4))

@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
+from planted import planted as planted_campaign
+from planted import two_loads_a_pose
 from scipy.linalg import block_diag, inv, sqrtm
 from scipy.stats import binom
 from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
@@ -279,3 +281,36 @@ def test_scores_do_not_hang_on_the_other_candidates_but_for_the_family(base):
     both, one = (score(d, REPLICATES, np.random.default_rng(8)) for d in (some, alone))
     np.testing.assert_allclose(both.p_value[1], one.p_value[0], rtol=1e-9)
     assert both.p_family[1] >= one.p_family[0]
+
+
+def approached_in_two_poses(seed):
+    """States of twenty poses, two of which were approached from a side that is known."""
+    states = two_loads_a_pose(6, 20, (5, seed))
+    return replace(states, approach=states.approach * np.isin(states.pose, (3, 11))[:, None])
+
+
+@pytest.mark.parametrize("size", [1e-4, 3e-4])
+@pytest.mark.parametrize("seed", [0, 2])
+def test_an_effect_of_two_poses_in_twenty_stands_out(seed, size, fanuc):
+    """Their signs turned, two poses look like themselves in every second replicate."""
+    campaign = planted_campaign(fanuc, {"hysteresis@2": [size]}, seed, states=approached_in_two_poses(seed))
+    found = directions(campaign.declared, campaign.observations, campaign.all_candidates)
+    scores = score(found, REPLICATES, np.random.default_rng(9))
+    index = [candidate.key for candidate, _ in found.candidates].index("hysteresis@2")
+    assert scores.p_family[index] == 1 / (REPLICATES + 1)
+    # Nor does all stand out where one does.
+    assert scores.p_family.max() > 0.3
+
+
+def test_effects_of_two_poses_in_twenty_raise_no_more_false_alarms(fanuc):
+    smallest = []
+    for number in range(60):
+        campaign = planted_campaign(fanuc, {}, 500 + number, states=approached_in_two_poses(number))
+        found = directions(campaign.declared, campaign.observations, campaign.all_candidates)
+        assert "hysteresis@2" in {candidate.key for candidate, _ in found.candidates}
+        smallest.append(score(found, 99, np.random.default_rng((10, number))).p_family.min())
+    smallest = np.array(smallest)
+    assert (smallest <= 0.05).sum() <= binom.ppf(0.99, 60, 0.05)
+    for level in (0.3, 0.5, 0.7):
+        low, high = binom.ppf([0.001, 0.999], 60, level)
+        assert low <= (smallest <= level).sum() <= high, (level, (smallest <= level).mean())

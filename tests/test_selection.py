@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import HAND, planted
+from planted import HAND, planted, two_loads_a_pose
 from scipy.stats import binom
-from synthetic import NOISE
+from synthetic import NOISE, seen_exactly, with_noise
 
+from elastocal import selection
 from elastocal.fitting import fit
 from elastocal.screening import directions, score
 from elastocal.selection import FAMILY_WISE_LEVEL, parameter_slice, search, without
@@ -188,3 +189,106 @@ def test_parameters_of_an_effect_stand_where_the_fit_lists_them(fanuc):
     assert mine.tolist() == list(range(12, 12 + len(drift.parameters)))
     assert [fitted.parameters[index][1].name for index in mine] == [parameter.name for parameter in drift.parameters]
     assert len(parameter_slice(fitted, "not there")) == 0
+
+
+def shapes_of(found):
+    """Shape of the last effect of the final fit, and the standard error of its coefficient beside it."""
+    (coefficient, _) = parameter_slice(found.final, found.effects[0].key)
+    deviation = np.sqrt(found.final.covariance[coefficient, coefficient])
+    return found.final.estimate.coefficients[-1][0], deviation, found.final.estimate.shapes[-1][0]
+
+
+@pytest.mark.parametrize("size", [3e-5, 6e-5, 1e-4])
+def test_thermal_growth_whose_lag_cannot_be_told_is_not_dropped(size, fanuc):
+    """Within an hour a lag of an hour is hardly told from others: nor is the growth in the end, but that there is some."""
+    states = two_loads_a_pose(6, 25, (5, 1))
+    campaign = planted(fanuc, {"thermal_growth[time]": [size]}, seed=1, states=replace(states, time_s=states.time_s / 4))
+    found = searched(campaign)
+    assert keys(found) == {"thermal_growth[time]"}
+    growth, deviation, _ = shapes_of(found)
+    # Without the lag known, the growth is none that could not be chance.
+    assert 0 < growth < 2.5 * deviation
+
+
+@pytest.mark.parametrize("size", [1e-4, 2e-4])
+def test_play_that_is_as_good_as_a_straight_line_is_not_dropped(size, fanuc):
+    states = two_loads_a_pose(6, 25, (5, 1), force=50.0)
+    campaign = planted(fanuc, {}, seed=1, states=states, identified=False)
+    play = campaign.candidates["lost_motion@2"]
+    bare = campaign.declared
+    model, true = bare.model.with_effects([play]), bare.estimate.with_effects([play])
+    true.coefficients[-1][:], true.shapes[-1][:] = size, 390.0
+    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng((6, 1)))
+    declared = fit(bare.model, seen, bare.noise, bare.estimate)
+    found = search(declared, seen, [play], REPLICATES, np.random.default_rng(0))
+    assert keys(found) == {"lost_motion@2"}
+    value, _, torque = shapes_of(found)
+    assert value / torque == pytest.approx(size / 390.0, rel=0.25)
+
+
+def test_an_effect_of_two_poses_in_twenty_is_found(fanuc):
+    states = two_loads_a_pose(6, 20, (5, 2))
+    few = replace(states, approach=states.approach * np.isin(states.pose, (3, 11))[:, None])
+    found = searched(planted(fanuc, {"hysteresis@2": [3e-4]}, seed=2, states=few))
+    assert keys(found) == {"hysteresis@2"}
+
+
+@pytest.fixture(scope="module")
+def pair(fanuc):
+    return planted(fanuc, {key: share_of_plausible(fanuc, key, 0.6) for key in ("joint_offset@3", "hysteresis@2")}, seed=2)
+
+
+@pytest.mark.parametrize(("further", "number"), [(-1.0, 1), (1.0, 2)])
+def test_a_further_effect_must_be_worth_its_parameters_and_a_first_one_need_not(further, number, pair, monkeypatch):
+    """Looks at the real candidates in their order, but all of them worth a little less or more than nothing."""
+    looks = []
+
+    def scored(*given):
+        scores = score(*given)
+        looks.append(scores)
+        return replace(scores, bic_gain=1e-6 * scores.bic_gain + (-1.0 if len(looks) == 1 else further))
+
+    monkeypatch.setattr(selection, "score", scored)
+    found = searched(pair)
+    assert len(found.effects) == number and keys(found) <= {"joint_offset@3", "hysteresis@2"}
+    # What was left out stood out beyond chance.
+    assert looks[1].p_family.min() < FAMILY_WISE_LEVEL
+
+
+@pytest.mark.parametrize(("gain", "chosen"), [(0.1, True), (-0.1, False)])
+def test_what_is_chosen_predicts_left_out_poses_better_if_by_less_than_its_standard_error(gain, chosen, pair, monkeypatch):
+    monkeypatch.setattr(selection, "cross_validated_gains", lambda *_: (np.array([gain]), np.array([5.0])))
+    first = searched(pair).looks[0]
+    assert (first.chosen is not None) == chosen
+    if chosen:
+        assert (first.gain, first.gain_std_error) == (gain, 5.0)
+    else:
+        # All that stand out are refused by name.
+        out = {c.key for (c, _), p in zip(first.directions.candidates, first.scores.p_family, strict=True) if p < 0.05}
+        assert set(first.refused) == out and "joint_offset@3" in out
+
+
+def test_a_candidate_that_was_dropped_as_needless_is_not_looked_at_again(pair, monkeypatch):
+    """Though it is there: what stands for it has once been found to be enough."""
+    seen_before, dropped = [], []
+
+    def simpler(declared, current, observations, found, candidates):
+        if len(found) < 2 or dropped:
+            return []
+        dropped.extend(candidate.key for candidate in found[1:])
+        return [(found[0], [])]
+
+    def looked(current, observations, candidates):
+        seen_before.append((list(dropped), {candidate.key for candidate in candidates}))
+        return directions(current, observations, candidates)
+
+    monkeypatch.setattr(selection, "_simpler", simpler)
+    monkeypatch.setattr(selection, "directions", looked)
+    found = searched(pair)
+    assert dropped and not set(dropped) & keys(found)
+    (_, first), *later = seen_before
+    assert set(dropped) <= first and later
+    for gone, candidates in later:
+        assert gone == dropped and not set(dropped) & candidates
+    # What is missing in its place is something else, or nothing.
+    assert found.looks[0].directions.candidates[found.looks[0].chosen][0].key in keys(found)

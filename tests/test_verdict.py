@@ -18,8 +18,8 @@ def attribution(*alternatives):
     return Attribution("e", (), 0.01, alternatives, np.full(count, 10.0), np.zeros(count), np.ones(count, int), 1)
 
 
-def evidence(tested=5, before=FITS_NOT, after=FITS, missing=(1e-4, 0.0), attributions=(), faults=()):
-    return Evidence(tested, before, after, *missing, tuple(attributions), tuple(faults))
+def evidence(tested=5, before=FITS_NOT, after=FITS, missing=(1e-4, 0.0), attributions=(), faults=(), **others):
+    return Evidence(tested, before, after, *missing, tuple(attributions), tuple(faults), **others)
 
 
 BRANCHES = {
@@ -32,6 +32,17 @@ BRANCHES = {
     "nothing found and much left": ({}, UNEXPLAINED),
     "one effect": ({"attributions": [attribution()]}, NAMED),
     "one effect that has an alternative": ({"attributions": [attribution("a")]}, CLASS),
+    "one effect that departs from its law": ({"attributions": [attribution()], "doubted": True}, CLASS),
+    "one effect that departs from its law and has an alternative": (
+        {"attributions": [attribution("a")], "doubted": True},
+        CLASS,
+    ),
+    "two effects that depart from their laws": ({"attributions": [attribution()] * 2, "doubted": True}, SEVERAL),
+    "an effect that departs from its law and leaves most": (
+        {"attributions": [attribution()], "after": FITS_NOT, "missing": (1e-4, 9e-5), "doubted": True},
+        UNEXPLAINED,
+    ),
+    "a fault of the data that makes an effect depart from its law": ({"faults": ["wrong unit"], "doubted": True}, NAMED),
     "two effects": ({"attributions": [attribution(), attribution()]}, SEVERAL),
     "two effects that have alternatives": ({"attributions": [attribution("a"), attribution("b")]}, SEVERAL),
     "effects that leave most": ({"attributions": [attribution()], "after": FITS_NOT, "missing": (1e-4, 9e-5)}, UNEXPLAINED),

@@ -70,22 +70,41 @@ def test_keys_are_unique_and_readable(chain):
 @pytest.mark.parametrize(
     ("effect", "places"),
     [
-        ("joint_offset", "1 2 3 4 5 6"),
-        ("link_geometry", "1 2 3 4 5 6"),
-        ("link_weight", "2 3 4 5"),
-        ("compensator_torque", "2"),
-        ("compensator_stiffness", "2"),
-        ("link_elasticity", "1 2 3 6 column section"),
-        ("joint_tilt", "1 2 3 4 5 6"),
-        ("stiffening", "1 2 3 4 5 6"),
-        ("lost_motion", "1 2 3 4 5 6"),
-        ("hysteresis", "1 2 3 4 5 6"),
+        ("joint_offset", "@1 @2 @3 @4 @5 @6"),
+        ("link_geometry", "@1 @2 @3 @4 @5 @6"),
+        ("link_weight", "@2 @3 @4 @5"),
+        ("payload", " [mass]"),
+        ("compensator_torque", "@2 @2[first_order]"),
+        ("compensator_stiffness", "@2"),
+        ("link_elasticity", "[column] @1 @2 @3 @6 @1+2+3+6[one_section]"),
+        ("joint_tilt", "@1 @2 @3 @4 @5 @6"),
+        ("base_compliance", " [rocking]"),
+        ("stiffening", "@1 @2 @3 @4 @5 @6"),
+        ("lost_motion", "@1 @2 @3 @4 @5 @6"),
+        ("hysteresis", "@1 @2 @3 @4 @5 @6"),
     ],
 )
 def test_places_on_the_fanuc(fanuc, effect, places):
-    found = [c for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
-    assert {c.detail.split()[-1] if c.detail else str(*c.joints) for c in found} == set(places.split())
-    assert len(found) == len(places.split())
+    found = [c.key for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
+    assert found == [effect + place.replace("_", " ") for place in places.split(" ")]
+
+
+@pytest.mark.parametrize(
+    ("whole", "part", "kept"),
+    [
+        ("payload", "payload[mass]", [0]),
+        ("compensator_torque@2", "compensator_torque@2[first order]", [0, 1]),
+        ("base_compliance", "base_compliance[rocking]", [2]),
+    ],
+)
+def test_small_form_of_a_large_effect_is_some_of_its_parameters(fanuc, whole, part, kept):
+    around, by_key = circumstances_on(fanuc.chain, made_states(6, 8, seed=11)), candidates_on(sites_of(fanuc.chain))
+    large, small = by_key[whole], by_key[part]
+    assert (small.effect, small.family, small.joints, small.needs) == (large.effect, large.family, large.joints, large.needs)
+    assert small.parameters == tuple(large.parameters[number] for number in kept)
+    made = displacements(small, around)
+    assert made.any()
+    np.testing.assert_array_equal(made, displacements(large, around)[kept])
 
 
 def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
@@ -257,7 +276,7 @@ def test_module_that_was_added_is_gone_with_its_file():
 def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
     sites = sites_of(fanuc.chain)
     found = [candidate.key for candidate in declared_candidates(["payload", "link_weight"], sites)]
-    assert found == ["payload", *(f"link_weight@{joint}" for joint in (2, 3, 4, 5))]
+    assert found == ["payload", "payload[mass]", *(f"link_weight@{joint}" for joint in (2, 3, 4, 5))]
     assert declared_candidates([], sites) == []
 
 

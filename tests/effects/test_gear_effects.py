@@ -33,6 +33,14 @@ def test_stiffening_is_the_cube_of_the_torque(case):
         assert_only(displacements(candidate_on(chain, f"stiffening@{joint + 1}"), around), joint, torque[:, joint] ** 3)
 
 
+def test_plausible_stiffening_moves_the_end_of_the_arm_alike_at_every_joint():
+    """Five millimetres under a kilonewton across the arm outstretched; a tool is at least half a metre long."""
+    chain = chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]")
+    for joint, lever in enumerate((3.1, 2.1, 0.5), 1):
+        (cubic,) = candidate_on(chain, f"stiffening@{joint}").parameters
+        assert cubic.plausible * (1e3 * lever) ** 3 * lever == pytest.approx(5e-3), joint
+
+
 @pytest.mark.parametrize("taken_up", [5.0, 50.0, 400.0])
 def test_lost_motion_is_crossed_where_the_torque_changes_its_sign(case, taken_up):
     chain, around, torque = case

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_folders import made_folder, made_table
+from made_folders import PLAN, made_folder, made_table
 
 from elastocal.attribution import Attribution
 from elastocal.fitting import fit
@@ -63,9 +63,10 @@ def attribution(case, key, *alternatives, angles=()):
     return Attribution(candidate.effect, (candidate,), 0.01, alternatives, angles, np.zeros(count), np.ones(count, int), 1)
 
 
-def said(case, fits, attributions=(), faults=(), warnings=(), noise=NOISE, looks=LOOKS):
+def said(case, fits, attributions=(), doubts=(), faults=(), warnings=(), noise=NOISE, looks=LOOKS):
     facts = {"noise": noise_facts(noise), "warnings": ["of the noise"]}
-    verdict = concluded(case, facts, *fits, attributions, looks, ROWS, {"poses": 4}, faults, list(warnings), (0.5, 0.1))
+    judged = ROWS, {"poses": 4}, faults, list(warnings), (0.5, 0.1)
+    verdict = concluded(case, facts, *fits, attributions, doubts, looks, *judged)
     return json.loads(json.dumps(verdict, allow_nan=False))
 
 
@@ -84,6 +85,7 @@ def test_effects_have_the_figures_of_the_final_fit(case, fits):
     # Shares of what the step before left.
     assert offset["heldout_gain"] == pytest.approx(0.75) and payload["heldout_gain"] == pytest.approx(0.5)
     assert offset["angle_to_nearest_deg"] is None
+    assert offset["doubts"] == payload["doubts"] == []
 
 
 def test_compliances_and_lack_of_fit_are_those_of_both_fits(case, fits):
@@ -109,6 +111,19 @@ def test_alternatives_make_a_class(case, fits):
     assert verdict["effects"][0]["angle_to_nearest_deg"] == 30.0
 
 
+def test_a_doubt_makes_a_class_and_a_warning_and_stands_with_its_effect(case, fits):
+    doubt = {"effect": "joint_offset@3", "circumstance": "the load", "p_value": 0.01}
+    verdict = said(case, fits, [attribution(case, "joint_offset@3")], [doubt])
+    assert verdict["verdict"] == "class"
+    assert verdict["effects"][0]["doubts"] == [doubt] and verdict["effects"][0]["alternatives"] == []
+    (warning,) = (text for text in verdict["warnings"] if "joint_offset@3" in text)
+    assert "goes with the load as its law does not" in warning
+    without = said(case, fits, [attribution(case, "joint_offset@3")])
+    assert without["verdict"] == "named" and without["warnings"] == ["of the noise"]
+    _, payload = said(case, fits, [attribution(case, "joint_offset@3"), attribution(case, "payload")], [doubt])["effects"]
+    assert payload["doubts"] == []
+
+
 def test_a_fault_of_the_data_comes_before_all_physics(case, fits):
     doubt = FAULT | {"name": "outliers", "decisive": False, "detail": "two rows"}
     verdict = said(case, (fits[0], fits[0]), faults=[FAULT, doubt])
@@ -116,6 +131,7 @@ def test_a_fault_of_the_data_comes_before_all_physics(case, fits):
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["family"], effect["joints"]) == ("wrong_unit", "data", [2])
     assert effect["parameters"] == [{"name": "factor", "value": 57.3, "unit": "", "std_error": None}]
+    assert effect["alternatives"] == effect["doubts"] == []
     assert "outliers: two rows" in verdict["warnings"]
 
 
@@ -145,6 +161,22 @@ def test_unknown_noise_is_null_and_not_a_number_nowhere(case, fits):
     verdict = said(case, [replace(fitted, noise=unknown) for fitted in fits], noise=unknown)
     assert verdict["lack_of_fit"]["before"] == {"mean_square_over_noise": None, "p_value": None, "rejected": False}
     assert verdict["noise"]["source"] == "residual"
+
+
+def test_a_wild_repeat_is_not_in_the_means(kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made", plan=replace(PLAN, repeats=4))
+    repeated = np.flatnonzero(table["repeat"] == 3)
+    observations = []
+    for name, off in (("clean", 0.0), ("wild", 0.01)):
+        moved = table["x"].copy()
+        moved[repeated] += off * (np.arange(len(repeated)) % 4 == 0)
+        made_folder(tmp_path / name, kuka, table=table | {"x": moved})
+        descriptions, training, _ = taken_in(tmp_path / name, config_folder / "robots")
+        observations.append(case_from(descriptions, reading_columns(training)).observations)
+    clean, wild = observations
+    shifted = np.abs(wild.position - clean.position).max(axis=1)
+    # The means lose one of four repeats, each 60 µm off or so, and not a share of ten millimetres.
+    assert 2 <= np.count_nonzero(shifted) < len(shifted) and shifted.max() < 2e-4
 
 
 def test_noise_is_of_repeats_as_declared_or_of_the_residual(case):

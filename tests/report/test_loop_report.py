@@ -43,6 +43,8 @@ CAMPAIGNS = {
     "adequate": verdict_document(ADEQUATE),
     "named": verdict_document(NAMED, [effect_entry()]),
     "class": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt@2", "link_elasticity@1+2[one section]"])]),
+    "class by doubts": verdict_document(CLASS, [effect_entry(doubted=["the load"])]),
+    "class by both": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt@2"], doubted=["the load", "the time"])]),
     "several": verdict_document(SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]),
     "unexplained": verdict_document(UNEXPLAINED, warnings=["the residual is 5 times the noise"]),
     "not_testable": verdict_document(NOT_TESTABLE),
@@ -55,6 +57,10 @@ WORDS = {
     "adequate": "none of 30 candidates stands out",
     "named": "lost motion in joint 3",
     "class": "cannot tell from it: joint tilt in joint 2 and link elasticity in links 1 and 2, one section",
+    "class by doubts": "lacks one effect: lost motion in joint 3, or something akin to it, "
+    "for what it makes goes with the load as its law does not.",
+    "class by both": "lost motion in joint 3, or one that these data cannot tell from it: joint tilt in joint 2, "
+    "or something akin to it, for what it makes goes with the load and the time as its law does not.",
     "several": "lacks 2 effects: lost motion in joint 3 and payload",
     "unexplained": "the catalogue does not account for it",
     "not_testable": "These data can test nothing",
@@ -112,9 +118,19 @@ def test_each_verdict_has_its_words():
     assert set(TITLES) == {ADEQUATE, NAMED, CLASS, SEVERAL, UNEXPLAINED, NOT_TESTABLE}
 
 
-@pytest.mark.parametrize("campaign", WORDS)
+# To be taken away once `sentences` asks whether there is anything to list, not for "none", which is always true.
+lists_none = pytest.mark.xfail(strict=True, reason="listed() of nothing is the word none")
+
+
+@pytest.mark.parametrize("campaign", [pytest.param(c, marks=[lists_none] * (c == "class by doubts")) for c in WORDS])
 def test_the_verdict_is_said_in_plain_words(campaign):
     assert WORDS[campaign] in " ".join(sentences(CAMPAIGNS[campaign], 30))
+
+
+@lists_none
+def test_doubts_are_said_of_a_class_that_has_them_and_rivals_of_one_that_has_rivals():
+    of_rivals, of_doubts = (" ".join(sentences(CAMPAIGNS[name], 30)) for name in ("class", "class by doubts"))
+    assert "akin" not in of_rivals and "cannot tell" not in of_doubts
 
 
 @pytest.mark.parametrize("campaign", CAMPAIGNS)
