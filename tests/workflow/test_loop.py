@@ -69,9 +69,11 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
         "p_value",
         "heldout_gain",
         "alternatives",
+        "doubts",
         "angle_to_nearest_deg",
     }
     assert (effect["name"], effect["family"], effect["joints"], effect["alternatives"]) == ("joint_offset", "geometry", [3], [])
+    assert effect["doubts"] == json.loads(diagnosed.path("results/loop/made/doubts.json").read_text(encoding="utf-8")) == []
     (parameter,) = effect["parameters"]
     assert set(parameter) >= {"name", "value", "std_error", "unit"} and parameter["unit"] == "rad"
     assert abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
@@ -162,6 +164,7 @@ EDITS = {
         {"read_campaign", "estimate_noise", "fit_declared"},
     ),
     "the selection": ("src/elastocal/selection.py", set(STEPS[4:]), set(STEPS[:4])),
+    "the check of laws": ("src/elastocal/law_check.py", set(STEPS[5:]), set(STEPS[:5])),
     "the judgement": ("src/elastocal/held_out.py", set(STEPS[6:]), set(STEPS[:6])),
     "the verdict": ("src/elastocal/verdict.py", set(STEPS[7:]), set(STEPS[:7])),
     "figures of the study": ("src/elastocal/figures/strategies.py", set(), set(STEPS)),
