@@ -143,7 +143,10 @@ def without_wild_repeats(readings):
     telling = np.bincount(group)[group] > 2
     if not telling.any():
         return readings
-    return readings.select(np.flatnonzero(~(telling & (off > _WILD * np.median(off[telling])).any(axis=1))))
+    apart = off[telling]
+    # The middle one of an odd number is not off at all, and tells nothing of the others.
+    usual = np.median(apart[apart > 0]) if apart.any() else 0.0
+    return readings.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
 
 
 def _medians(values, group):

@@ -148,11 +148,11 @@ def sentences(verdict, tested):
         return [f"The declared model lacks {counted(len(found), 'effect')}: {named}.", last]
     effect = found[0]
     if said == "class":
-        others = listed(map(candidate_words, effect["alternatives"]), _MOST_NAMES)
-        doubted = listed(dict.fromkeys(doubt["circumstance"] for doubt in effect["doubts"]), _MOST_NAMES)
-        akin = f"something akin to it, for what it makes goes with {doubted} as its law does not" if doubted else ""
-        confused = f"one that these data cannot tell from it: {others}" if others else ""
-        either = ", or ".join(part for part in (confused, akin) if part)
+        others = [candidate_words(key) for key in effect["alternatives"]]
+        doubted = dict.fromkeys(doubt["circumstance"] for doubt in effect["doubts"])
+        akin = f"something akin to it, for what it makes goes with {listed(doubted, _MOST_NAMES)} as its law does not"
+        confused = f"one that these data cannot tell from it: {listed(others, _MOST_NAMES)}"
+        either = ", or ".join(part for part, there in ((confused, others), (akin, doubted)) if there)
         return [
             f"The declared model lacks one effect: {named}, or {either}.",
             "Which of them it is takes another experiment; the errors below fall all the same.",
