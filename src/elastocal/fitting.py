@@ -124,13 +124,13 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     around = circumstances(model, start, observations.states)
     if discrepancy_m is not None:
         return _robustly(model, observations, around, noise, start, discrepancy_m)
-    discrepancy = likely_discrepancy_m
-    found = _robustly(model, observations, around, noise, start, discrepancy)
+    lacking = likely_discrepancy_m
+    found = _robustly(model, observations, around, noise, start, lacking)
     for _ in range(_DISCREPANCY_ROUNDS):
-        before, discrepancy = discrepancy, _discrepancy(found, observations)
-        if abs(discrepancy - before) <= 0.01 * max(discrepancy, before):
+        before, lacking = lacking, discrepancy(found, observations, found.tame)
+        if abs(lacking - before) <= 0.01 * max(lacking, before):
             break
-        found = _robustly(model, observations, around, noise, found.estimate, discrepancy)
+        found = _robustly(model, observations, around, noise, found.estimate, lacking)
     return found
 
 
@@ -269,18 +269,31 @@ def identifiable(gram, frozen, bending):
     return mask
 
 
-def _discrepancy(found, observations):
-    """Standard deviation that brings the mean square of the whitened residual to one."""
-    weighted = found.residual * np.sqrt(found.weights * found.tame)[:, None]
-    freedom = found.tame_freedom
-    variances, squares = spectrum(observations, found.joint_jacobian, found.noise, weighted)
+def discrepancy(fitted, observations, tame):
+    """Standard deviation that brings the mean square of the whitened residual to one.
 
-    def excess(discrepancy):
-        return (squares / (variances + discrepancy**2)).sum() / freedom - 1.0
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+    tame : ndarray of bool (M,)
+        Observations that count.
+
+    Returns
+    -------
+    float
+        m; zero where the noise accounts for the residual.
+    """
+    weighted = fitted.residual * np.sqrt(fitted.weights * tame)[:, None]
+    freedom = fitted.degrees_of_freedom - int((~tame).sum()) * observations.rows
+    variances, squares = spectrum(observations, fitted.joint_jacobian, fitted.noise, weighted)
+
+    def excess(deviation):
+        return (squares / (variances + deviation**2)).sum() / freedom - 1.0
 
     if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
         return 0.0
-    highest = found.noise.position_m
+    highest = fitted.noise.position_m
     while excess(highest) > 0:
         highest *= 2
     return brentq(excess, 0.0, highest, rtol=1e-3)

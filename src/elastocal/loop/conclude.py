@@ -3,6 +3,7 @@
 import numpy as np
 
 from elastocal.attribution import Attribution, by_effect
+from elastocal.fitting import discrepancy
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
 from elastocal.selection import parameter_slice
@@ -84,7 +85,8 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
     before, after = lack_of_fit(declared, case.observations), lack_of_fit(final, case.observations)
     tested = len(set(looks["candidate"][(looks["look"] == 0) & np.isfinite(looks["p_value"])]))
     decisive = [fault for fault in faults if fault["decisive"]]
-    missing = declared.discrepancy_m, final.discrepancy_m
+    # Both over the same readings: where the model lacks much, the poses that show it most look wild to the declared model.
+    missing = discrepancy(declared, case.observations, final.tame), final.discrepancy_m
     evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive), bool(doubts))
     said = word(evidence)
     gains = _gains(rows)
