@@ -29,6 +29,9 @@ _DRAWS = 8
 # Times the plausible size.
 _IMPLAUSIBLE = 3.0
 
+# Of every case whose setting says nothing else.
+USUAL_DESIGN = Design()
+
 # Settings by name: what is other than usual about the design, the tracker and the drives.
 SETTINGS = {
     "usual": {},
@@ -219,7 +222,7 @@ def block_of(cases, number, of):
 def design_of(case):
     """How the campaign of a case is made."""
     setting = _setting(case)
-    design = replace(Design(), **setting.get("design", {}))
+    design = replace(USUAL_DESIGN, **setting.get("design", {}))
     if "declared_ratio" in setting:
         tracker = replace(Tracker(), **setting.get("tracker", {}))
         noise = tuple(setting["declared_ratio"] * sigma for sigma in (tracker.sigma_m, tracker.sigma_rad))

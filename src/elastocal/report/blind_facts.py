@@ -5,10 +5,10 @@ import hashlib
 import pandas as pd
 
 from elastocal.blind.case_rows import EXACT_ALIASES
+from elastocal.blind.cases import USUAL_DESIGN
 from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.blind.scores import NONE
-from elastocal.plant.campaigns import Design
 from elastocal.report.wording import at_joints, counted, grouped, listed, plain, words
 
 _OUTSIDE = "outside:"
@@ -65,7 +65,7 @@ def blind_facts(tables, manifest, size, seed, replicates):
                 words(name.removeprefix(_OUTSIDE)) for name in sorted(set(cases[cases.group == "outside"].truth))
             ),
         },
-        "design": _design(Design()),
+        "design": _design(USUAL_DESIGN),
         "aliases": listed(f"{words(effect)}{at_joints(effect, joints)}" for effect, joints in EXACT_ALIASES if joints),
         "counts": _counts(cases),
         "targets": {key: _targets(summary, key) for key in (PROOF, TUNED)},
