@@ -79,7 +79,7 @@ def test_keys_are_unique_and_readable(chain):
         ("link_elasticity", "[column] @1 @2 @3 @6 @1+2+3+6[one_section]"),
         ("joint_tilt", "@1 @2 @3 @4 @5 @6"),
         ("base_compliance", " [rocking]"),
-        ("stiffening", "@1 @2 @3 @4 @5 @6"),
+        ("stiffening", "@1 @2 @3 @4 @5 @6 " + " ".join(f"@{joint}[two_slopes]" for joint in range(1, 7))),
         ("lost_motion", "@1 @2 @3 @4 @5 @6"),
         ("hysteresis", "@1 @2 @3 @4 @5 @6"),
     ],

@@ -33,12 +33,32 @@ def test_stiffening_is_the_cube_of_the_torque(case):
         assert_only(displacements(candidate_on(chain, f"stiffening@{joint + 1}"), around), joint, torque[:, joint] ** 3)
 
 
+@pytest.mark.parametrize("meeting", [5.0, 50.0, 400.0])
+def test_stiffening_with_two_slopes_begins_where_they_meet(case, meeting):
+    chain, around, torque = case
+    beyond = np.sign(torque) * np.maximum(np.abs(torque) - meeting, 0.0)
+    for joint in range(chain.coordinates):
+        made = displacements(candidate_on(chain, f"stiffening@{joint + 1}[two slopes]"), around, meeting)
+        assert_only(made, joint, beyond[:, joint])
+
+
 def test_plausible_stiffening_moves_the_end_of_the_arm_alike_at_every_joint():
     """Five millimetres under a kilonewton across the arm outstretched; a tool is at least half a metre long."""
     chain = chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]")
     for joint, lever in enumerate((3.1, 2.1, 0.5), 1):
         (cubic,) = candidate_on(chain, f"stiffening@{joint}").parameters
+        (beyond,) = candidate_on(chain, f"stiffening@{joint}[two slopes]").parameters
         assert cubic.plausible * (1e3 * lever) ** 3 * lever == pytest.approx(5e-3), joint
+        assert beyond.plausible * (1e3 * lever) * lever == pytest.approx(5e-3), joint
+
+
+def test_play_is_taken_up_before_the_slopes_of_a_stiffening_gear_meet(fanuc):
+    """Both laws would otherwise be one: two slopes are play and a spring."""
+    for joint in range(1, 7):
+        (taken_up,), (meeting,) = (
+            candidate_on(fanuc.chain, f"{name}").shapes for name in (f"lost_motion@{joint}", f"stiffening@{joint}[two slopes]")
+        )
+        assert taken_up.lowest < taken_up.start < taken_up.highest <= meeting.lowest < meeting.start < meeting.highest
 
 
 @pytest.mark.parametrize("taken_up", [5.0, 50.0, 400.0])

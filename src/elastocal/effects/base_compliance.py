@@ -7,9 +7,9 @@ from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "base_compliance", "elastic"
 _PARAMETERS = (
-    Parameter("horizontal", "m/N", 2e-8),
-    Parameter("vertical", "m/N", 2e-8),
-    Parameter("tilt", "rad/(N m)", 1e-7),
+    Parameter("horizontal", "m/N", 2e-8, sign=1),
+    Parameter("vertical", "m/N", 2e-8, sign=1),
+    Parameter("tilt", "rad/(N m)", 1e-7, sign=1),
 )
 
 

@@ -13,7 +13,7 @@ def candidates(sites):
 
     def at(joint):
         across = [axis for axis in range(3) if axis != sites.joint_axes[joint]]
-        parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7) for axis in across)
+        parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
         def displacement(circumstances):

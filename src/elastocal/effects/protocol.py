@@ -19,6 +19,8 @@ from elastocal.robot import MeasuringPoint
 from elastocal.sites import Sites
 
 STANDARD_GRAVITY = 9.80665
+# Of the load under which gears are looked at: a pull at the end of the arm, at the least lever of a tool.
+_PULL_N, _LEAST_LEVER_M = 1e3, 0.5
 
 
 @dataclass(frozen=True)
@@ -34,12 +36,15 @@ class Parameter:
     prior_std : float or None
         Standard deviation of a normal prior about zero, for series whose terms the data tell from each other only in part.
         None, as nearly everywhere, for no prior. Reported with the estimate.
+    sign : {-1, 0, 1}
+        That such an effect has by its physics; 0 where it may have either.
     """
 
     name: str
     unit: str
     plausible: float
     prior_std: float | None = None
+    sign: int = 0
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,11 @@ class Candidate:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
         where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
         return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
+
+
+def effect_of(key):
+    """Name of the effect in the key of a candidate."""
+    return key.split("@")[0].split("[")[0]
 
 
 @dataclass(frozen=True)
@@ -186,3 +196,35 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0):
 def per_joint(sites, make):
     """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each joint."""
     return [make(joint) for joint in range(sites.joints)]
+
+
+def lever_m(sites, joint):
+    """Length of the arm beyond a joint, outstretched; at least that of a tool.
+
+    Parameters
+    ----------
+    sites : Sites
+    joint : int
+        From 0.
+
+    Returns
+    -------
+    float
+    """
+    return max(float(np.linalg.norm(sites.link_vectors_m[joint + 1 :], axis=1).sum()), _LEAST_LEVER_M)
+
+
+def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
+    """Torque of a kilonewton at the end of the outstretched arm, by which laws of gears are scaled.
+
+    Parameters
+    ----------
+    sites : Sites
+    joint : int
+        From 0.
+
+    Returns
+    -------
+    float
+    """
+    return _PULL_N * lever_m(sites, joint)

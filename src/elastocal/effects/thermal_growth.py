@@ -31,7 +31,7 @@ def candidates(sites):
     def by_time(circumstances, lag):
         return [grown(-np.expm1(-circumstances.time_s / lag))]
 
-    coefficient, growth = Parameter("expansion", "1/K", 3e-5), Parameter("final_growth", "m/m", 3e-4)
+    coefficient, growth = Parameter("expansion", "1/K", 3e-5, sign=1), Parameter("final_growth", "m/m", 3e-4)
     return [
         Candidate(NAME, FAMILY, (), "temperature", (coefficient,), by_temperature, frozenset({"temperature"})),
         Candidate(NAME, FAMILY, (), "time", (growth,), by_time, frozenset({"time"}), (_LAG,)),
