@@ -255,8 +255,11 @@ def test_a_further_effect_must_be_worth_its_parameters_and_a_first_one_need_not(
     assert looks[1].p_family.min() < FAMILY_WISE_LEVEL
 
 
-@pytest.mark.parametrize(("gain", "chosen"), [(0.1, True), (-0.1, False)])
-def test_what_is_chosen_predicts_left_out_poses_better_if_by_less_than_its_standard_error(gain, chosen, pair, monkeypatch):
+@pytest.mark.parametrize(
+    ("gain", "sure", "chosen"), [(0.1, np.inf, True), (-0.1, np.inf, False), (-0.1, selection.SURE_GAIN, True)]
+)
+def test_what_is_chosen_predicts_left_out_poses_better_or_is_beyond_any_doubt(gain, sure, chosen, pair, monkeypatch):
+    monkeypatch.setattr(selection, "SURE_GAIN", sure)
     monkeypatch.setattr(selection, "cross_validated_gains", lambda *_: (np.array([gain]), np.array([5.0])))
     first = searched(pair).looks[0]
     assert (first.chosen is not None) == chosen
@@ -264,7 +267,11 @@ def test_what_is_chosen_predicts_left_out_poses_better_if_by_less_than_its_stand
         assert (first.gain, first.gain_std_error) == (gain, 5.0)
     else:
         # All that stand out are refused by name.
-        out = {c.key for (c, _), p in zip(first.directions.candidates, first.scores.p_family, strict=True) if p < 0.05}
+        out = {
+            c.key
+            for (c, _), p in zip(first.directions.candidates, first.scores.p_family, strict=True)
+            if p < selection.FAMILY_WISE_LEVEL
+        }
         assert set(first.refused) == out and "joint_offset@3" in out
 
 
@@ -292,3 +299,12 @@ def test_a_candidate_that_was_dropped_as_needless_is_not_looked_at_again(pair, m
         assert gone == dropped and not set(dropped) & candidates
     # What is missing in its place is something else, or nothing.
     assert found.looks[0].directions.candidates[found.looks[0].chosen][0].key in keys(found)
+
+
+def test_of_two_names_for_one_law_that_of_fewer_places_is_taken(fanuc):
+    """A compensator's torque and the first two harmonics of its joint are the same functions; each joint has harmonics."""
+    planted_torque = [3e-4, -2e-4, 1e-4, 1e-4]
+    for seed in range(3):
+        campaign = planted(fanuc, {"compensator_torque@2": planted_torque}, seed=seed)
+        found = search(campaign.declared, campaign.observations, campaign.all_candidates, 199, np.random.default_rng(seed))
+        assert keys(found) == {"compensator_torque@2"}

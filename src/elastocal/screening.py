@@ -22,8 +22,8 @@ LEAST_NONCENTRALITY = 10.0
 # Directions of a candidate that keep less than this share (squared) are rounding.
 _ROUNDING = 1e-10
 _SHAPES_TRIED = 3
-# Candidates by which the criterion falls this much, up to so many, are taken out of the residual that stands for noise.
-_OBVIOUS_BIC, _MOST_OBVIOUS = 10.0, 6
+# Candidates less likely than this by chance, up to so many, are taken out of the residual that stands for noise.
+_OBVIOUS, _MOST_OBVIOUS = 3e-4, 6
 
 
 @dataclass(frozen=True)
@@ -173,6 +173,20 @@ def score(found, replicates, stream):
     return Scores(statistic, sizes, p_value, p_family, _bic_gain(statistic, rest, sizes, len(found.residual)))
 
 
+def by_chance(found):
+    """Probability that each candidate alone stands out as much by chance, by the F distribution.
+
+    Parameters
+    ----------
+    found : Directions
+
+    Returns
+    -------
+    ndarray (K,)
+    """
+    return _tail(*_statistics(found), found.residual_freedom) if found.columns else np.zeros(0)
+
+
 def absorbed(found, winner):
     """The same directions once the model has a candidate as well.
 
@@ -285,11 +299,10 @@ def _without_the_obvious(found):
     for _ in range(_MOST_OBVIOUS):
         if not found.columns:
             break
-        statistic, rest, sizes = _statistics(found)
-        gain = _bic_gain(statistic, rest, sizes, len(found.residual))
-        if gain.max() < _OBVIOUS_BIC:
+        p_value = by_chance(found)
+        if p_value.min() >= _OBVIOUS:
             break
-        found = absorbed(found, int(np.argmax(gain)))
+        found = absorbed(found, int(np.argmin(p_value)))
     return found
 
 

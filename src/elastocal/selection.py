@@ -8,11 +8,16 @@ from scipy.stats import chi2
 from elastocal.fitting import Fit, fit
 from elastocal.screening import Directions, Scores, absorbed, cross_validated_gains, directions, score
 
-FAMILY_WISE_LEVEL = 0.05
+# With the test of lack of fit, the other way to an alarm, this leaves the whole below 5 %; less would cost power.
+FAMILY_WISE_LEVEL = 0.03
 FOLDS = 10
 # A first effect must stand out beyond chance. A further one must be worth its parameters as well, by the extended Bayesian
 # criterion: no law fits so well that nothing of the first is left behind it.
 _LEAST_FURTHER_GAIN = 0.0
+# By the same criterion, one that need not predict poses that were left out.
+SURE_GAIN = 10.0
+# Decimals to which the gains of candidates that make the same agree.
+_SAME_GAIN = 6
 # Exact refits; each finds what the linear look before it could not see.
 _ROUNDS = 4
 # Up to so many chosen effects are weighed against each single one that could stand for all of them.
@@ -160,15 +165,22 @@ def without(fitted, keys, observations):
 def _look(seen, replicates, stream, least_gain):
     scores = score(seen, replicates, stream)
     refused = []
-    for index in np.argsort(-scores.bic_gain):
+    for index in _best_first(seen.candidates, scores.bic_gain):
         if scores.p_family[index] >= FAMILY_WISE_LEVEL or scores.bic_gain[index] < least_gain:
             continue
-        # What is chosen must predict poses that were left out better, if by little: an effect may live in few poses.
+        # What is chosen must predict poses that were left out better, if by little: an effect may live in few poses. One that
+        # lives in a single pose cannot, and is taken where it stands out whatever the other poses say.
         (gain,), (std_error,) = cross_validated_gains(seen, [index], FOLDS)
-        if gain > 0:
+        if gain > 0 or scores.bic_gain[index] >= SURE_GAIN:
             return Look(seen, scores, int(index), float(gain), float(std_error), tuple(refused))
         refused.append(seen.candidates[index][0].key)
     return Look(seen, scores, None, refused=tuple(refused))
+
+
+def _best_first(candidates, gains):
+    """Order of candidates by gain. Of those that make the same, that of the effect which fewer places can have is meant."""
+    effects = [candidate.effect for candidate, _ in candidates]
+    return np.lexsort(([effects.count(effect) for effect in effects], -np.round(gains, _SAME_GAIN)))
 
 
 def _told(look):

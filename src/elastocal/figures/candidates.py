@@ -10,7 +10,7 @@ from elastocal.figures.style import PALETTE, note, panels, styled
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # As in selection.FAMILY_WISE_LEVEL, which a drawing job should not have to import all of the search for; a test compares them.
-FAMILY_WISE_LEVEL = 0.05
+FAMILY_WISE_LEVEL = 0.03
 # Of the smallest p-value that a double holds.
 _FARTHEST = 308.0
 _NAMED = 15
