@@ -119,7 +119,7 @@ def effect_entry(
         "p_value": 0.0005,
         "heldout_gain": 0.24,
         "alternatives": list(alternatives),
-        "doubts": [{"effect": members[0], "circumstance": circumstance, "p_value": 0.01} for circumstance in doubted],
+        "doubts": [{"effect": members[0], "departure": departure, "p_value": 0.001} for departure in doubted],
         "angle_to_nearest_deg": 49.0,
     }
 

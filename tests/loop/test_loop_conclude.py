@@ -112,12 +112,12 @@ def test_alternatives_make_a_class(case, fits):
 
 
 def test_a_doubt_makes_a_class_and_a_warning_and_stands_with_its_effect(case, fits):
-    doubt = {"effect": "joint_offset@3", "circumstance": "the load", "p_value": 0.01}
+    doubt = {"effect": "joint_offset@3", "departure": "its size goes with the load", "p_value": 0.001}
     verdict = said(case, fits, [attribution(case, "joint_offset@3")], [doubt])
     assert verdict["verdict"] == "class"
     assert verdict["effects"][0]["doubts"] == [doubt] and verdict["effects"][0]["alternatives"] == []
     (warning,) = (text for text in verdict["warnings"] if "joint_offset@3" in text)
-    assert "goes with the load as its law does not" in warning
+    assert "departs from its law, its size goes with the load" in warning
     without = said(case, fits, [attribution(case, "joint_offset@3")])
     assert without["verdict"] == "named" and without["warnings"] == ["of the noise"]
     _, payload = said(case, fits, [attribution(case, "joint_offset@3"), attribution(case, "payload")], [doubt])["effects"]

@@ -42,9 +42,13 @@ WAVES = [f"{wave}_{order}q" for order in range(1, 7) for wave in ("cos", "sin")]
 CAMPAIGNS = {
     "adequate": verdict_document(ADEQUATE),
     "named": verdict_document(NAMED, [effect_entry()]),
+    "named, not where": verdict_document(NAMED, [effect_entry(alternatives=["lost_motion@5"])]),
     "class": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt@2", "link_elasticity@1+2[one section]"])]),
-    "class by doubts": verdict_document(CLASS, [effect_entry(doubted=["the load"])]),
-    "class by both": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt@2"], doubted=["the load", "the time"])]),
+    "class by doubts": verdict_document(CLASS, [effect_entry(doubted=["its size goes with the load"])]),
+    "class by both": verdict_document(
+        CLASS,
+        [effect_entry(alternatives=["joint_tilt@2"], doubted=["its size goes with the load", "its size goes with the time"])],
+    ),
     "several": verdict_document(SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]),
     "unexplained": verdict_document(UNEXPLAINED, warnings=["the residual is 5 times the noise"]),
     "not_testable": verdict_document(NOT_TESTABLE),
@@ -56,11 +60,12 @@ CAMPAIGNS = {
 WORDS = {
     "adequate": "none of 30 candidates stands out",
     "named": "lost motion in joint 3",
+    "named, not where": "These data show it, but not where: instead it may be lost motion in joint 5.",
     "class": "cannot tell from it: joint tilt in joint 2 and link elasticity in links 1 and 2, one section",
     "class by doubts": "lacks one effect: lost motion in joint 3, or something akin to it, "
-    "for what it makes goes with the load as its law does not.",
+    "for it departs from its law: its size goes with the load.",
     "class by both": "lost motion in joint 3, or one that these data cannot tell from it: joint tilt in joint 2, "
-    "or something akin to it, for what it makes goes with the load and the time as its law does not.",
+    "or something akin to it, for it departs from its law: its size goes with the load and its size goes with the time.",
     "several": "lacks 2 effects: lost motion in joint 3 and payload",
     "unexplained": "the catalogue does not account for it",
     "not_testable": "These data can test nothing",

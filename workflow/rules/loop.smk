@@ -167,7 +167,6 @@ rule weigh_rivals:
     params:
         seed=config["seed"],
         states=config["loop"]["proposed_states"],
-        replicates=config["loop"]["replicates"],
     script:
         "../scripts/weigh_rivals.py"
 

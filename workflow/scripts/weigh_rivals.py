@@ -22,9 +22,7 @@ def weigh_rivals(job):
     p_values = dict(zip(table["candidate"], table["p_family"], strict=True))
     attributions = attribute(final, found, p_values, case.observations, list(case.candidates.values()))
     write_table(job.output.rivals, RIVALS, rival_blocks(attributions), provenance({}, **job.wildcards))
-    draws = stream(job.params.seed, case.campaign.name, "laws", 0)
-    departures = doubts(final, found, case.observations, job.params.replicates, draws)
-    write_json(job.output.doubts, [vars(doubt) for doubt in departures])
+    write_json(job.output.doubts, [vars(doubt) for doubt in doubts(final, found, case.observations)])
     draws = stream(job.params.seed, case.campaign.name, "next experiment", 0)
     write_csv(job.output.experiment, proposal_frame(case, final, attributions, job.params.states, draws))
 

@@ -170,8 +170,7 @@ def _fault_warnings(faults):
 
 def _doubt_warnings(doubts):
     return [
-        f"what {doubt['effect']} makes goes with {doubt['circumstance']} as its law does not: something akin to it"
-        for doubt in doubts
+        f"{doubt['effect']} departs from its law, {doubt['departure']}: something akin to it may be missing" for doubt in doubts
     ]
 
 

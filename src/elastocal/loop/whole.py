@@ -45,7 +45,7 @@ def diagnosed(folder, robots_folder, replicates, seed):
     found = search(declared, case.observations, candidates, replicates, draws)
     p_values = {key: float(p_value) for key, (p_value, _, _) in found.chosen.items()}
     attributions = attribute(found.final, found.effects, p_values, case.observations, everything)
-    departures = doubts(found.final, found.effects, case.observations, replicates, stream(seed, case.campaign.name, "laws", 0))
+    departures = doubts(found.final, found.effects, case.observations)
     groups = {name: list(members) for name, members in by_effect(found.effects).items()}
     result = judged(model_steps(case, noise, declared, found.final, groups, []), case, unseen, seed)
     first = found.looks[0]

@@ -149,8 +149,8 @@ def sentences(verdict, tested):
     effect = found[0]
     if said == "class":
         others = [candidate_words(key) for key in effect["alternatives"]]
-        doubted = dict.fromkeys(doubt["circumstance"] for doubt in effect["doubts"])
-        akin = f"something akin to it, for what it makes goes with {listed(doubted, _MOST_NAMES)} as its law does not"
+        doubted = dict.fromkeys(doubt["departure"] for doubt in effect["doubts"])
+        akin = f"something akin to it, for it departs from its law: {listed(doubted, _MOST_NAMES)}"
         confused = f"one that these data cannot tell from it: {listed(others, _MOST_NAMES)}"
         either = ", or ".join(part for part, there in ((confused, others), (akin, doubted)) if there)
         return [
@@ -158,9 +158,13 @@ def sentences(verdict, tested):
             "Which of them it is takes another experiment; the errors below fall all the same.",
             last,
         ]
+    first = f"The declared model lacks one effect: {named}."
+    if effect["alternatives"]:
+        places = listed([candidate_words(key) for key in effect["alternatives"]], _MOST_NAMES)
+        return [first, f"These data show it, but not where: instead it may be {places}.", last]
     nearest = effect["angle_to_nearest_deg"]
     told = f", and tell it from every other candidate (the nearest lies {nearest:.0f}° off)" if nearest is not None else ""
-    return [f"The declared model lacks one effect: {named}. These data show it{told}.", last]
+    return [first, f"These data show it{told}.", last]
 
 
 def measured(table, descriptions):
