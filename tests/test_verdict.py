@@ -32,6 +32,8 @@ BRANCHES = {
     "nothing found and much left": ({}, UNEXPLAINED),
     "one effect": ({"attributions": [attribution()]}, NAMED),
     "one effect that has an alternative": ({"attributions": [attribution("a")]}, CLASS),
+    "one effect that may sit elsewhere": ({"attributions": [attribution("e@2", "e@3[first order]")]}, NAMED),
+    "one effect that may sit elsewhere or be another": ({"attributions": [attribution("e@2", "a")]}, CLASS),
     "one effect that departs from its law": ({"attributions": [attribution()], "doubted": True}, CLASS),
     "one effect that departs from its law and has an alternative": (
         {"attributions": [attribution("a")], "doubted": True},

@@ -4,14 +4,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.effects.protocol import effect_of
 from elastocal.screening import directions
 from elastocal.selection import without
 
-# Within this difference of the Bayesian criterion a candidate cannot be told from what was found. Within this angle it needs a
-# larger one: no law of the catalogue is so exact that the small part in which near relatives differ is to be trusted.
-CONFOUNDED_BIC = 6.0
-CONFOUNDED_DEG = 20.0
-CONFOUNDED_BIC_NEAR = 10.0
+# Within this difference of the Bayesian criterion, odds of 4 or 5 to 1, a candidate cannot be told from what was found.
+CONFOUNDED_BIC = 3.0
 # Beyond this angle a candidate makes less than a quarter of what was found: it may be missing too, but does not stand for it.
 UNRELATED_DEG = 60.0
 
@@ -49,15 +47,15 @@ class Attribution:
 
     @property
     def alternatives(self):
-        """Keys of the rivals that these data cannot tell from what was found, the closest first.
-
-        A rival with more parameters only counts where the criterion cannot tell it: it makes whatever its parts make.
-        """
-        near = (self.angle_deg < CONFOUNDED_DEG) & (self.rival_parameters <= self.found_parameters)
-        confounded = self.bic_difference < np.where(near, CONFOUNDED_BIC_NEAR, CONFOUNDED_BIC)
-        confounded &= self.angle_deg < UNRELATED_DEG
+        """Keys of the rivals that these data cannot tell from what was found, the closest first."""
+        confounded = (self.bic_difference < CONFOUNDED_BIC) & (self.angle_deg < UNRELATED_DEG)
         order = np.argsort(self.bic_difference)
         return tuple(self.rivals[index] for index in order if confounded[index])
+
+    @property
+    def other_effects(self):
+        """Names among the alternatives: what was found may sit elsewhere, or be something else."""
+        return {effect_of(key) for key in self.alternatives} - {self.effect}
 
 
 def attribute(final, found, p_values, observations, candidates):
@@ -136,6 +134,8 @@ def _attribution(name, members, final, others_found, p_values, observations, can
     basis = np.linalg.qr(np.concatenate(mine.columns, axis=1))[0]
     explained = basis @ (basis.T @ seen.residual)
     made = np.linalg.norm(explained)
+    # A parameter costs as much as the number of poses says: readings of one pose are no witnesses of their own to a law.
+    cost = np.log(len(np.unique(seen.cluster)))
     rows, total = len(seen.residual), seen.residual @ seen.residual
     rest = total - explained @ explained
     rivals, angles, differences, sizes = [], [], [], []
@@ -145,7 +145,7 @@ def _attribution(name, members, final, others_found, p_values, observations, can
         rest_with = total - ((columns.T @ seen.residual) ** 2).sum()
         rivals.append(candidate.key)
         angles.append(np.degrees(np.arccos(min(share, 1.0))))
-        differences.append(rows * np.log(rest_with / rest) + np.log(rows) * (columns.shape[1] - basis.shape[1]))
+        differences.append(rows * np.log(rest_with / rest) + cost * (columns.shape[1] - basis.shape[1]))
         sizes.append(columns.shape[1])
     # Variants of one candidate, as by their shape, count once: the one that fits best.
     order = np.argsort(differences)

@@ -53,10 +53,10 @@ def word(evidence):
     Returns
     -------
     str
-        adequate: nothing is missing that these data could show. named: one effect, told from all others. class: one effect or
-        one of those that these data cannot tell from it, or something akin to it that departs from its law. several: more
-        than one effect. unexplained: the residual is more than noise and no effect of the catalogue accounts for it.
-        not_testable: the data can test nothing.
+        adequate: nothing is missing that these data could show. named: one effect, told from all others, if not always where it
+        sits. class: one effect or one of those that these data cannot tell from it, or something akin to it that departs from
+        its law. several: more than one effect. unexplained: the residual is more than noise and no effect of the catalogue
+        accounts for it. not_testable: the data can test nothing.
     """
     if evidence.data_faults:
         return NAMED if len(evidence.data_faults) == 1 else SEVERAL
@@ -68,4 +68,4 @@ def word(evidence):
         return UNEXPLAINED
     if len(evidence.attributions) > 1:
         return SEVERAL
-    return CLASS if evidence.attributions[0].alternatives or evidence.doubted else NAMED
+    return CLASS if evidence.attributions[0].other_effects or evidence.doubted else NAMED

@@ -69,7 +69,7 @@ def test_proposing_and_diagnosing_anew_open_no_sealed_file_and_know_no_plant(kuk
     table = made_table(kuka, "case_1", offset_of_joint_3=6e-4)
     folder = made_folder(tmp_path / "blind" / "case_1", kuka, "case_1", table=table)
     for arm in ARMS:
-        for poses in POSES[:1]:
+        for poses in POSES:
             made_folder(tmp_path / "again" / folder_name(arm, poses) / "case_1", kuka, "case_1", table=table)
     sealed = tmp_path / "sealed" / "case_1.json"
     sealed.parent.mkdir()

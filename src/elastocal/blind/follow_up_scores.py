@@ -3,7 +3,7 @@
 import pandas as pd
 from scipy.stats import binomtest
 
-from elastocal.attribution import CONFOUNDED_BIC_NEAR
+from elastocal.attribution import CONFOUNDED_BIC
 from elastocal.blind.follow_up import ARMS, POSES
 from elastocal.blind.scores import outcome
 from elastocal.verdict import CLASS
@@ -57,11 +57,11 @@ def with_one_effect(cases):
 
 
 def with_prospects(cases):
-    """Which rows are of cases whose proposal promises as much separation as the verdict asks for between near relatives.
+    """Which rows are of cases whose proposal promises as much separation as the verdict asks for.
 
     The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
     """
-    return cases["foreseen"] >= CONFOUNDED_BIC_NEAR
+    return cases["foreseen"] >= CONFOUNDED_BIC
 
 
 def rates(cases):

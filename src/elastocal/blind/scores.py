@@ -5,6 +5,7 @@ from scipy.optimize import linear_sum_assignment
 
 from elastocal.blind.cases import TUNED as TUNED_ON
 from elastocal.blind.robots import PROOF, TUNED
+from elastocal.effects.protocol import effect_of
 from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 
 NONE = "none"
@@ -25,9 +26,9 @@ def outcome(truth, verdict):
     -------
     dict
         Of the case: where it belongs, what was true, what was said. ``exact`` says that the names found are the true ones,
-        ``named_right`` that this was said without alternatives, ``holds_truth`` that as many effects were found as were made
-        and each true one is the name of another of them or among its alternatives, ``wrong_name`` that one wrong name was said
-        alone.
+        ``named_right`` that this was said without another name beside it, ``holds_truth`` that as many effects were found as
+        were made and each true one is the name of another of them or among its alternatives, ``wrong_name`` that one wrong
+        name was said alone.
     """
     case, said = truth["case"], verdict["verdict"]
     names, true = [effect["name"] for effect in verdict["effects"]], list(case["effects"])
@@ -59,6 +60,6 @@ def kind_of(robot):
 def _each_is_held(true, effects):
     if len(true) != len(effects):
         return False
-    meant = [{effect["name"], *(key.split("@")[0].split("[")[0] for key in effect["alternatives"])} for effect in effects]
+    meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]
     held = np.array([[name in names for names in meant] for name in true], bool)
     return bool(held[linear_sum_assignment(~held)].all())
