@@ -337,9 +337,12 @@ def test_a_shape_that_is_bound_to_nothing_is_kept():
 def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_shape(fanuc, half_play):
     """Play that the load never crosses but a little: half the play over the torque is all that shows."""
     model = model_of(fanuc, "lost_motion@2")
+    (play,) = model.effects
+    taken_up = 0.98 * play.shapes[0].highest
     true = made_estimate(model, seed=46)
-    true = replace(true, coefficients=(np.array([half_play]),), shapes=(np.array([390.0]),))
-    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=47, force=50.0)), np.random.default_rng(48))
+    true = replace(true, coefficients=(np.array([half_play]),), shapes=(np.array([taken_up]),))
+    states = made_states(6, 60, seed=47, force=taken_up / 8.0)
+    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(48))
     found = fit(model, seen, NOISE)
     assert names_held(found) == ["lost_motion@2 torque"]
     (value,), (torque,) = found.estimate.coefficients[0], found.estimate.shapes[0]
@@ -347,7 +350,7 @@ def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_
     deviation = np.sqrt(found.covariance[number, number])
     # Given the torque; of the straight line within four standard errors.
     assert value > 5 * deviation
-    assert abs(value / torque - half_play / 390.0) < 4 * deviation / torque
+    assert abs(value / torque - half_play / taken_up) < 4 * deviation / torque
 
 
 def test_wild_observations_are_those_of_little_weight_and_do_not_count(fanuc):

@@ -107,4 +107,4 @@ def test_effects_start_at_zero_and_compliances_at_their_nominal_values(fanuc):
     found = registered(model, seen_exactly(model, made_estimate(model, seed=15), states))
     np.testing.assert_array_equal(found.coefficients[0], fanuc.compliance)
     assert [values.tolist() for values in found.coefficients[1:]] == [[0.0], [0.0]]
-    assert [values.tolist() for values in found.shapes] == [[], [], [50.0]]
+    assert [values.tolist() for values in found.shapes] == [[], [], [effects[1].shapes[0].start]]

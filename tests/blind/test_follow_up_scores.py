@@ -38,7 +38,7 @@ ANEW = [
 
 @pytest.fixture
 def cases():
-    return followed(TRUTHS, dict.fromkeys("abcde", CLASS), ANEW, {"a": 3.0, "b": 30.0, "c": 0.0, "d": 100.0})
+    return followed(TRUTHS, dict.fromkeys("abcde", CLASS), ANEW, {"a": 2.0, "b": 30.0, "c": 0.0, "d": 100.0})
 
 
 def row(table, *key):
