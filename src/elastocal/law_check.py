@@ -9,9 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
+from statsmodels.stats.multitest import multipletests
 
 from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.screening import by_chance, directions
+from elastocal.selection import parameter_slice
 
 # Family-wise over all departures of all effects found. Small, for no law of the catalogue is quite that of a machine.
 LEVEL = 0.001
@@ -66,8 +68,7 @@ def doubts(final, members, observations):
         for clause, candidate in _ways(final, member).items():
             ways[candidate.key] = (member.key, clause, candidate)
     seen = directions(final, observations, [candidate for _, _, candidate in ways.values()])
-    p_values = by_chance(seen)
-    family_wise = -np.expm1(len(p_values) * np.log1p(-p_values))
+    family_wise = multipletests(by_chance(seen), method="sidak")[1]
     departures = [
         Doubt(*ways[candidate.key][:2], float(p_value))
         for (candidate, _), p_value in zip(seen.candidates, family_wise, strict=True)
@@ -91,10 +92,10 @@ def wrong_signs(final, member):
         One for each such parameter, however uncertain; by the normal distribution, for the smallest of all parameters.
     """
     values, _ = final.values_of(member.key)
-    mine = [index for index, (owner, _) in enumerate(final.parameters) if owner == member.key]
+    linear = parameter_slice(final, member.key)[: len(values)]
+    deviations = np.sqrt(np.diag(final.covariance)[linear])
     found = []
-    for parameter, value, index in zip(member.parameters, values, mine, strict=False):
-        deviation = np.sqrt(final.covariance[index, index])
+    for parameter, value, deviation in zip(member.parameters, values, deviations, strict=True):
         if parameter.sign * value < 0 < deviation:
             needed = "positive" if parameter.sign > 0 else "negative"
             p_value = norm.sf(abs(value) / deviation) * len(member.parameters)
