@@ -8,7 +8,7 @@ from scipy.stats import chi2
 from elastocal.fitting import Fit, fit
 from elastocal.screening import Directions, Scores, absorbed, cross_validated_gains, directions, score
 
-# With the test of lack of fit, the other way to an alarm, this leaves the whole below 5 %; less would cost power.
+# With the test of lack of fit, the other way to an alarm, this is meant to leave the whole below 5 %; less would cost power.
 FAMILY_WISE_LEVEL = 0.03
 FOLDS = 10
 # A first effect must stand out beyond chance. A further one must be worth its parameters as well, by the extended Bayesian
