@@ -1,8 +1,9 @@
 """Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the readings then fit.
 
-One scan over a short list of hypotheses, nearly all of them discrete. They are only looked at where the readings as written are
-absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or targets
-that stand elsewhere, then two changes together. Signs, axes and units are facts, not parameters: each is tried, none is fitted.
+One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the readings as written are
+absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
+targets that stand elsewhere, then two changes together. Senses, axes and units are facts, not parameters: each is tried, none
+is fitted.
 """
 
 from collections.abc import Callable
@@ -24,7 +25,11 @@ from elastocal.faults.placement import (
 )
 from elastocal.faults.protocol import Fault, Value
 
-NAMES, FAMILY, AFTER = ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target"), "data", ("constant_columns",)
+NAMES, FAMILY, AFTER = (
+    ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target"),
+    "data",
+    ("constant_columns",),
+)
 
 # Poses enough to compare some two hundred hypotheses.
 _POSES = 40
@@ -45,12 +50,17 @@ _LENGTHS = {
     "decimetres": 0.1,
     "inches": 0.0254,
     "feet": 0.3048,
-    "a tenth of metres": 10.0,
-    "hundredths of metres": 100.0,
-    "thousandths of metres": 1e3,
+    "tenths of what they should be": 10.0,
+    "hundredths of what they should be": 100.0,
+    "thousandths of what they should be": 1e3,
 }
 # What rotation vectors were multiplied by before they were written.
-_TURNS = {0.5: "half of them", 2.0: "twice of them", 180 / np.pi: "degrees", np.pi / 180: "radians converted twice"}
+_TURNS = {
+    0.5: "halves of what they should be",
+    2.0: "doubles of what they should be",
+    180 / np.pi: "degrees",
+    np.pi / 180: "radians converted twice",
+}
 # Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
 _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
 
@@ -170,7 +180,9 @@ def placements(campaign):
     if any(target.offset_m is not None for target in campaign.targets):
 
         def unknown(campaign, readings):
-            return replace(campaign, targets=tuple(replace(t, offset_m=None) for t in campaign.targets)), readings
+            seen = set(readings.target.tolist())
+            targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
+            return replace(campaign, targets=tuple(targets)), readings
 
         found.append(Change("wrong_target", "", unknown, placement="targets"))
     return found
@@ -265,8 +277,12 @@ def _winner(tried, before, measure):
     misfits = [_misfit(one.placement, measure) for one in tried]
     together = np.array([misfit.together for misfit in misfits])
     # One of two faults may concern positions alone, or orientations alone.
-    keys = together, *(
-        np.array([getattr(misfit, name) for misfit in misfits]) + 1e-3 * together for name in ("position_m", "orientation_rad")
+    keys = (
+        together,
+        *(
+            np.array([getattr(misfit, name) for misfit in misfits]) + 1e-3 * together
+            for name in ("position_m", "orientation_rad")
+        ),
     )
     for key in keys:
         alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
@@ -275,7 +291,9 @@ def _winner(tried, before, measure):
         after = _misfit(placement, measure)
         evidence = _evidence(before, after, _extent(placement, best.readings))
         if evidence:
-            others = [tried[number].changes[0].detail for number in alike[1 : 1 + _MOST_ALIKE] if len(tried[number].changes) == 1]
+            others = [
+                tried[number].changes[0].detail for number in alike[1 : 1 + _MOST_ALIKE] if len(tried[number].changes) == 1
+            ]
             return _Winner(best, placement, after, evidence, tuple(detail for detail in others if detail))
     return None
 
@@ -347,7 +365,9 @@ def _lengths_of_targets(campaign):
     groups = [known, *([name] for name in known if len(known) > 1)] if known else []
     found = []
     for names, (unit, metres) in product(groups, _LENGTHS.items()):
-        which = "the target offset" if len(known) == 1 else "the target offsets" if names == known else f"the offset of {names[0]}"
+        which = (
+            "the target offset" if len(known) == 1 else "the target offsets" if names == known else f"the offset of {names[0]}"
+        )
         looks = "looks" if len(names) == 1 else "look"
         detail = f"{which} {looks} like {unit}: readings fit {metres:g} times what is written for {', '.join(names)}"
         factor = Value("metres for each unit of target offset written", metres, "m")
@@ -375,9 +395,7 @@ def _rotations():
 def _axes(mirrored_only, oriented):
     """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
     if mirrored_only:
-        detail = (
-            "the readings are mirrored: two axes are exchanged, or one is turned round, or joints are counted the other way round"
-        )
+        detail = "the readings are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
         return [Change("swapped_axes", detail, _with_positions(np.diag([1.0, 1.0, -1.0])))]
     ways = [
         np.array(signs)[:, None] * np.eye(3)[list(order)]
@@ -451,9 +469,7 @@ def _with_offsets(names, factor):
 def _frame_told(estimate, before, after):
     """Sentence and numbers of a base that stands elsewhere, and whether that is too far for physics."""
     parameters, away, turned = [], 0.0, 0.0
-    for session, position, rotation in zip(
-        estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True
-    ):
+    for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
         vector = Rotation.from_matrix(rotation).as_rotvec()
         of = f" in session {session}" if len(estimate.sessions) > 1 else ""
         parameters += [Value(f"base {axis}{of}", float(value), "m") for axis, value in zip("xyz", position, strict=True)]
