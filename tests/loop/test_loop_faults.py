@@ -108,9 +108,9 @@ def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder,
     verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
     told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
     for axis, place, turn in zip("xyz", PLACE, TURN, strict=True):
-        value, unit = told[f"base {axis}"]
+        value, unit = told[f"{axis} of the base in the frame of the readings"]
         assert unit == "m" and abs(value - place) < 5e-4
-        value, unit = told[f"base rotation vector {axis}"]
+        value, unit = told[f"rotation vector {axis} of the base in the frame of the readings"]
         assert unit == "rad" and abs(value - turn) < 5e-4
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from elastocal.attribution import Attribution, by_effect
 from elastocal.compliance_check import compliance_warnings
+from elastocal.faults.placement import IMPLAUSIBLE_M
 from elastocal.fitting import discrepancy
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
@@ -112,7 +113,7 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
             *_fault_warnings(faults),
             *warnings,
             *_doubt_warnings(doubts),
-            *compliance_warnings(compliances["after"], compliances["std_error"], final.model.nominal_compliance),
+            *_compliance_warnings(compliances, final),
             # What readings leave that are wrong in themselves says nothing of the model.
             *([] if decisive else _remainder(said, after, evidence)),
         ],
@@ -196,6 +197,13 @@ def _gains(rows):
         if row["kind"] in ("declared", "effect"):
             last = row["heldout_rms_m"]
     return gains
+
+
+def _compliance_warnings(compliances, final):
+    # Where readings are wrong by centimetres, compliances mean nothing.
+    if np.sqrt((final.residual[:, :3] ** 2).sum(axis=1).mean()) > IMPLAUSIBLE_M:
+        return []
+    return compliance_warnings(compliances["after"], compliances["std_error"], final.model.nominal_compliance)
 
 
 def _compliances(declared, final):
