@@ -168,3 +168,8 @@ def test_confounding_is_the_smallest_angle_between_what_two_candidates_make(fanu
     keys = [candidate.key for candidate, _ in seen.candidates]
     aliases = [angles[keys.index(one), keys.index(other)] for one, other in [names[3:]]]
     assert aliases[0] < 5.0
+
+
+def test_where_nothing_is_tested_nothing_is_confounded(fanuc):
+    campaign = planted(fanuc, {}, seed=5, poses=12)
+    assert confounding(directions(campaign.declared, campaign.observations, [])).shape == (0, 0)

@@ -167,6 +167,12 @@ def test_reported_angles_are_converted_both_ways():
         ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),
         ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
         ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
+        (
+            {"lengths_m": {"l1": 500, "l2": 250, "l3": 1500}},
+            "lengths_m",
+            ["reaches 2250 m", "in metres (not millimetres)", "10 m"],
+        ),
+        ({"chain": "Tz(0.5) Rz(q1) Tx(-9) Ry(q2) Tx(0.6) [B]", "lengths_m": None}, "chain", ["reaches 10.1 m", "metres"]),
         ({"links": TUBES | {"tubes": TUBES["tubes"] * 2}}, "links.tubes", ["2 tubes", "each of the 3"]),
         ({"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}}, "links.tubes", ["0.101", "half"]),
     ],

@@ -38,6 +38,7 @@ FAULT = {
     "joints": [2],
     "parameters": [{"name": "factor", "value": 57.3, "unit": ""}],
     "decisive": True,
+    "alternatives": ("gradians for radians",),
 }
 
 
@@ -131,7 +132,7 @@ def test_a_fault_of_the_data_comes_before_all_physics(case, fits):
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["family"], effect["joints"]) == ("wrong_unit", "data", [2])
     assert effect["parameters"] == [{"name": "factor", "value": 57.3, "unit": "", "std_error": None}]
-    assert effect["alternatives"] == effect["doubts"] == []
+    assert effect["alternatives"] == ["gradians for radians"] and effect["doubts"] == []
     assert "outliers: two rows" in verdict["warnings"]
 
 

@@ -477,11 +477,12 @@ def _frame_told(estimate, before, after):
             Value(f"rotation vector {axis} {of}", float(value), "rad") for axis, value in zip("xyz", vector, strict=True)
         ]
         away, turned = max(away, float(np.linalg.norm(position))), max(turned, float(np.linalg.norm(vector)))
-    where = f"{away:.3g} m away, turned by {np.degrees(turned):.3g}°"
+    distance = f"{away:.3g} m" if away >= 0.1 else f"{1e3 * away:.2g} mm"
+    where = f"{distance} away, turned by {np.degrees(turned):.3g}°"
     if away > _NEAR_M or turned > _NEAR_RAD:
         return f"readings do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
     better = before.together / max(after.together, 1e-12)
-    return f"readings would fit {better:.2g} times better if the base stood {where}", tuple(parameters), False
+    return f"readings would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
 def _targets_told(targets, written, fitted):
