@@ -38,6 +38,8 @@ class Noise:
         Repeatability of each joint.
     degrees_of_freedom : int
         Contrasts of repeats behind the figures; 0 where they are declared.
+    pose_rad : float
+        Error of each joint that all readings of a pose have in common.
     """
 
     source: str
@@ -45,6 +47,16 @@ class Noise:
     orientation_rad: float
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
+    pose_rad: float = 0.0
+
+    def scaled(self, factor):
+        """The same with the noise of single readings multiplied."""
+        return replace(
+            self,
+            position_m=factor * self.position_m,
+            orientation_rad=factor * self.orientation_rad,
+            joint_rad=factor * self.joint_rad,
+        )
 
 
 def declared_noise(campaign):

@@ -14,7 +14,7 @@ class Whitening:
     Attributes
     ----------
     blocks : tuple of (ndarray (G, k), ndarray (G, k * rows, k * rows))
-        For the states with k targets: indices of their observations, and the inverse Cholesky factor of their covariance.
+        For the states, or the poses, with k observations: their indices, and the inverse Cholesky factor of their covariance.
     """
 
     blocks: tuple
@@ -90,10 +90,22 @@ def spectrum(observations, jacobian, noise, values):
 
 
 def _covariances(observations, jacobian, noise):
-    """Observations of the states with the same number of targets (G, k), and covariance of their averaged readings."""
-    for members in _members(observations.state):
-        covariance = reading_covariances(noise, jacobian[members], observations.rows)
-        yield members, covariance / observations.states.repeats[observations.state[members[:, 0]]][:, None, None]
+    """Observations with correlated errors (G, k) and their covariance (G, k * rows, k * rows), for each number k.
+
+    Those of a state share the approach; where poses have an error in common, those of all states of a pose share it.
+    """
+    rows, repeats = observations.rows, observations.states.repeats[observations.state]
+    if not noise.pose_rad:
+        for members in _members(observations.state):
+            covariance = reading_covariances(noise, jacobian[members], rows)
+            yield members, covariance / repeats[members[:, 0]][:, None, None]
+        return
+    for members in _members(observations.cluster):
+        stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
+        state = np.repeat(observations.state[members], rows, axis=1)
+        alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
+        common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
+        yield members, alike * reading_covariances(noise, jacobian[members], rows) + common
 
 
 def _lacking(noise, rows):
@@ -101,8 +113,8 @@ def _lacking(noise, rows):
     return np.repeat([1.0, noise.orientation_rad / noise.position_m], 3)[:rows] ** 2
 
 
-def _members(state):
-    """Observations of each state, for each number of targets in a state: arrays (G, k)."""
-    seen = np.bincount(state)
+def _members(group):
+    """Observations of each state or pose, for each number of them in one: arrays (G, k)."""
+    seen = np.bincount(group)
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
     return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]

@@ -88,6 +88,9 @@ class Candidate:
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be told from a smooth one.
+    place : str
+        Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
+        location are variants of its law, of which only one can hold.
     """
 
     effect: str
@@ -99,6 +102,12 @@ class Candidate:
     needs: frozenset = frozenset()
     shapes: tuple = ()
     distinct_angles: int = 0
+    place: str = ""
+
+    @property
+    def location(self):
+        """Where the effect acts: its joints, with the place where they do not tell it."""
+        return (*self.joints, self.place) if self.place else self.joints
 
     @property
     def key(self):

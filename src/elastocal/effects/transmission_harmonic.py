@@ -31,5 +31,5 @@ def _candidate(joint, low, high):
         angle = circumstances.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in orders for wave in (np.cos, np.sin)]
 
-    detail = f"orders {low}-{high}"
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=_SAMPLES_PER_PERIOD * high)
+    detail, angles = f"orders {low}-{high}", _SAMPLES_PER_PERIOD * high
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=angles, place=detail)
