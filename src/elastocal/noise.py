@@ -49,6 +49,11 @@ class Noise:
     degrees_of_freedom: int = 0
     pose_rad: float = 0.0
 
+    @property
+    def of_readings(self):
+        """The same without what the readings of a pose have in common."""
+        return replace(self, pose_rad=0.0)
+
     def scaled(self, factor):
         """The same with the noise of single readings multiplied."""
         return replace(

@@ -1,23 +1,39 @@
-"""The exact fit of a selected model: same priors, exact kinematics, and parameters averaged over models.
+"""The exact fit of a selected model: same priors, exact kinematics.
 
-Coefficients keep the normal priors under which they were selected; the noise is that which the selected model leaves. The
-averages differ from the exact fit of the best model by what other models add in the linearised problem, and intervals hold
-their spread as well, so that they are honest after selection.
+Coefficients keep the normal priors under which they were selected, so that what the readings do not determine stays at zero;
+the noise is that which the selected model leaves.
 
 References
 ----------
-.. [1] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
+.. [1] Hoerl, A. E. and Kennard, R. W. (1970). Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12.
+.. [2] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.fitting import fit
 
 
-def selected_candidates(problem, model):
-    """Candidates of a model with the priors of its units, and their shape values.
+@dataclass(frozen=True)
+class Selected:
+    """A model as the exact fit wants it.
+
+    Attributes
+    ----------
+    effects : tuple of (Candidate, ndarray)
+        Found, with normal priors on their parameters, and shape values. Without the competitor, which predicts nothing.
+    declared : dict of str to float
+        Size of each declared effect whose size was averaged over, by its name, in plausible sizes.
+    """
+
+    effects: tuple
+    declared: dict
+
+
+def selected(problem, model):
+    """What a model of the posterior is for the exact fit.
 
     Parameters
     ----------
@@ -26,25 +42,19 @@ def selected_candidates(problem, model):
 
     Returns
     -------
-    list of (Candidate, ndarray)
-        Without the competitor, which predicts nothing.
+    Selected
     """
-    scales = model.scales[len(problem.base) :]
-    chosen = []
-    for number, scale in zip(model.units, scales, strict=True):
+    sizes = dict(zip((*problem.base, *model.units), model.scales, strict=True))
+    effects = []
+    for number in model.units:
         unit = problem.units[number]
-        if unit.candidate is None:
-            continue
-        parameters = tuple(
-            replace(parameter, prior_std=float(scale * size))
-            for parameter, size in zip(unit.candidate.parameters, unit.sizes, strict=True)
-        )
-        chosen.append((replace(unit.candidate, parameters=parameters), np.array(unit.shapes, float)))
-    return chosen
+        if unit.candidate:
+            effects.append((_with_prior(unit.candidate, sizes[number] * unit.sizes), np.array(unit.shapes, float)))
+    return Selected(tuple(effects), {problem.units[number].mechanism: float(sizes[number]) for number in problem.base})
 
 
-def refitted(declared, observations, noise, chosen):
-    """Fit the declared model with more candidates.
+def fit_with_sizes(declared, observations, noise, chosen):
+    """Fit the declared model with the effects of a selected one.
 
     Parameters
     ----------
@@ -53,21 +63,50 @@ def refitted(declared, observations, noise, chosen):
     observations : Observations
     noise : Noise
         Of readings and poses, as the selected model leaves it.
-    chosen : list of (Candidate, ndarray)
-        As of `selected_candidates`.
+    chosen : Selected
 
     Returns
     -------
     Fit
     """
-    effects = [candidate for candidate, _ in chosen]
+    model = declared.model
+    known = tuple(
+        _with_prior(effect, chosen.declared[effect.effect] * np.array([p.plausible for p in effect.parameters]))
+        if effect.effect in chosen.declared
+        else effect
+        for effect in model.effects
+    )
+    effects = [candidate for candidate, _ in chosen.effects]
     start = declared.estimate.with_effects(effects)
-    start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen)))
-    return fit(declared.model.with_effects(effects), observations, noise, start, 0.0)
+    start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
+    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start, 0.0)
+
+
+def mean_square_left(problem, model):
+    """Mean square of the whitened residual that a model leaves, by the linearised problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : search.Model
+
+    Returns
+    -------
+    float
+        1 where the noise accounts for it.
+    """
+    statistics = problem.statistics
+    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
+    members = (*problem.base, *model.units)
+    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
+    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
+    along = deviations * statistics.along[place, columns]
+    inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
+    return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
 
 
 def remaining_noise(problem, model, noise):
-    """Noise of the readings as a model leaves it: at least the noise that repeats or the campaign say.
+    """Noise as a model leaves it: at least the noise that repeats or the campaign say.
 
     Parameters
     ----------
@@ -79,13 +118,13 @@ def remaining_noise(problem, model, noise):
     -------
     Noise
     """
-    statistics = problem.statistics
-    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
-    members = (*problem.base, *model.units)
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
-    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
-    along = deviations * statistics.along[place, columns]
-    inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
-    left = statistics.squares[place] - along @ np.linalg.solve(inner, along)
-    factor = float(np.sqrt(max(left / statistics.freedom, 1.0)))
+    factor = float(np.sqrt(max(mean_square_left(problem, model), 1.0)))
     return replace(noise.scaled(factor), pose_rad=factor * model.pose_error_rad)
+
+
+def _with_prior(candidate, deviations):
+    parameters = tuple(
+        replace(parameter, prior_std=float(deviation))
+        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
+    )
+    return replace(candidate, parameters=parameters)

@@ -59,6 +59,13 @@ class Settings:
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
     testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
+    linearizations: int = _setting(
+        3, "times that the problem is linearised, each about the model found before; the third moves no verdict"
+    )
+    relinearize_above: float = _setting(
+        100.0,
+        "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
+    )
     beam: int = _setting(6, "models of each size whose extensions are tried; more change probabilities by less than 1 %")
     largest_model: int = _setting(40, "most units of one model; UR10 series use some 30 bands of gear harmonics")
     kept_models: int = _setting(

@@ -38,6 +38,8 @@ class Parameter:
         None, as nearly everywhere, for no prior. Reported with the estimate.
     sign : {-1, 0, 1}
         That such an effect has by its physics; 0 where it may have either.
+    order : int
+        Of a harmonic, whose plausible size falls with it; 1 elsewhere.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Parameter:
     plausible: float
     prior_std: float | None = None
     sign: int = 0
+    order: int = 1
 
 
 @dataclass(frozen=True)

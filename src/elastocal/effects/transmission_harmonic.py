@@ -24,7 +24,9 @@ def candidates(sites):
 def _candidate(joint, low, high):
     orders = range(low, high + 1)
     parameters = tuple(
-        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD) for order in orders for wave in ("cos", "sin")
+        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD, order=order)
+        for order in orders
+        for wave in ("cos", "sin")
     )
 
     def displacement(circumstances):
