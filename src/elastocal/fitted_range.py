@@ -35,8 +35,8 @@ def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=N
 def predictive_variances(fitted, observations, model, estimate, unseen):
     """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
 
-    The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the readings
-    do not tell is as uncertain as that, and one pose that alone tells a parameter does not make all others look sure beside it.
+    The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
+    readings do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look sure.
 
     Parameters
     ----------

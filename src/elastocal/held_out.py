@@ -15,8 +15,8 @@ METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
 _ENDS = np.array([0.5 * (1.0 - _CONFIDENCE), 0.5 * (1.0 + _CONFIDENCE)])
 _SHARE = 0.95
-# Student's t with the same standard error takes over where fewer poses make the bootstrap-t erratic (with 3 it holds 80 %, t 94 %;
-# with 6 they hold the same), and where so many make both alike (with 300 they differ by 3 % of their width) and drawing costly.
+# Student's t with the same standard error takes over where few poses make the bootstrap-t erratic (3: it holds 80 %, t 94 %;
+# 6: both hold the same), and where so many make both alike (300: widths differ by 3 %) and drawing costly.
 _FEWEST_TO_DRAW, _MOST_TO_DRAW = 6, 300
 # Standard errors of a logarithm below this are rounding.
 _ROUNDING = 1e-12
@@ -63,8 +63,8 @@ def position_errors(model, estimate, observations):
 def placed_estimate(fitted, observations):
     """The estimate of a fit for other observations of its targets, whose sessions it may not have seen.
 
-    A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it, six
-    numbers of each session, and so its errors come out slightly too small. Everything else stays.
+    A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
+    six numbers of each session, and so its errors come out slightly too small. Everything else stays.
 
     Parameters
     ----------
@@ -130,11 +130,10 @@ def intervals(errors, replicates, stream, reference=0):
 
     Poses are the independent units; readings of one pose share errors. Mean and RMS, and the ratio of two RMS, have bootstrap-t
     intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and Tibshirani 1993,
-    sections 11.3 and 12.5; Cameron, Gelbach and Miller 2008 for clusters). Coverage is in ``docs/held_out_intervals.md``: where
-    the percentile bootstrap and BCa hold 0.77 to 0.94, these hold 0.91 to 0.96, unless a pose in twenty is far off, which 9 to
-    36 poses do not show reliably. The 95th percentile has the interval of Woodruff (1952) at the effective number of readings of
-    Korn and Graubard (1998), open above where fewer than 72 readings' worth are at hand. The maximum of a sample has no interval
-    that a bootstrap could give: not a number, see `share_below_largest`.
+    sections 11.3 and 12.5; Cameron, Gelbach and Miller 2008 for clusters). The 95th percentile has the interval of Woodruff
+    (1952) at the effective number of readings of Korn and Graubard (1998), open above where that is less than 72. The maximum
+    of a sample has no interval that a bootstrap could give: not a number, see `share_below_largest`. Why these, and what they
+    cover: ``docs/held_out_intervals.md``.
 
     Parameters
     ----------
@@ -187,7 +186,7 @@ def share_below_largest(poses):
 
 
 def _drawn_poses(poses, replicates, stream):
-    """How often each pose counts in each replicate, ndarray (B, P) of float; None where no bootstrap is needed or can be had."""
+    """How often each pose counts in each replicate, ndarray (B, P) of float; None where Student's t is taken instead."""
     if not _FEWEST_TO_DRAW <= poses <= _MOST_TO_DRAW:
         return None
     weights = stream.multinomial(poses, np.full(poses, 1.0 / poses), replicates).astype(float)
@@ -242,9 +241,10 @@ def _quantile_interval(errors):
     off = np.bincount(errors.cluster, below - share)
     inflation = poses / (poses - 1) * (off**2).sum() / (count * max(share * (1.0 - share), _ROUNDING))
     effective = int(count / max(inflation, 1.0))
-    low, high = binom.ppf(_ENDS, effective, _SHARE) + [0, 1]
-    bottom = rising[max(int(low / effective * count), 1) - 1] if low >= 1 else 0.0
-    top = rising[int(np.ceil(high / effective * count)) - 1] if high <= effective else np.inf
+    low, high = binom.ppf(_ENDS, effective, _SHARE)
+    bottom = rising[int(low / effective * count) - 1] if low >= 1 else 0.0
+    # So many readings' worth that fewer than 2.5 % of such samples lie below the quantile as a whole.
+    top = rising[int(np.ceil((high + 1) / effective * count)) - 1] if high < effective else np.inf
     return np.array([bottom, top])
 
 

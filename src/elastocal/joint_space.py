@@ -4,6 +4,7 @@ import numpy as np
 
 # A joint that moves less than readings of one pose may differ tells no poses apart.
 _STILL_RAD = 0.02
+_ROUNDS = 100
 # How often a pose drawn like the others, from a box, is called beyond their range.
 _LEVEL = 0.05
 
@@ -11,9 +12,9 @@ _LEVEL = 0.05
 def blocks(joint_angles, count):
     """Poses parted into blocks of neighbours whose sizes differ by one at most.
 
-    Principal direction divisive partitioning (Boley 1998) at quantiles instead of means: a block is cut across the direction in
-    which it is widest, so that no draw decides and no block is too small to be held out. Joints count alike, by the cosine and
-    sine of their angles over their spread.
+    Bisecting k-means (Steinbach, Karypis and Kumar 2000) with parts of given size: a block is cut across the direction in
+    which it is widest (Boley 1998), then across the line between the means of its parts until these stay. No draw decides, and
+    no block is too small to be held out. Joints count alike, by the cosine and sine of their angles over their spread.
 
     Parameters
     ----------
@@ -42,10 +43,15 @@ def blocks(joint_angles, count):
         direction = np.linalg.svd(about, full_matrices=False)[2][0]
         # The sign of a singular vector is arbitrary.
         direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
-        ranked = members[np.argsort(about @ direction, kind="stable")]
         lower = parts // 2
         cut = round(len(members) * lower / parts)
-        waiting += [(ranked[:cut], first, lower), (ranked[cut:], first + lower, parts - lower)]
+        order = np.argsort(about @ direction, kind="stable")
+        for _ in range(_ROUNDS):
+            before, direction = set(order[:cut]), about[order[cut:]].mean(axis=0) - about[order[:cut]].mean(axis=0)
+            order = np.argsort(about @ direction, kind="stable")
+            if set(order[:cut]) == before:
+                break
+        waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
     return found
 
 
@@ -53,9 +59,9 @@ def beyond_range(fitted_angles, joint_angles):
     """Poses at which a joint stands farther beyond those of other poses than chance explains.
 
     Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
-    range with probability 2 n (1 + t)^(1-P) / (P + 1), from the spacings of uniform order statistics (David and Nagaraja 2003,
-    section 6.4). The margin is the t that makes this 5 %: without one, half of the random poses beside 20 others would be called
-    outside.
+    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics (David and
+    Nagaraja 2003, section 6.4). The margin is the t that makes this 5 %, or what readings of one pose may differ: without one,
+    half of the random poses beside 20 others would be called outside.
 
     Parameters
     ----------

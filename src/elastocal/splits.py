@@ -1,8 +1,8 @@
 """Cross-validation over blocks of joint space and over sessions: how far a model carries, from the training poses alone.
 
-Poses drawn at random have neighbours among those fitted, so their errors say how well a model interpolates; whole blocks of joint
-space left out say how well it extrapolates (Roberts et al. 2017, cross-validation for structured data). The effects stay those
-that were chosen with all training poses: what is refitted is their size, so the errors carry the selection's optimism.
+Poses drawn at random have neighbours among those fitted, so their errors say how well a model interpolates; whole blocks of
+joint space left out say how well it extrapolates (Roberts et al. 2017, cross-validation for structured data). The effects stay
+those that were chosen with all training poses: what is refitted is their size, so the errors carry the selection's optimism.
 """
 
 from dataclasses import dataclass, replace

@@ -21,6 +21,7 @@ from elastocal.loop.reading_columns import residual_columns
 from elastocal.model import circumstances, measured_in_base, residuals
 from elastocal.observations import each_approach, state_clusters
 from elastocal.random_streams import stream
+from elastocal.splits import error_row, split_rows
 
 _REPLICATES = 1000
 # A control of more parameters than this would take longer to fit than it tells.
@@ -200,6 +201,27 @@ def outside_poses(steps, case, held_out):
     variances = predictive_variances(fitted, case.observations, *_placed(fitted, case, held_out), unseen)
     outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
     return np.bincount(state_clusters(unseen.states), outside) > 0
+
+
+def split_table(steps, case, held_out, seed):
+    """Errors on the held-out poses beside those that cross-validation of the training poses foresees.
+
+    Parameters
+    ----------
+    steps, case, held_out, seed
+        As in `judged`.
+
+    Returns
+    -------
+    list of dict
+        Rows of splits.csv.
+    """
+    before = next(step.fitted for step in steps if step.kind == "declared")
+    after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    draws = stream(seed, case.campaign.name, "splits", 0)
+    unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    rows = [error_row("held out", "all", *unseen, _REPLICATES, draws)]
+    return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
 def residual_blocks(steps, case, held_out):
