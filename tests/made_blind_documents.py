@@ -60,6 +60,8 @@ def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warni
             "after": {"rms_m": after},
             "noise_floor_rms_m": 1e-4,
             "reduction_ci95": list(reduction),
+            # As the interval of a normal estimate has it.
+            "reduction_std_error": (reduction[1] - reduction[0]) / (2 * 1.959964),
         },
         "noise": {"degrees_of_freedom": freedom},
         "warnings": list(warnings),

@@ -153,7 +153,7 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     return found
 
 
-def fit_frames(fitted, model, observations, noise):
+def fit_frames(fitted, model, observations, noise, own_targets=True):
     """Fit frames and targets of other observations; everything else stays as it was found.
 
     Parameters
@@ -163,13 +163,21 @@ def fit_frames(fitted, model, observations, noise):
         The same effects with the targets of these observations.
     observations : Observations
     noise : Noise
+    own_targets : bool
+        Whether these observations have targets of their own; where not, those of the fit stay as they were found.
 
     Returns
     -------
     Estimate
     """
+    found = fitted.estimate
+    if not own_targets:
+        known = [replace(t, offset_m=tuple(at)) for t, at in zip(model.targets, found.target_offset, strict=True)]
+        model = replace(model, targets=tuple(known))
     start = registered(model, observations)
-    start = replace(start, coefficients=fitted.estimate.coefficients, shapes=fitted.estimate.shapes)
+    start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
+    if not own_targets:
+        start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = circumstances(model, start, observations.states)
     return _robustly(model, observations, around, noise, start, fitted.discrepancy_m, frozen).estimate

@@ -10,6 +10,7 @@ LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confoundin
 LOOP_REPORTS = [
     "verdict.json",
     "before_after.csv",
+    "splits.csv",
     "candidates.parquet",
     "residuals.parquet",
     "next_experiment.csv",
@@ -185,6 +186,7 @@ rule judge_held_out:
         sources=sources("judge_held_out.py"),
     output:
         before_after="reports/loop/{campaign}/before_after.csv",
+        splits="reports/loop/{campaign}/splits.csv",
         errors="results/loop/{campaign}/held_out_errors.json",
         residuals="reports/loop/{campaign}/residuals.parquet",
     log:

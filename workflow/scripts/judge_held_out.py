@@ -6,7 +6,7 @@ from elastocal.attribution import by_effect
 from elastocal.frames import write_csv
 from elastocal.json_files import read_json, write_json
 from elastocal.loop.case import noise_from
-from elastocal.loop.judge import controls, judged, model_steps, residual_blocks
+from elastocal.loop.judge import controls, judged, model_steps, residual_blocks, split_table
 from elastocal.loop.opened import opened_case, opened_fit
 from elastocal.loop.schemas import LOOKS, RIVALS, residuals
 from elastocal.provenance import provenance
@@ -25,6 +25,7 @@ def judge_held_out(job):
     steps = model_steps(case, noise_from(read_json(job.input.noise)), declared, final, groups, beside)
     result = judged(steps, case, held_out, job.params.seed)
     write_csv(job.output.before_after, pd.DataFrame(result.rows))
+    write_csv(job.output.splits, pd.DataFrame(split_table(steps, case, held_out, job.params.seed)))
     write_json(job.output.errors, {"heldout": result.heldout, "warnings": result.warnings})
     schema = residuals(case.campaign.robot.joints)
     write_table(job.output.residuals, schema, residual_blocks(steps, case, held_out), provenance(job.params, **job.wildcards))

@@ -1,7 +1,6 @@
 """One row a case: what the verdict is worth, how large the effect was, which errors were left, and what the oracle did."""
 
 import numpy as np
-from scipy.stats import norm
 
 from elastocal.blind.scores import outcome
 from elastocal.plant.defects import KINDS
@@ -80,12 +79,12 @@ def _found_places(verdict):
 
 
 def _errors(verdict):
-    """Held-out errors, and whether they got worse by more than chance without a word."""
+    """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
     held = verdict["heldout"]
     before, after = held["before"]["rms_m"], held["after"]["rms_m"]
-    low, high = held["reduction_ci95"]
-    reduction, std_error = 1.0 - after / before, (high - low) / (2.0 * norm.ppf(0.975))
+    reduction, std_error = 1.0 - after / before, held["reduction_std_error"]
     warned = any("held-out" in warning for warning in verdict["warnings"])
+    adopted = any(effect.get("family") != "data" for effect in verdict["effects"])
     worse = reduction + _STD_ERRORS * std_error < 0.0
     return {
         "before_rms_m": before,
@@ -93,7 +92,10 @@ def _errors(verdict):
         "noise_floor_rms_m": np.nan if held["noise_floor_rms_m"] is None else held["noise_floor_rms_m"],
         "reduction": reduction,
         "reduction_std_error": std_error,
+        "adopted": adopted,
         "worse": worse,
+        # A warning does not excuse it, as there always is one.
+        "worse_adopted": adopted and worse,
         "warned": warned,
         "worse_unwarned": worse and not warned,
     }

@@ -4,12 +4,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from elastocal.fitted_range import outside_fitted_range, predictive_variances
 from elastocal.fitting import fit, fit_frames
-from elastocal.held_out import METRICS, grown, intervals, noise_floor, position_errors, summary
+from elastocal.held_out import (
+    METRICS,
+    errors_by_range,
+    grown,
+    intervals,
+    noise_floor,
+    placed_estimate,
+    position_errors,
+    share_below_largest,
+    summary,
+)
 from elastocal.loop.reading_columns import residual_columns
 from elastocal.model import circumstances, measured_in_base, residuals
-from elastocal.observations import each_approach
+from elastocal.observations import each_approach, state_clusters
 from elastocal.random_streams import stream
+from elastocal.splits import error_row, split_rows
 
 _REPLICATES = 1000
 # A control of more parameters than this would take longer to fit than it tells.
@@ -156,28 +168,76 @@ def judged(steps, case, held_out, seed):
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
     ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    outside = outside_poses(steps, case, held_out)
+    by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
         "before": ends[0],
         "after": ends[1],
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
-        "reduction_ci95": [float(value) for value in reductions[after]],
+        "reduction_ci95": [reductions[after].low, reductions[after].high],
+        "reduction_std_error": reductions[after].std_error,
         "poses": errors[0].poses,
+        "share_below_max": share_below_largest(errors[0].poses),
+        "outside_range": by_range,
     }
-    return Judged(rows, heldout, _warnings(steps, rows, errors, before, after))
+    return Judged(rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)))
+
+
+def outside_poses(steps, case, held_out):
+    """Which held-out poses lie outside the range of those that the last model was fitted to.
+
+    Parameters
+    ----------
+    steps, case, held_out
+        As in `judged`.
+
+    Returns
+    -------
+    ndarray of bool (P,)
+        By `Observations.cluster`.
+    """
+    fitted = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    unseen = held_out.observations
+    variances = predictive_variances(fitted, case.observations, *_placed(fitted, case, held_out), unseen)
+    outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
+    return np.bincount(state_clusters(unseen.states), outside) > 0
+
+
+def split_table(steps, case, held_out, seed):
+    """Errors on the held-out poses beside those that cross-validation of the training poses foresees.
+
+    Parameters
+    ----------
+    steps, case, held_out, seed
+        As in `judged`.
+
+    Returns
+    -------
+    list of dict
+        Rows of splits.csv.
+    """
+    before = next(step.fitted for step in steps if step.kind == "declared")
+    after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    draws = stream(seed, case.campaign.name, "splits", 0)
+    unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    rows = [error_row("held out", "all", *unseen, _REPLICATES, draws)]
+    return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
 def residual_blocks(steps, case, held_out):
     """Blocks of the residuals table: training readings, then held-out ones; every reading before and after."""
     before = next(step.fitted for step in steps if step.kind == "declared")
     after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
-    for part, unseen in ((case, False), (held_out, True)):
+    inside = np.zeros(case.observations.cluster.max() + 1, bool)
+    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
         observations, order = _in_order(part.campaign.readings)
         off, position = [], None
         for fitted in (before, after):
             model, estimate = _placed(fitted, case, part)
             off.append(residuals(model, estimate, observations, circumstances(model, estimate, observations.states)))
             position = measured_in_base(estimate, observations)[0]
-        yield residual_columns(part.campaign.readings.select(order), unseen, position, *off)
+        readings = part.campaign.readings.select(order)
+        yield residual_columns(readings, unseen, outside[state_clusters(readings)], position, *off)
 
 
 def _with(case, noise, declared, added):
@@ -189,7 +249,7 @@ def _with(case, noise, declared, added):
 def _placed(fitted, case, part):
     """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
     if part is case or part.campaign.name == case.campaign.name:
-        return fitted.model, fitted.estimate
+        return fitted.model, placed_estimate(fitted, part.observations)
     model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=fitted.model.effects)
     return model, fit_frames(fitted, model, part.observations, fitted.noise)
 
@@ -201,6 +261,13 @@ def _in_order(readings):
     return observations, np.lexsort(
         (readings.target, readings.repeat, *approach, readings.load, readings.pose, readings.session)
     )
+
+
+def _range_warnings(by_range, poses):
+    count = by_range["poses"]
+    if not count:
+        return []
+    return [f"{count} of {poses} validation poses lie outside the range of the fitted poses: errors there are extrapolated"]
 
 
 def _warnings(steps, rows, errors, before, after):

@@ -138,6 +138,7 @@ def residuals(joints):
         (
             *_IDENTITY,
             Column("held_out", "bool", "", "whether no step but the last has seen it"),
+            Column("outside_range", "bool", "", "whether its held-out pose lies outside the range of the fitted poses"),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
             *_angles_and_wrench(joints),
             *(Column(axis, "float64", "m", f"measured position along {axis}, base axes") for axis in "xyz"),
