@@ -111,6 +111,9 @@ def confounding(seen):
         Degrees.
     """
     sizes = [columns.shape[1] for columns in seen.columns]
+    if not sizes:
+        # A fault of the data, or data that can test nothing: there is nothing to compare.
+        return np.zeros((0, 0))
     ends = np.cumsum(sizes)
     together = np.concatenate(seen.columns, axis=1)
     products = together.T @ together

@@ -38,4 +38,5 @@ def explainable_share(fitted, observations):
     for known, unseen in GroupKFold(min(_FOLDS, len(np.unique(cluster)))).split(inputs, groups=cluster):
         forest = ExtraTreesRegressor(_TREES, min_samples_leaf=_SMALLEST_LEAF, random_state=0)
         predicted[unseen] = forest.fit(inputs[known], wanted[known]).predict(inputs[unseen])
-    return float(max(0.0, 1.0 - ((wanted - predicted) ** 2).sum() / (wanted**2).sum()))
+    total = (wanted**2).sum()
+    return float(max(0.0, 1.0 - ((wanted - predicted) ** 2).sum() / total)) if total else 0.0

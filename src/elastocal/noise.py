@@ -19,6 +19,8 @@ from elastocal.observations import each_approach, without_wild_repeats
 FEWEST_FOR_JOINTS = 60
 # Fewer than this say nothing of their own.
 FEWEST = 9
+# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
+FINEST = 1e-8
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
@@ -85,7 +87,7 @@ def noise_from_repeats(model, estimate, readings):
     Returns
     -------
     Noise or None
-        None where there are too few repeats.
+        None where there are too few repeats, or where they do not differ at all.
     """
     contrasts, jacobians = _contrasts(model, estimate, readings)
     total = sum(part.size for part in contrasts)
@@ -95,6 +97,9 @@ def noise_from_repeats(model, estimate, readings):
     every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
     position = np.sqrt((every[:, :3] ** 2).mean())
     orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
+    if min(position, orientation) < FINEST:
+        # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
+        return None
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor

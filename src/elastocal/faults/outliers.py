@@ -13,7 +13,7 @@ from elastocal.model import circumstances, declared_model, residuals
 from elastocal.noise import Noise
 from elastocal.observations import averaged
 
-NAME, FAMILY, AFTER = "outliers", "data", ("wrong_sign", "wrong_unit", "shuffled_rows")
+NAMES, FAMILY, AFTER = ("outliers",), "data", ("constant_columns", "alternatives", "loads", "shuffled_rows", "implausible")
 
 # Robust standard deviations of the readings of one target.
 _FAR = 8.0
@@ -66,7 +66,7 @@ def find(campaign, readings):
     detail = detail.replace("counts", "count") if count > 1 else detail
     share = Value("share of the readings", count / len(readings), "–")
     evidence = _rms(residual[:, :3]), _rms(residual[~far, :3])
-    return [Fault(NAME, (), detail, (share,), evidence, tuple(rows.tolist()), False)]
+    return [Fault(NAMES[0], (), detail, (share,), evidence, tuple(rows.tolist()), False)]
 
 
 def _rms(values):

@@ -3,6 +3,7 @@
 import numpy as np
 
 from elastocal.attribution import Attribution, by_effect
+from elastocal.compliance_check import compliance_warnings
 from elastocal.fitting import discrepancy
 from elastocal.lack_of_fit import lack_of_fit
 from elastocal.model import joint_compliances
@@ -89,7 +90,7 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
     missing = discrepancy(declared, case.observations, final.tame), final.discrepancy_m
     evidence = Evidence(tested, before, after, *missing, tuple(attributions), tuple(decisive), bool(doubts))
     said = word(evidence)
-    gains = _gains(rows)
+    gains, compliances = _gains(rows), _compliances(declared, final)
     return {
         "campaign": case.campaign.name,
         "verdict": said,
@@ -103,7 +104,7 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
         },
         "predictable_share": {"before": foreseen[0], "after": foreseen[1]},
         "heldout": heldout,
-        "compliance_urad_per_Nm": _compliances(declared, final),
+        "compliance_urad_per_Nm": {name: (1e6 * values).tolist() for name, values in compliances.items()},
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": tested,
         "warnings": [
@@ -111,7 +112,9 @@ def concluded(case, noise_facts, declared, final, attributions, doubts, looks, r
             *_fault_warnings(faults),
             *warnings,
             *_doubt_warnings(doubts),
-            *_remainder(said, after, evidence),
+            *compliance_warnings(compliances["after"], compliances["std_error"], final.model.nominal_compliance),
+            # What readings leave that are wrong in themselves says nothing of the model.
+            *([] if decisive else _remainder(said, after, evidence)),
         ],
     }
 
@@ -158,7 +161,7 @@ def _fault_entry(fault):
         "parameters": [value | {"std_error": None} for value in fault["parameters"]],
         "p_value": None,
         "heldout_gain": None,
-        "alternatives": [],
+        "alternatives": list(fault.get("alternatives", ())),
         "doubts": [],
         "angle_to_nearest_deg": None,
     }
@@ -199,12 +202,11 @@ def _compliances(declared, final):
     deviations = np.zeros(final.model.sites.joints)
     if final.model.identifies_compliance:
         deviations = np.sqrt(np.diag(final.covariance))[parameter_slice(final, "joint_compliance")]
-    found = {
+    return {
         "before": joint_compliances(declared.model, declared.estimate),
         "after": joint_compliances(final.model, final.estimate),
         "std_error": deviations,
     }
-    return {name: (1e6 * values).tolist() for name, values in found.items()}
 
 
 def _fit_entry(fit):
