@@ -40,9 +40,10 @@ def at_rest(arm, angles, wrench, structure=None, compliance=None):
 def deflections(arm, angles, wrench, **more):
     """Of each measuring point, m and rad, ndarray (points, S, 6)."""
     machine, bent = at_rest(arm, angles, wrench, **more)
-    _, position, rotation = generalized_forces(
+    rest = generalized_forces(
         machine, np.where(np.isin(np.arange(machine.model.nq), machine.drive), bent.coordinates, 0.0), loading_of(angles)
     )
+    position, rotation = rest[1].position, rest[1].rotation
     points = range(position.shape[1])
     return np.array(
         [pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p]) for p in points]
