@@ -199,6 +199,13 @@ def bends(model, estimate):
     return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
 
 
+def limits(model, estimate):
+    """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
+    ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
+    listed = [ranges.get((owner, p.name), (-np.inf, np.inf)) for owner, p in parameters(model, estimate)]
+    return np.array(listed).reshape(-1, 2)
+
+
 def parameter_values(model, estimate):
     """Present values of all that is fitted, in the order of `parameters`.
 
