@@ -37,6 +37,12 @@ def fanuc_specimen(fanuc_arm):
 
 
 @pytest.fixture(scope="session")
+def weightless(fanuc_arm):
+    """The same, of an arm that weighs nothing: what only its loads and defects do."""
+    return robots.specimen(fanuc_arm, 4, weighs=False)
+
+
+@pytest.fixture(scope="session")
 def small():
     """A short campaign."""
     return campaigns.Design(poses=8, held_out=2, repeated_poses=3, repeats=2)

@@ -134,7 +134,9 @@ def drawn_defect(effect, arm, seed):
     Defect
     """
     places = _kind(effect).places(arm)
-    return Defect(effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible_on(arm), seed)
+    return Defect(
+        effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible_on(arm), seed
+    )
 
 
 def _kind(effect):

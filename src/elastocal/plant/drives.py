@@ -125,7 +125,7 @@ class Repeatability:
 
 @dataclass(frozen=True)
 class PoseError:
-    """What is wrong about the angles of a pose and the same in all its readings; `sigma_rad` (n,). No defect: every arm has it."""
+    """An error of the angles common to all readings of a pose; `sigma_rad` (n,). No defect: every arm has it."""
 
     sigma_rad: tuple
 

@@ -14,7 +14,6 @@ from elastocal.campaign import write_campaign
 from elastocal.plant.campaigns import measured_table
 from elastocal.whole_files import appearing_whole
 
-
 ROBOT_FILE = "robot.yaml"
 
 

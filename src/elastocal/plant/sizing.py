@@ -163,7 +163,7 @@ class Yardstick:
 
 
 def _per_turn(machine, rest):
-    """Movement of all targets per turn of each gear, two ndarray (S, targets, n, 3): m/rad, and the axis where it turns them."""
+    """Movement of all targets per turn of each gear, two ndarray (S, targets, n, 3): m/rad, and axes where it turns them."""
     where, gear = rest.where, machine.gear
     axis, arm = where.axis[:, None, gear], where.position[:, :, None] - where.anchor[:, None, gear]
     body = machine.model.site_bodyid[list(machine.sites.values())]

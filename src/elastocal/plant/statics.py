@@ -150,7 +150,7 @@ def generalized_forces(machine, coordinates, loading):
     Returns
     -------
     force : ndarray (S, coordinates)
-        N m, N: of a joint about the axis a through o that moves masses m_k at x_k, a . (M + (p - o) x F + sum (x_k - o) x m_k g).
+        N m, N: a . (M + (p - o) x F + sum (x_k - o) x m_k g) about the axis a through o, of masses m_k at x_k beyond it.
     where : Places
     """
     model, where = machine.model, places(machine, coordinates, loading.growth)
