@@ -15,7 +15,7 @@ else:
     arms, campaigns, robots = (import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot"))
 
 
-@pytest.fixture(scope="session", params=["kuka", "fanuc", "abb"])
+@pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
 def name(request):
     """Each robot of the blind proof in turn."""
     return request.param
