@@ -27,7 +27,7 @@ rule propose_follow_ups:
 rule carry_out_follow_ups:
     input:
         proposals=rules.propose_follow_ups.output.proposals,
-        robots=expand("config/robots/{robot}.yaml", robot=["kuka", "fanuc", "abb"]),
+        robots=expand("config/robots/{robot}.yaml", robot=BLIND_ROBOTS),
         sources=sources("carry_out_follow_ups.py"),
     output:
         campaigns=directory("data/follow_up/{block}"),
