@@ -7,6 +7,8 @@ from elastocal.diagnosis.verdict import location_probabilities
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
+# Standard errors beyond which a value is taken at its word, and times the plausible size that no machine reaches.
+_SURE, _IMPLAUSIBLE = 2.0, 3.0
 
 
 def location_words(mechanism, location):
@@ -186,7 +188,3 @@ def implausible(final, entries, rated_kg=None):
             if rated_kg is not None and parameter.unit == "kg" and value - _SURE * error > rated_kg:
                 found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
     return found
-
-
-# Standard errors beyond which a value is taken at its word, and times the plausible size that no machine reaches.
-_SURE, _IMPLAUSIBLE = 2.0, 3.0

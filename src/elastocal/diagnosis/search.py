@@ -24,6 +24,7 @@ from elastocal.diagnosis.evidence import (
     pose_weights,
     scale_weights,
 )
+from elastocal.diagnosis.hypotheses import OTHER
 
 # Models below the best by more than this, in log odds, hold nothing.
 _NEGLIGIBLE = 9.0
@@ -105,8 +106,8 @@ class Posterior:
     probabilities: np.ndarray
 
 
-def single_log_odds(problem):
-    """Posterior log odds of each candidate unit alone against the base.
+def single_log_bayes_factors(problem):
+    """Log Bayes factor of each unit alone against the declared model.
 
     Parameters
     ----------
@@ -117,8 +118,11 @@ def single_log_odds(problem):
     ndarray (number of units,)
         -inf for units of the base.
     """
-    searcher = _Searcher(problem)
-    return np.array([searcher.met.get((number,), -np.inf) for number in range(len(problem.units))])
+    met, prior = _Searcher(problem).met, problem.prior
+    factors = np.full(len(problem.units), -np.inf)
+    for number in problem.candidates:
+        factors[number] = met[(number,)] - prior.log_odds_of([problem.units[number]])
+    return factors
 
 
 def posterior(problem):
@@ -220,7 +224,7 @@ class _Searcher:
     def start_from_whole_mechanisms(self):
         """Meet each mechanism at all its locations, with the best variant at each."""
         units = self.problem.units
-        for mechanism in dict.fromkeys(units[n].mechanism for n in self.candidates):
+        for mechanism in dict.fromkeys(units[n].mechanism for n in self.candidates if units[n].mechanism != OTHER):
             best = {}
             for number in self.candidates:
                 unit = units[number]

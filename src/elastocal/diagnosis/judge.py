@@ -1,11 +1,11 @@
-"""Step 6: every model on poses that no step has seen."""
+"""The last step: every model on poses that no step has seen."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.fitted_range import outside_fitted_range, predictive_variances
-from elastocal.fitting import fit, fit_frames
+from elastocal.fitting import fit_frames
 from elastocal.held_out import (
     METRICS,
     errors_by_range,
@@ -24,122 +24,30 @@ from elastocal.random_streams import stream
 from elastocal.splits import error_row, split_rows
 
 _REPLICATES = 1000
-# A control of more parameters than this would take longer to fit than it tells.
-_LARGEST_CONTROL = 24
-_CONTROLS = 2
 
 
 @dataclass(frozen=True)
-class Step:
-    """One model on the way from the nominal robot to all effects found.
+class Verdict:
+    """A diagnosis with what held-out poses say of it.
 
     Attributes
     ----------
-    name : str
-    kind : {"frames", "declared", "effect", "control"}
-    fitted : Fit
-    """
-
-    name: str
-    kind: str
-    fitted: object
-
-
-def model_steps(case, noise, declared, final, found, controls):
-    """Fit every model of the way on the training poses.
-
-    Parameters
-    ----------
-    case : Case
-    noise : Noise
-    declared, final : Fit
-    found : dict of str to list of Candidate
-        Members of each effect found, in the order in which they were found.
-    controls : list of list of Candidate
-
-    Returns
-    -------
-    list of Step
-    """
-    bare = replace(case.model, effects=())
-    steps = [
-        Step("frames and targets", "frames", fit(bare, case.observations, noise)),
-        Step("declared model", "declared", declared),
-    ]
-    added = []
-    for number, (name, members) in enumerate(found.items(), 1):
-        added += members
-        fitted = final if number == len(found) else _with(case, noise, declared, added)
-        steps.append(Step(f"+ {name}", "effect", fitted))
-    for members in controls:
-        keys = ", ".join(member.key for member in members)
-        steps.append(Step(f"control: {keys}", "control", _with(case, noise, declared, members)))
-    return steps
-
-
-def controls(looks, rivals, found, candidates):
-    """Effects that should not help, with at least as many parameters as those found where there are so many.
-
-    Parameters
-    ----------
-    looks, rivals : dict of str to ndarray
-        Columns of their tables.
-    found : dict of str to list of Candidate
-    candidates : dict of str to Candidate
-
-    Returns
-    -------
-    list of list of Candidate
-        Each from one family that none of the effects found belongs to, at the largest angles from them.
-    """
-    if not found:
-        return []
-    members = [member for group in found.values() for member in group]
-    wanted = min(sum(len(member.parameters) for member in members), _LARGEST_CONTROL)
-    first = looks["look"] == 0
-    innocent = set(looks["candidate"][first & (looks["p_family"] >= 0.05)])
-    angles = dict(zip(rivals["candidate"], rivals["angle_deg"], strict=True))
-    families = {member.family for member in members}
-    far = sorted(
-        (key for key in innocent if key in angles and candidates[key].family not in families), key=lambda k: -angles[k]
-    )
-    groups = []
-    for family in dict.fromkeys(candidates[key].family for key in far):
-        group, size = [], 0
-        for key in far:
-            if candidates[key].family == family and size < wanted:
-                group.append(candidates[key])
-                size += len(candidates[key].parameters)
-        groups.append((size < wanted, -angles[group[0].key], group))
-    # Families that have enough parameters come first.
-    return [group for _, _, group in sorted(groups, key=lambda entry: entry[:2])[:_CONTROLS]]
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Held-out errors of every step.
-
-    Attributes
-    ----------
+    document : dict
+        Contents of verdict.json.
     rows : list of dict
         Of before_after.csv.
-    heldout : dict
-        As in verdict.json.
-    warnings : list of str
     """
 
+    document: dict
     rows: list
-    heldout: dict
-    warnings: list
 
 
-def judged(steps, case, held_out, seed):
-    """Errors of every step on training and held-out poses.
+def judge(diagnosis, held_out, seed):
+    """Open the held-out poses and state the verdict.
 
     Parameters
     ----------
-    steps : list of Step
-    case : Case
+    diagnosis : Diagnosis
     held_out : Case
         The held-out readings; of another campaign, whose frames and targets are then fitted to them.
     seed : int
@@ -147,7 +55,49 @@ def judged(steps, case, held_out, seed):
 
     Returns
     -------
-    Judged
+    Verdict
+    """
+    case, steps = diagnosis.case, diagnosis.steps
+    rows, heldout, warnings = heldout_errors(steps, case, held_out, seed)
+    gains = _gains(rows)
+    effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
+    document = diagnosis.document | {
+        "effects": effects,
+        "heldout": heldout,
+        "warnings": [*diagnosis.document["warnings"], *warnings],
+    }
+    return Verdict(document, rows)
+
+
+def _gains(rows):
+    """Share by which each step lowers the held-out RMS."""
+    gains, last = {}, None
+    for row in rows:
+        if row["kind"] == "effect":
+            gains[row["step"].removeprefix("+ ")] = float(1 - row["heldout_rms_m"] / last)
+        if row["kind"] in ("declared", "effect"):
+            last = row["heldout_rms_m"]
+    return gains
+
+
+def heldout_errors(steps, case, held_out, seed):
+    """Errors of every step on training and held-out poses.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    case : Case
+    held_out : Case
+        As in `judge`.
+    seed : int
+
+    Returns
+    -------
+    rows : list of dict
+        Of before_after.csv.
+    heldout : dict
+        As in verdict.json.
+    warnings : list of str
     """
     placed = [_placed(step.fitted, case, held_out) for step in steps]
     errors = [position_errors(model, estimate, held_out.observations) for model, estimate in placed]
@@ -180,7 +130,7 @@ def judged(steps, case, held_out, seed):
         "share_below_max": share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
-    return Judged(rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)))
+    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
 
 
 def outside_poses(steps, case, held_out):
@@ -189,7 +139,7 @@ def outside_poses(steps, case, held_out):
     Parameters
     ----------
     steps, case, held_out
-        As in `judged`.
+        As in `judge`.
 
     Returns
     -------
@@ -203,31 +153,29 @@ def outside_poses(steps, case, held_out):
     return np.bincount(state_clusters(unseen.states), outside) > 0
 
 
-def split_table(steps, case, held_out, seed):
-    """Errors on the held-out poses beside those that cross-validation of the training poses foresees.
+def split_table(diagnosis, held_out, seed):
+    """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
 
     Parameters
     ----------
-    steps, case, held_out, seed
-        As in `judged`.
+    diagnosis, held_out, seed
+        As in `judge`.
 
     Returns
     -------
     list of dict
         Rows of splits.csv.
     """
-    before = next(step.fitted for step in steps if step.kind == "declared")
-    after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)
     unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
     rows = [error_row("held out", "all", *unseen, _REPLICATES, draws)]
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
-def residual_blocks(steps, case, held_out):
+def residual_blocks(diagnosis, held_out):
     """Blocks of the residuals table: training readings, then held-out ones; every reading before and after."""
-    before = next(step.fitted for step in steps if step.kind == "declared")
-    after = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    case, steps, before, after = diagnosis.case, diagnosis.steps, diagnosis.declared, diagnosis.final
     inside = np.zeros(case.observations.cluster.max() + 1, bool)
     for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
         observations, order = _in_order(part.campaign.readings)
@@ -238,12 +186,6 @@ def residual_blocks(steps, case, held_out):
             position = measured_in_base(estimate, observations)[0]
         readings = part.campaign.readings.select(order)
         yield residual_columns(readings, unseen, outside[state_clusters(readings)], position, *off)
-
-
-def _with(case, noise, declared, added):
-    model = case.model.with_effects(added)
-    start = declared.estimate.with_effects(added)
-    return fit(model, case.observations, noise, start, None, declared.discrepancy_m)
 
 
 def _placed(fitted, case, part):
