@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaign import Readings, Target
+from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import circumstances_of
@@ -35,13 +36,14 @@ def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
     )
 
 
-def made_model(chain, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
-    """A model; its targets are unknown offsets from the last measuring point unless told."""
-    sites = sites_of(chain)
-    targets = (Target("A", chain.end_effector.name, None),) if targets is None else targets
+def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
+    """A model of a chain or a robot; its targets are unknown offsets from the last measuring point unless told."""
+    sites = sites_of(holder)
+    targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)
     springs = (joint_compliance(sites),) if identified else ()
-    return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *effects))
+    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *weight, *effects))
 
 
 def made_estimate(model, sessions=(0,), seed=0, size=0.3):
@@ -121,16 +123,16 @@ def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_
     )
 
 
-def circumstances_on(chain, states, compliance=None):
-    """Circumstances of some states on a chain."""
-    sites = sites_of(chain)
+def circumstances_on(holder, states, compliance=None):
+    """Circumstances of some states on a chain or a robot."""
+    sites = sites_of(holder)
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
     return circumstances_of(sites, compliance, states)
 
 
-def candidate_on(chain, key):
-    """One candidate of the catalogue."""
-    return candidates_on(sites_of(chain))[key]
+def candidate_on(holder, key):
+    """One candidate of the catalogue, on a chain or a robot."""
+    return candidates_on(sites_of(holder))[key]
 
 
 def displacements(candidate, circumstances, *shapes):

@@ -1,7 +1,8 @@
 """Sag of a joint under the weight of the links that it carries.
 
 Catalogue row 8: theta_i = sum_k (c_i m_k) tau_ik(q), with tau_ik the torque on joint i of one kilogram at the far end of link
-k. Linear in the products of compliance and mass. A link's own mass m at its middle counts as m/2 at its end.
+k. Linear in the products of compliance and mass. A link's own mass m at its middle counts as m/2 at its end. Where the robot
+file declares masses, theirs are parameters already (`declared_weight`).
 """
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
@@ -12,6 +13,8 @@ _LINKS = 2
 
 def candidates(sites):
     """One candidate a joint that weight can turn: masses at the far ends of the next two links behind it that have a length."""
+    if sites.masses:
+        return []
 
     def at(joint):
         carried = sites.carried_links(joint)[:_LINKS]
