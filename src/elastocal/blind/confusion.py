@@ -2,8 +2,8 @@
 
 import pandas as pd
 
+from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 from elastocal.effects.catalogue import effects
-from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 
 PAIR, SWEEP = "pair", "sweep"
 CLASS_WITH, CLASS_WITHOUT = "class with the truth", "class without the truth"

@@ -83,9 +83,6 @@ def _inputs(around):
 
 def _relative_load(around, location):
     """Torque on the joint, or force on the base, relative to the largest, ndarray (S,)."""
-    if location:
-        load = around.load[:, location[0] - 1]
-    else:
-        load = np.linalg.norm(around.wrench[:, :3], axis=1)
+    load = around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)
     largest = np.abs(load).max(initial=0.0)
     return load / largest if largest else np.zeros(len(load))
