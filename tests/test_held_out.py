@@ -90,11 +90,22 @@ def test_intervals_are_those_of_a_bootstrap_t_over_whole_poses(errors):
     ):
         value, error = jackknifed(top, bottom)
         pairs = np.array([jackknifed(top[poses], bottom[poses]) for poses in drawn if len(set(poses)) > 1])
-        low, high = np.quantile((pairs[:, 0] - value) / pairs[:, 1], [0.025, 0.975])
+        # At most as far as Student's t of two degrees of freedom.
+        farthest = student.ppf(0.975, 2)
+        low, high = np.clip(np.quantile((pairs[:, 0] - value) / pairs[:, 1], [0.025, 0.975]), -farthest, farthest)
         np.testing.assert_allclose(limits, [value - high * error, value - low * error], rtol=1e-9)
     ratio = np.sqrt(totals[1].sum() / totals[0].sum())
     assert reductions[1].std_error == pytest.approx(0.5 * ratio * jackknifed(totals[1], totals[0])[1])
     assert (reductions[0].low, reductions[0].high, reductions[0].std_error) == (0.0, 0.0, 0.0)
+
+
+def test_a_pose_that_makes_most_of_the_error_does_not_make_the_interval_endless():
+    distance = np.array([1.0, 1.1, 0.9, 1.05, 1.0, 0.95, 0.9, 1.0, 60.0])
+    errors = Errors(distance, np.arange(9))
+    low, high = intervals([errors], 400, np.random.default_rng(9))[0][0]["rms_m"]
+    value, error = jackknifed(distance**2, np.ones(9))
+    assert np.log(high**2) == pytest.approx(value + student.ppf(0.975, 2) * error)
+    assert low < 20.0
 
 
 def test_intervals_hold_what_they_are_of(errors):
