@@ -7,7 +7,7 @@ from elastocal.blind.case_rows import case_row
 JOINTS = 6
 
 
-def truth(*places, group="single", level=50.0, robot="fanuc", setting="usual", **changes):
+def truth(*places, group="single", level=50.0, robot="gp180", setting="usual", **changes):
     """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
     defects = [
         {
@@ -44,7 +44,12 @@ def effect(name, *joints, parameters=(), alternatives=()):
         "joints": list(joints),
         "alternatives": list(alternatives),
         "parameters": [
-            {"name": f"{name}@ {key}", "value": value, "std_error": error, "held": error == 0}
+            {
+                "name": f"{name}{'@' if joints else ''}{'+'.join(map(str, joints))} {key}",
+                "value": value,
+                "std_error": error,
+                "held": error == 0,
+            }
             for key, value, error in parameters
         ],
     }
