@@ -39,18 +39,13 @@ def truth(*places, group="single", level=50.0, robot="gp180", setting="usual", *
 
 def effect(name, *joints, parameters=(), alternatives=()):
     """An effect of a verdict; a parameter is a name with its value and its standard error."""
+    key = "@".join([name, "+".join(map(str, joints))] if joints else [name])
     return {
         "name": name,
         "joints": list(joints),
         "alternatives": list(alternatives),
         "parameters": [
-            {
-                "name": f"{name}{'@' if joints else ''}{'+'.join(map(str, joints))} {key}",
-                "value": value,
-                "std_error": error,
-                "held": error == 0,
-            }
-            for key, value, error in parameters
+            {"name": f"{key} {of}", "value": value, "std_error": error, "held": error == 0} for of, value, error in parameters
         ],
     }
 

@@ -80,7 +80,7 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
 
 
 def test_coverage_has_a_row_for_each_kind_and_numbers_of_intervals():
-    head = {"robots": "proof", "setting": "usual", "truth": "joint_offset", "level": 50.0}
+    head = {"robots": "proof", "setting": "usual", "truth": "joint_offset", "level": 50.0, "right": True}
     rows = [head | {"effect": "joint_offset", "parameter": "offset", "comparable": "exact", "holds": holds} for holds in (1, 0)]
     rows.append(head | {"effect": "joint_compliance", "parameter": "c1", "comparable": "exact", "holds": 1})
     figure = coverage_by_effect(covered(pd.DataFrame(rows)))
