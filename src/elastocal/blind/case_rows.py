@@ -20,7 +20,7 @@ EXACT_ALIASES = {
 }
 _STD_ERRORS = 2.0
 _ERRORS = ("before_rms_m", "after_rms_m", "noise_floor_rms_m", "reduction", "reduction_std_error")
-_ERRORS += ("worse", "warned", "worse_unwarned")
+_ERRORS += ("worse", "warned", "worse_unwarned", "adopted", "worse_adopted")
 _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
