@@ -94,7 +94,7 @@ def test_good_documents_pass():
     [
         (("compliance_urad_per_Nn",), [1], "compliance_urad_per_Nn", ["unknown key", "'compliance_urad_per_Nm'?", "chain"]),
         (("links", "tubes", 0, "wall"), 0.01, "links.tubes[0].wall", ["unknown key", "'wall_m'?", "outer_diameter_m"]),
-        (("zzz",), 1, "zzz", ["unknown key", "(chain, compliance_urad_per_Nm"]),
+        (("zzz",), 1, "zzz", ["unknown key", "(chain, compensator, compliance_urad_per_Nm"]),
         (("chain",), None, "chain", ["nothing", "chain notation"]),
         (("links", "youngs_modulus_GPa"), None, "links.youngs_modulus_GPa", ["nothing", "GPa"]),
         (("links", "tubes", 0, "wall_m"), None, "links.tubes[0].wall_m", ["nothing", "metres"]),

@@ -5,13 +5,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, chain_of, random_angles
 from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
 
 from elastocal.campaign import Campaign, Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point
+from elastocal.elastostatics import exact_deflections, joint_torques
 from elastocal.kinematics import poses
 from elastocal.model import (
     circumstances,
@@ -115,14 +116,41 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     estimate, states = made_estimate(model), made_states(6, 6, seed=4)
     seen = seen_exactly(model, estimate, states)
     position, rotation = predict(model, estimate, seen, circumstances(model, estimate, states))
-    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, loaded_point(fanuc.chain, None, "end_effector"))
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
-        expected = poses(fanuc.chain, states.joint_angles + torques * fanuc.compliance, target)
-        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-14)
-    bent = exact_deflections(fanuc.chain, states.joint_angles, torques * fanuc.compliance, fanuc.chain.end_effector)
+        expected = poses(fanuc.chain, states.joint_angles + turned, target)
+        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-9)
+    bent = exact_deflections(fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector)
     assert np.abs(bent).max() > 1e-4
+
+
+def equilibrium(chain, compliance, states, weighing=None):
+    """Turn of each joint where the springs hold the load at the pose to which it has turned them, by scipy's root finder."""
+    end = replace(chain.end_effector, offset_m=(0, 0, 0))
+
+    def unbalanced(turned, q, wrench):
+        torque = joint_torques(chain, q + turned, wrench, end)
+        return turned - compliance * (torque if weighing is None else torque + weighing(q + turned))
+
+    pairs = zip(states.joint_angles, states.wrench, strict=True)
+    return np.array([root(unbalanced, np.zeros(len(q)), (q, wrench), tol=1e-15).x for q, wrench in pairs])
+
+
+def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_finds_it(fanuc):
+    model = made_model(fanuc.chain, fitted_frames=False, compliance=fanuc.compliance)
+    estimate, states = made_estimate(model), made_states(6, 40, seed=12)
+    states.wrench[:] *= (3000.0 / np.linalg.norm(states.wrench[:, :3], axis=1))[:, None]
+    found = displaced_coordinates(model, estimate, circumstances(model, estimate, states))[:, :6]
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
+    end = fanuc.chain.end_effector
+    ends = [poses(fanuc.chain, q, end)[0] for q in (found, states.joint_angles + turned)]
+    assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-8
+    # At the commanded pose the load would be off by far more than a tracker's noise.
+    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, end)
+    there = poses(fanuc.chain, states.joint_angles + fanuc.compliance * torques, end)[0]
+    assert np.linalg.norm(there - ends[1], axis=1).max() > 5e-5
 
 
 def test_wrench_acts_at_the_last_measuring_point_and_not_at_a_target_on_it(fanuc):
@@ -161,10 +189,10 @@ def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
     estimate, states = made_estimate(model, seed=10), made_states(6, 5, seed=11)
     around = circumstances(model, estimate, states)
     found = displaced_coordinates(model, estimate, around)
-    torque = joint_torques(fanuc.chain, states.joint_angles, states.wrench, fanuc.chain.end_effector)
+    torque = joint_torques(model.sites.chain, found, states.wrench, model.sites.chain.end_effector)[:, :6]
     expected = states.joint_angles + fanuc.compliance * torque
     expected[:, 1] += estimate.coefficients[0][0] + estimate.coefficients[1][0] * torque[:, 1] ** 3
-    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-9)
     at_base = found[:, list(model.sites.base)]
     np.testing.assert_allclose(at_base[:, :2], estimate.coefficients[2][0] * states.wrench[:, :2], rtol=1e-9, atol=1e-18)
     used = {*range(6), *model.sites.base}

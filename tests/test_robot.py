@@ -2,6 +2,7 @@
 
 import math
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,8 +10,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from support import chain_of, refused
 
-from elastocal.documents import read_document
-from elastocal.robot import Transform, parse_chain, robot_from_document, stretches, with_target_offset
+from elastocal.documents import check_document, read_document
+from elastocal.robot import (
+    Compensator,
+    Mass,
+    Transform,
+    document_of,
+    notation,
+    parse_chain,
+    robot_from_document,
+    stretches,
+    with_target_offset,
+)
 
 TWO_JOINTS = {
     "name": "two joints",
@@ -225,3 +236,84 @@ def test_every_robot_of_the_repository_has_the_compliances_of_table_1(config_fol
     for name, compliance in (table | {"kuka_extended": table["kuka"]}).items():
         robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
         np.testing.assert_allclose(robot.compliance, 1e-6 * np.array(compliance), rtol=1e-12)
+
+
+WEIGHED = {
+    "masses": [
+        {"link": 2, "mass_kg": 40, "centre_m": [0.5, 0, -0.02], "relative_std": 0.1},
+        {"link": 0, "mass_kg": 90.5, "centre_m": [0, 0, 0.2], "relative_std": 0.2},
+    ],
+    "gravity_m_s2": [0, 9.80665, 0],
+    "gear_ratio": [None, 171],
+    "compensator": {"joint": 2, "kind": "spring"},
+    "payload_kg": 12,
+}
+
+
+def test_what_the_links_weigh_comes_in_their_order():
+    robot = robot_from_document(document(**WEIGHED))
+    assert robot.masses == (Mass(0, 90.5, (0.0, 0.0, 0.2), 0.2), Mass(2, 40, (0.5, 0.0, -0.02), 0.1))
+    assert robot.gravity_m_s2 == (0.0, 9.80665, 0.0) and robot.gear_ratio == (None, 171)
+    assert robot.compensator == Compensator(2, "spring") and robot.payload_kg == 12
+
+
+def test_robot_file_that_says_nothing_of_weights_is_a_weightless_arm_on_a_floor():
+    robot = robot_from_document(document())
+    assert robot.masses == () and robot.gravity_m_s2 == (0.0, 0.0, -9.80665)
+    assert robot.gear_ratio is None and robot.compensator is None and robot.payload_kg is None
+
+
+@pytest.mark.parametrize("more", [{}, WEIGHED, {"reported_joints": {"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}}])
+def test_robot_becomes_a_document_that_gives_it_back(more):
+    robot = robot_from_document(document(**more))
+    written = document_of(robot)
+    check_document(written, "robot", "robot.yaml")
+    again = robot_from_document(written)
+    assert again.chain == robot.chain
+    for name, value in vars(robot).items():
+        if isinstance(value, np.ndarray):
+            np.testing.assert_allclose(getattr(again, name), value, rtol=1e-15)
+        else:
+            assert getattr(again, name) == value, name
+
+
+@given(written_chains())
+def test_notation_of_a_chain_is_read_as_that_chain(written):
+    chain = chain_of(written[0])
+    again = chain_of(notation(chain))
+    for ours, theirs in zip(again.transforms, chain.transforms, strict=True):
+        assert replace(ours, constant=0.0) == replace(theirs, constant=0.0)
+        assert ours.constant == pytest.approx(theirs.constant, rel=1e-15)
+    assert again.points == chain.points
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"masses": [WEIGHED["masses"][0] | {"link": 3}]}, "masses[0].link", ["3", "to 2"]),
+        ({"masses": WEIGHED["masses"][:1] * 2}, "masses", ["link 2 twice", "each link once"]),
+        ({"gravity_m_s2": [0, 0, 0]}, "gravity_m_s2", ["[0, 0, 0]", "base axes"]),
+        ({"gear_ratio": [100]}, "gear_ratio", ["1 entries", "2 joints"]),
+        ({"compensator": {"joint": 3, "kind": "gas"}}, "compensator.joint", ["3", "1 to 2"]),
+    ],
+)
+def test_weights_that_do_not_suit_the_robot_are_refused(changes, key, words):
+    with refused("robots/two.yaml", key, *words):
+        robot_from_document(document(**changes), "robots/two.yaml")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"masses": [{"link": 1, "mass_kg": 5, "centre_m": [0, 0, 0]}]}, "masses[0].relative_std"),
+        ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 0}]}, "masses[0].mass_kg"),
+        ({"masses": [WEIGHED["masses"][0] | {"centre_m": [0, 0]}]}, "masses[0].centre_m"),
+        ({"gravity_m_s2": [0, 0]}, "gravity_m_s2"),
+        ({"gear_ratio": [0, 100]}, "gear_ratio[0]"),
+        ({"compensator": {"joint": 2, "kind": "rope"}}, "compensator.kind"),
+        ({"payload_kg": 0}, "payload_kg"),
+    ],
+)
+def test_schema_refuses_weights_that_cannot_be(changes, key):
+    with refused("robots/two.yaml", key):
+        check_document(document(**changes), "robot", "robots/two.yaml")

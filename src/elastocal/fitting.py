@@ -9,27 +9,39 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.model import bends, circumstances, joint_compliances, linearize, parameter_values, parameters, residuals, stepped
+from elastocal.effects.protocol import with_springs
+from elastocal.model import (
+    bends,
+    circumstances,
+    joint_compliances,
+    limits,
+    linearize,
+    mass_corrections,
+    parameter_values,
+    parameters,
+    residuals,
+    stepped,
+)
 from elastocal.noise import Noise
 from elastocal.registration import registered
-from elastocal.whitening import Whitening, spectrum, whitening
+from elastocal.whitening import Whitening, whitening
 
 _STEPS = 30
+# A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
+_HALVINGS = 6
 # Largest step that remains, in standard errors.
 _SETTLED = 1e-3
+# Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
+_LEAST_FALL = 0.1
+# Of the objective. In a fit of a thousand rows a thousandth of a standard error in one parameter makes half of that.
+_ROUNDING = 1e-9
 # Observations beyond this quantile of their distance lose weight.
 _HUBER_QUANTILE = 0.99
 # Correlation beyond which a parameter cannot be told because of a shape.
 _BOUND_TO_SHAPE = 0.5
-# Robust weight below which an observation is wild: less than one in a million is so far off by the noise.
-_TAME = 0.5
-_DISCREPANCY_ROUNDS = 6
-# Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
-_ABOVE_NOISE = 1.02
 
 
 @dataclass(frozen=True)
@@ -41,8 +53,6 @@ class Fit:
     model : Model
     estimate : Estimate
     noise : Noise
-    discrepancy_m : float
-        See `whitening.whitening`; brings the mean square of the whitened residual to one.
     held : ndarray of bool (P,)
         Parameters that the data cannot tell.
     covariance : ndarray (P, P)
@@ -56,12 +66,13 @@ class Fit:
         Of each target with respect to the joints.
     circumstances : Circumstances
         Of the states fitted.
+    converged : bool
+        Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
     """
 
     model: object
     estimate: object
     noise: Noise
-    discrepancy_m: float
     held: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
@@ -69,26 +80,12 @@ class Fit:
     residual: np.ndarray
     joint_jacobian: np.ndarray
     circumstances: object
+    converged: bool = True
 
     @property
     def parameters(self):
         """As `model.parameters`."""
         return parameters(self.model, self.estimate)
-
-    @property
-    def degrees_of_freedom(self):
-        """Rows less fitted parameters."""
-        return self.residual.size - int((~self.held).sum())
-
-    @property
-    def tame(self):
-        """Observations that are not wild, ndarray of bool (M,): single wild ones say nothing of the model."""
-        return self.weights >= _TAME
-
-    @property
-    def tame_freedom(self):
-        """Rows of the tame observations less fitted parameters."""
-        return self.degrees_of_freedom - int((~self.tame).sum()) * self.model.rows
 
     def values_of(self, key):
         """Linear parameters and shapes of one effect."""
@@ -101,7 +98,7 @@ class Fit:
         return self.whitener.apply(values * weights)
 
 
-def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discrepancy_m=0.0):
+def fit(model, observations, noise, start=None):
     """Fit a model.
 
     Parameters
@@ -111,30 +108,16 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     noise : Noise
     start : Estimate, optional
         Of this model; by `registered` without.
-    discrepancy_m : float, optional
-        As in `Fit`; found from the residual without.
-    likely_discrepancy_m : float
-        Where the search for it begins, which saves time and changes nothing else.
 
     Returns
     -------
     Fit
     """
     start = registered(model, observations) if start is None else start
-    around = circumstances(model, start, observations.states)
-    if discrepancy_m is not None:
-        return _robustly(model, observations, around, noise, start, discrepancy_m)
-    lacking = likely_discrepancy_m
-    found = _robustly(model, observations, around, noise, start, lacking)
-    for _ in range(_DISCREPANCY_ROUNDS):
-        before, lacking = lacking, discrepancy(found, observations, found.tame)
-        if abs(lacking - before) <= 0.01 * max(lacking, before):
-            break
-        found = _robustly(model, observations, around, noise, found.estimate, lacking)
-    return found
+    return _robustly(model, observations, circumstances(model, start, observations.states), noise, start)
 
 
-def fit_frames(fitted, model, observations, noise):
+def fit_frames(fitted, model, observations, noise, own_targets=True):
     """Fit frames and targets of other observations; everything else stays as it was found.
 
     Parameters
@@ -144,47 +127,97 @@ def fit_frames(fitted, model, observations, noise):
         The same effects with the targets of these observations.
     observations : Observations
     noise : Noise
+    own_targets : bool
+        Whether these observations have targets of their own; where not, those of the fit stay as they were found.
 
     Returns
     -------
     Estimate
     """
+    found = fitted.estimate
+    if not own_targets:
+        known = [replace(t, offset_m=tuple(at)) for t, at in zip(model.targets, found.target_offset, strict=True)]
+        model = replace(model, targets=tuple(known))
     start = registered(model, observations)
-    start = replace(start, coefficients=fitted.estimate.coefficients, shapes=fitted.estimate.shapes)
+    start = replace(start, coefficients=found.coefficients, shapes=found.shapes)
+    if not own_targets:
+        start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = circumstances(model, start, observations.states)
-    return _robustly(model, observations, around, noise, start, fitted.discrepancy_m, frozen).estimate
+    return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
-def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=False):
+def _robustly(model, observations, around, noise, estimate, frozen=False):
+    """Gauss-Newton steps on Huber's objective by iteratively reweighted least squares, each halved until it does not rise.
+
+    The step minimises a bound of the objective that touches it at the present estimate (Huber and Ronchetti 2009, 7.8), so that
+    without curvature it never rises; against curvature it is backtracked (Nocedal and Wright 2006, 3.1).
+    """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
-    bending = bends(model, estimate)
+    bending, bounds = bends(model, estimate), limits(model, estimate)
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
+
+    def objective(estimate, residual):
+        """Half the squared distances, those of outliers counted linearly, and half the squares of what has a prior."""
+        distance = np.sqrt((whitener.apply(residual) ** 2).mean(axis=1))
+        lost = distance**2 / 2 if scale is None else scale**2 * norm.rho(distance / scale)
+        return rows * lost.sum() + 0.5 * penalty @ parameter_values(model, estimate) ** 2
+
+    converged, scale = False, None
+    line = linearize(model, estimate, observations, around)
     for step_number in range(_STEPS):
-        around = replace(around, compliance=joint_compliances(model, estimate))
-        line = linearize(model, estimate, observations, around)
+        # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
+        around = line.circumstances
         jacobian = line.coordinate_jacobian[..., : model.sites.joints]
-        whitener = whitening(observations, jacobian, noise, discrepancy)
+        whitener = whitening(observations, jacobian, noise)
         if step_number:
             distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
-            weights = norm.weights(distance / max(np.median(distance) / typical, 1.0))
+            scale = max(np.median(distance) / typical, 1.0)
+            weights = norm.weights(distance / scale)
         root = np.sqrt(weights)
         right = whitener.apply(line.residual * root[:, None]).reshape(-1)
         left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
         present = parameter_values(model, estimate)
         step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, present, bending)
-        estimate = stepped(model, estimate, step)
+        # A shape that would leave its range goes to the end of it, and the others as they do then.
+        leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
+        if leaving.any():
+            ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
+            rest = right - left[:, leaving] @ ends
+            step = solve_identifiable(left, rest, plausible, frozen | leaving, penalty, present, bending)[0]
+            step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
-        if step_number and (np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all():
+        converged = bool(step_number) and bool((np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all())
+        if converged:
+            estimate = stepped(model, estimate, step)
             break
-    around = replace(around, compliance=joint_compliances(model, estimate))
+        # Twice the fall that a parabola promises.
+        slope = right @ (left @ step) - penalty @ (present * step)
+        before, origin = objective(estimate, line.residual), estimate
+        for halving in range(_HALVINGS + 1):
+            estimate = stepped(model, origin, 0.5**halving * step)
+            line = linearize(model, estimate, observations, around)
+            after = objective(estimate, line.residual)
+            least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
+            if after > before - least and not halving:
+                # What it fell from was under the loads of the step before.
+                before = objective(origin, residuals(model, origin, observations, around))
+            if after <= before - least:
+                break
+        else:
+            estimate = origin
+            line = linearize(model, estimate, observations, around)
+            # The first step has another objective than those that follow: all observations count alike.
+            if step_number:
+                break
+    around = with_springs(line.circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
     residual = residuals(model, estimate, observations, around)
-    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around)
+    return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
@@ -267,33 +300,3 @@ def identifiable(gram, frozen, bending):
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask
-
-
-def discrepancy(fitted, observations, tame):
-    """Standard deviation that brings the mean square of the whitened residual to one.
-
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-    tame : ndarray of bool (M,)
-        Observations that count.
-
-    Returns
-    -------
-    float
-        m; zero where the noise accounts for the residual.
-    """
-    weighted = fitted.residual * np.sqrt(fitted.weights * tame)[:, None]
-    freedom = fitted.degrees_of_freedom - int((~tame).sum()) * observations.rows
-    variances, squares = spectrum(observations, fitted.joint_jacobian, fitted.noise, weighted)
-
-    def excess(deviation):
-        return (squares / (variances + deviation**2)).sum() / freedom - 1.0
-
-    if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
-        return 0.0
-    highest = fitted.noise.position_m
-    while excess(highest) > 0:
-        highest *= 2
-    return brentq(excess, 0.0, highest, rtol=1e-3)

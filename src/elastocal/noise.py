@@ -40,6 +40,8 @@ class Noise:
         Repeatability of each joint.
     degrees_of_freedom : int
         Contrasts of repeats behind the figures; 0 where they are declared.
+    pose_rad : float
+        Error of each joint that all readings of a pose have in common.
     """
 
     source: str
@@ -47,6 +49,21 @@ class Noise:
     orientation_rad: float
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
+    pose_rad: float = 0.0
+
+    @property
+    def of_readings(self):
+        """The same without what the readings of a pose have in common."""
+        return replace(self, pose_rad=0.0)
+
+    def scaled(self, factor):
+        """The same with the noise of single readings multiplied."""
+        return replace(
+            self,
+            position_m=factor * self.position_m,
+            orientation_rad=factor * self.orientation_rad,
+            joint_rad=factor * self.joint_rad,
+        )
 
 
 def declared_noise(campaign):

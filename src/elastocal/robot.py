@@ -7,11 +7,28 @@ The chain notation is the paper's matrix product written in a line (equations 1-
 ``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a
 length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign;
 ``[NAME]`` marks a measuring point.
+
+A robot file may say what the links weigh::
+
+    masses:
+      - {link: 2, mass_kg: 190, centre_m: [0.52, 0.0, 0.03], relative_std: 0.1}
+    gravity_m_s2: [0, 0, -9.80665]
+    gear_ratio: [null, 171, 153, null, null, null]
+    compensator: {joint: 2, kind: spring}
+    payload_kg: 165
+
+Link k is what joint k carries; link 0 is the column before joint 1. ``centre_m`` is stated in the frame of the chain directly
+behind the transform ``R.(qk)`` (of link 0: in the base frame): its origin lies on the axis of joint k, where the chain has it,
+and its axes turn with the joint, so that one axis is the joint's own. With all of the chain at zero these are base axes unless
+the chain has fixed rotations before. ``relative_std`` is the standard deviation of the mass over the mass, and of each
+component of the centre over its distance from the origin (0.1 m at least). Gravity is given in base axes: a robot on a wall or
+on a tilted foot has another.
 """
 
 import math
 import re
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,6 +40,9 @@ AXES = "xyz"
 LONGEST_REACH_M = 10.0
 _TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
 _NUMBER = re.compile(r"\d+(\.\d*)?|\.\d+")
+# Standard acceleration (ISO 80000-3), on a floor.
+STANDARD_GRAVITY = 9.80665
+STANDING = (0.0, 0.0, -STANDARD_GRAVITY)
 _NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POINT], separated by blanks"
 
 
@@ -141,6 +161,42 @@ class Link:
 
 
 @dataclass(frozen=True)
+class Mass:
+    """What a link weighs, as its file declares it.
+
+    Attributes
+    ----------
+    link : int
+        Carried by this joint; 0 for the column.
+    mass_kg : float
+    centre_m : tuple of float
+        Centre of mass in the frame directly behind the joint, see the module's docstring.
+    relative_std : float
+        How well this is known: of the mass, and of each component of the centre.
+    """
+
+    link: int
+    mass_kg: float
+    centre_m: tuple
+    relative_std: float
+
+
+@dataclass(frozen=True)
+class Compensator:
+    """A gravity compensator beside a joint.
+
+    Attributes
+    ----------
+    joint : int
+        From 1.
+    kind : {"spring", "gas"}
+    """
+
+    joint: int
+    kind: str
+
+
+@dataclass(frozen=True)
 class Robot:
     """A robot as its file describes it, in SI units.
 
@@ -156,6 +212,15 @@ class Robot:
         Elastic links of the extended model; empty for the reduced model.
     reported_matrix, reported_offset : ndarray (n, n), (n,)
         Joint angles from what the controller reports: q = matrix @ reported + offset (rad).
+    masses : tuple of Mass
+        In the order of the links; empty where nothing is known.
+    gravity_m_s2 : tuple of float
+        Base axes.
+    gear_ratio : tuple of float or None
+        Turns of the motor for one of the joint, None for joints where it is not known; None where no joint's is.
+    compensator : Compensator or None
+    payload_kg : float or None
+        Rated.
     """
 
     name: str
@@ -165,6 +230,11 @@ class Robot:
     links: tuple
     reported_matrix: np.ndarray
     reported_offset: np.ndarray
+    masses: tuple = ()
+    gravity_m_s2: tuple = STANDING
+    gear_ratio: tuple | None = None
+    compensator: Compensator | None = None
+    payload_kg: float | None = None
 
     @property
     def joints(self):
@@ -358,7 +428,116 @@ def robot_from_document(document, source="robot"):
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
         reported_offset=np.radians(np.array(offset, float)),
+        masses=_masses(document.get("masses", ()), n, source),
+        gravity_m_s2=_gravity(document.get("gravity_m_s2", STANDING), source),
+        gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
+        compensator=_compensator(document.get("compensator"), n, source),
+        payload_kg=document.get("payload_kg"),
     )
+
+
+def document_of(robot):
+    """A robot as the contents of its file, the inverse of `robot_from_document`.
+
+    Parameters
+    ----------
+    robot : Robot
+        Without elastic links: their tubes are no data of an arm but of a study.
+
+    Returns
+    -------
+    dict
+        Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
+    """
+    document = {
+        "name": robot.name,
+        "chain": notation(robot.chain),
+        "joint_limits_deg": np.degrees(robot.joint_limits).tolist(),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+    }
+    if (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
+        offset = np.degrees(robot.reported_offset).tolist()
+        document["reported_joints"] = {"matrix": robot.reported_matrix.tolist(), "offset_deg": offset}
+    if robot.masses:
+        document["masses"] = [vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses]
+    if robot.gravity_m_s2 != STANDING:
+        document["gravity_m_s2"] = list(robot.gravity_m_s2)
+    if robot.gear_ratio is not None:
+        document["gear_ratio"] = list(robot.gear_ratio)
+    if robot.compensator is not None:
+        document["compensator"] = dict(vars(robot.compensator))
+    if robot.payload_kg is not None:
+        document["payload_kg"] = robot.payload_kg
+    return document
+
+
+def notation(chain):
+    """A chain in the notation that `parse_chain` reads, with its lengths as numbers.
+
+    Parameters
+    ----------
+    chain : Chain
+
+    Returns
+    -------
+    str
+    """
+    words = []
+    for place in range(len(chain.transforms) + 1):
+        words += [f"[{point.name}]" for point in chain.points if point.after == place]
+        if place < len(chain.transforms):
+            words.append(_word(chain.transforms[place]))
+    return " ".join(words)
+
+
+def _word(transform):
+    turns = transform.kind == "R"
+    if transform.coordinate is not None:
+        sign, argument = transform.sign, f"q{transform.coordinate + 1}"
+    else:
+        sign, amount = math.copysign(1.0, transform.constant), abs(transform.constant)
+        number = np.format_float_positional(math.degrees(amount) if turns else amount, trim="-")
+        argument = f"{number}deg" if turns else number
+    return f"{transform.kind}{AXES[transform.axis]}({'-' if sign < 0 else ''}{argument})"
+
+
+def _masses(described, joints, source):
+    masses = sorted((Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described), key=_link_of)
+    for index, entry in enumerate(described):
+        if entry["link"] > joints:
+            raise InputError(
+                source, f"masses[{index}].link", str(entry["link"]), f"0 for the column, or a joint up to {joints}"
+            )
+    for one, other in pairwise(masses):
+        if one.link == other.link:
+            raise InputError(source, "masses", f"link {one.link} twice", "each link once, with all that it carries")
+    return tuple(masses)
+
+
+def _link_of(mass):
+    return mass.link
+
+
+def _gravity(vector, source):
+    if not any(vector):
+        raise InputError(source, "gravity_m_s2", str(list(vector)), "a vector with a length, in base axes")
+    return tuple(map(float, vector))
+
+
+def _gear_ratio(ratios, joints, source):
+    if ratios is None:
+        return None
+    if len(ratios) != joints:
+        raise InputError(source, "gear_ratio", f"{len(ratios)} entries", f"one or null for each of the {joints} joints")
+    return tuple(ratios)
+
+
+def _compensator(described, joints, source):
+    if described is None:
+        return None
+    if described["joint"] > joints:
+        raise InputError(source, "compensator.joint", str(described["joint"]), f"a joint from 1 to {joints}")
+    return Compensator(**described)
 
 
 def _check_reach(chain, key, source):

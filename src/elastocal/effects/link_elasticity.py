@@ -29,12 +29,13 @@ def _candidate(sites, links, detail):
     def displacement(circumstances):
         bent, twisted = {}, {}
         for link in links:
-            bending, torsion = _deflection(sites, link, circumstances.load)
+            bending, torsion = _deflection(sites, link, circumstances.total)
             bent |= bending
             twisted |= torsion
         return [bent, twisted]
 
-    return Candidate(NAME, FAMILY, tuple(k for k in links if k), detail, _PARAMETERS, displacement, frozenset({"load"}))
+    joints = tuple(k for k in links if k)
+    return Candidate(NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), place=detail)
 
 
 def _deflection(sites, link, load):

@@ -6,8 +6,6 @@ import numpy as np
 
 from elastocal.campaign import Campaign, described_campaign
 from elastocal.effects.catalogue import candidates_on, declared_candidates
-from elastocal.fitting import fit
-from elastocal.loop.fit_columns import estimate_from
 from elastocal.loop.reading_columns import readings_from
 from elastocal.model import Model, declared_model
 from elastocal.noise import Noise
@@ -37,17 +35,6 @@ class Case:
     model: Model
     candidates: dict
 
-    def fitted(self, model, columns, noise):
-        """A fit found before, from the columns of its parameters table."""
-        sessions = np.unique(self.observations.states.session)
-        estimate, discrepancy = estimate_from(columns, model, sessions)
-        return fit(model, self.observations, noise, estimate, discrepancy)
-
-    def with_found(self, keys):
-        """The declared model with some candidates, and these candidates."""
-        added = [self.candidates[key] for key in keys]
-        return self.model.with_effects(added), added
-
 
 def case_from(descriptions, columns):
     """Put a campaign together.
@@ -66,7 +53,7 @@ def case_from(descriptions, columns):
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = described_campaign(descriptions["campaign"], robot, readings_from(columns), source)
-    sites = sites_of(robot.chain)
+    sites = sites_of(robot)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
     return Case(campaign, averaged(without_wild_repeats(campaign.readings)), model, candidates)

@@ -5,11 +5,17 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal.fitting import fit
-from elastocal.loop.case import noise_facts
+from elastocal.loop.case import noise_facts, noise_from
 from elastocal.noise import FINEST, Noise, taken_noise
 from elastocal.registration import registered
 
 _ASSUMED_M = 1e-4
+
+
+def estimated_noise(case):
+    """Noise as `noise_of`, and the warnings, as objects."""
+    facts = noise_of(case)
+    return noise_from(facts), facts["warnings"]
 
 
 def noise_of(case):
