@@ -47,6 +47,11 @@ def test_every_effect_of_the_catalogue_can_be_a_defect():
     assert set(NAMED) == set(effects())
 
 
+def test_no_kind_outside_of_the_catalogue_bears_a_name_of_it():
+    """Else what the catalogue finds rightly would count as a wrong name."""
+    assert not {kind.removeprefix(OUTSIDE) for kind in FOREIGN} & set(effects())
+
+
 def test_at_least_eight_kinds_are_outside_of_the_catalogue():
     assert len(FOREIGN) >= 8
 
@@ -187,3 +192,20 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
         columns.append(yardstick.change(replace(fanuc_specimen, compliance=softer))[schedule.training].ravel())
     left = seen - np.array(columns).T @ np.linalg.lstsq(np.array(columns).T, seen, rcond=None)[0]
     assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)
+
+
+@pytest.mark.parametrize("joint", [1, 4])
+def test_a_runout_moves_what_turns_with_the_joint_by_the_circle_of_its_axis(weightless, schedule, joint):
+    """And by its lean: at the joint itself by no more than the size."""
+    bad = with_defects(weightless, [Defect("outside:bearing_runout", (joint,), 3e-5, 2)])
+    # Under a load the levers change too.
+    bare = schedule.load == 0
+    change = np.linalg.norm(seen_poses(bad, schedule)[0] - seen_poses(weightless, schedule)[0], axis=2)[bare]
+    names = weightless.arm.points
+    before = [names.index(name) for name in ("2DoF", "3DoF")] if joint == 4 else []
+    assert not change[:, before].any()
+    # [4DoF] of joint 4 lies on it; of joint 1 every target is far away.
+    near = change[:, names.index("4DoF")]
+    assert (near > 0).all()
+    if joint == 4:
+        np.testing.assert_allclose(near, 3e-5, rtol=1e-3)

@@ -23,6 +23,8 @@ OUTSIDE = "outside:"
 _AXES = "xyz"
 _SHORTEST_LINK_M = 0.1
 _HEAVY_REACH_M = 2.5
+# Radius of a bearing.
+_BEARING_M = 0.15
 # In the first half of the training poses, with repeats and without, at a state in 25 s.
 _KNOCKED_S = (700.0, 2000.0)
 # Share of the largest torque below which a weight does not turn a joint.
@@ -540,6 +542,35 @@ def _eccentric_nest(robot, joints, size, draws):
 @_register(OUTSIDE + "cell_crosstalk", "1/N", 5e-5, _nowhere, scale=(0.0, -1.0))
 def _cell_crosstalk(robot, joints, size, draws):
     return replace(robot, cell=replace(robot.cell, crosstalk_per_N=size)), {}
+
+
+@_register(OUTSIDE + "bearing_runout", "m", 3e-5, _each_joint)
+def _bearing_runout(robot, joints, size, draws):
+    """The axis of a joint circles once a turn by `size`, and wobbles by as much at the edge of its bearing."""
+    joint, phase, lean = joints[0], draws.uniform(0, 2 * np.pi), draws.uniform(0, 2 * np.pi)
+    structure, number, sense = robot.structure, joints[0] + 1, draws.choice([-1.0, 1.0])
+    tilt = structure.tilt | {number: structure.tilt.get(number, (0.0, 0.0))}
+    changed = _with_structure(robot, loose=tuple({*structure.loose, number}), tilt=tilt)
+    laws = []
+    for which in range(2):
+        quarter = which * sense * np.pi / 2
+        laws.append((f"shift{number}_{which}", drives.Runout(joint, size, phase + quarter)))
+        laws.append((f"tilt{number}_{which}", drives.Runout(joint, size / _BEARING_M, lean + quarter)))
+    return replace(changed, offsets=(*robot.offsets, *laws)), {}
+
+
+@_register(OUTSIDE + "motor_eccentricity", "rad", 6e-5, _each_joint)
+def _motor_eccentricity(robot, joints, size, draws):
+    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no whole number of turns of the joint."""
+    order, phases = robot.arm.gear_ratio[joints[0]], draws.uniform(0, 2 * np.pi, 2)
+    waves = ((order, size, phases[0]), (2.0 * order, 0.4 * size, phases[1]))
+    return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
+
+
+@_register(OUTSIDE + "temperature_gradient", "1/K", 1.2e-5, _nowhere)
+def _temperature_gradient(robot, joints, size, draws):
+    """Motors warm the foot of the arm while its tip stays as it was, or the other way round."""
+    return replace(robot, gradient_per_K=((size, 0.0), (0.0, size))[draws.integers(2)]), {}
 
 
 @_register(OUTSIDE + "short_waves", "rad", 8e-5, _each_joint)

@@ -113,6 +113,25 @@ class SlippingZero:
 
 
 @dataclass(frozen=True)
+class Runout:
+    """One coordinate of an axis that wobbles as its bearing turns: size cos(q - phase), (S,), rad or m.
+
+    Attributes
+    ----------
+    joint : int
+        From 0.
+    size, phase_rad : float
+    """
+
+    joint: int
+    size: float
+    phase_rad: float
+
+    def __call__(self, visits):
+        return self.size * np.cos(visits.angle[:, self.joint] - self.phase_rad)
+
+
+@dataclass(frozen=True)
 class Repeatability:
     """Each approach ends a little elsewhere; `sigma_rad` (n,). No defect: what every drive does."""
 

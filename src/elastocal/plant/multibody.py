@@ -39,6 +39,8 @@ class Machine:
         Which bodies each coordinate moves: all from its own on, for the tree is a chain.
     slides : ndarray of bool (coordinates,)
         Which coordinates are lengths; the others are angles.
+    body_stretch, site_stretch : ndarray of int (bodies,), (sites,)
+        Stretch of whose vector the place of each body and site is a part.
     flange : str
     compensator : structure.Compensator or None
     xml : str
@@ -53,6 +55,8 @@ class Machine:
     links: np.ndarray
     beyond: np.ndarray
     slides: np.ndarray
+    body_stretch: np.ndarray
+    site_stretch: np.ndarray
     flange: str
     compensator: object
     xml: str
@@ -118,6 +122,8 @@ def machine_of(arm, structure, gear_compliance=None):
             tree.joint(f"drive{number + 1}", "hinge", axis)
             tree.joint(f"gear{number + 1}", "hinge", axis, stiffness[number])
             across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
+            for which in range(2 if number + 1 in structure.loose else 0):
+                tree.joint(f"shift{number + 1}_{which}", "slide", across[which], 0.0)
             for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
                 tree.joint(f"tilt{number + 1}_{which}", "hinge", across[which], compliance)
     if structure.payload is not None:
@@ -147,10 +153,22 @@ def _indexed(arm, structure, tree, xml):
         np.array([model.body(name).id for name in ("foot", *(f"arm{j}" for j in numbers))]),
         np.arange(model.nbody) >= model.jnt_bodyid[:, None],
         model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE,
+        *_stretches_of(model),
         arm.points[-1],
         structure.compensator,
         xml,
     )
+
+
+def _stretches_of(model):
+    """Stretches of all bodies and of all sites: a body behind a drive is placed by the stretch before it."""
+    arms, bodies = 0, []
+    for number in range(model.nbody):
+        behind_drive = model.body(number).name.startswith("arm")
+        bodies.append(arms)
+        arms += behind_drive
+    within = np.array(bodies) + [model.body(number).name.startswith("arm") for number in range(model.nbody)]
+    return np.array(bodies), within[model.site_bodyid]
 
 
 @lru_cache(maxsize=4)
