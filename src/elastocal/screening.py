@@ -345,4 +345,4 @@ def _shapes_tried(candidate):
     if not candidate.shapes:
         return [np.zeros(0)]
     (shape,) = candidate.shapes
-    return [np.array([value]) for value in np.geomspace(shape.lowest, shape.highest, _SHAPES_TRIED + 2)[1:-1]]
+    return [np.array([value]) for value in shape.values(_SHAPES_TRIED)]
