@@ -97,7 +97,7 @@ def _campaign(folder, poses):
 def _case(folder, poses):
     campaign = read_campaign(_campaign(folder, poses), ROOT / "config" / "robots")
     campaign = replace(campaign, readings=split(campaign)[0])
-    sites = sites_of(campaign.robot.chain)
+    sites = sites_of(campaign.robot)
     return Case(campaign, averaged(campaign.readings), declared_model(campaign), candidates_on(sites))
 
 

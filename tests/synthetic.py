@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaign import Readings, Target
+from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import circumstances_of
@@ -13,6 +14,7 @@ from elastocal.kinematics import poses
 from elastocal.model import Estimate, Model, circumstances, parameters, predict, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.observations import Observations, States
+from elastocal.robot import Compensator
 from elastocal.sites import sites_of
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
@@ -32,16 +34,26 @@ def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
         approach=rng.choice([-1.0, 1.0], (count, joints)),
         time_s=np.sort(rng.uniform(0, 4 * 3600, count)),
         temperature_c=20 + np.sort(rng.uniform(0, 10, count)),
+        row=1 + np.arange(count),
     )
 
 
-def made_model(chain, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
-    """A model; its targets are unknown offsets from the last measuring point unless told."""
-    sites = sites_of(chain)
-    targets = (Target("A", chain.end_effector.name, None),) if targets is None else targets
+def equipped(holder):
+    """Sites of a robot or a chain with a compensator beside its shoulder and a known gear: no effect is out of place there."""
+    sites = sites_of(holder)
+    if sites.compensator is None and sites.shoulder is not None:
+        sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
+    return sites if sites.gear_ratio else replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
+
+
+def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
+    """A model of a chain or a robot; its targets are unknown offsets from the last measuring point unless told."""
+    sites = equipped(holder)
+    targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)
     springs = (joint_compliance(sites),) if identified else ()
-    return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *effects))
+    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *weight, *effects))
 
 
 def made_estimate(model, sessions=(0,), seed=0, size=0.3):
@@ -121,16 +133,16 @@ def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_
     )
 
 
-def circumstances_on(chain, states, compliance=None):
-    """Circumstances of some states on a chain."""
-    sites = sites_of(chain)
+def circumstances_on(holder, states, compliance=None):
+    """Circumstances of some states on a chain or a robot."""
+    sites = equipped(holder)
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
     return circumstances_of(sites, compliance, states)
 
 
-def candidate_on(chain, key):
-    """One candidate of the catalogue."""
-    return candidates_on(sites_of(chain))[key]
+def candidate_on(holder, key):
+    """One candidate of the catalogue, on a chain or a robot."""
+    return candidates_on(equipped(holder))[key]
 
 
 def displacements(candidate, circumstances, *shapes):

@@ -65,7 +65,9 @@ def test_compliances_are_identified(fanuc):
     true = replace(made_estimate(model, seed=3), coefficients=(np.array([1.2, 0.5, 0.6, 3.0, 2.5, 2.0]) * 1e-6,))
     seen = seen_exactly(model, true, made_states(6, 30, seed=4))
     found = fit(model, seen, NOISE)
-    np.testing.assert_allclose(found.estimate.coefficients[0], true.coefficients[0], rtol=1e-6)
+    deviation = np.sqrt(np.diag(found.covariance)[-6:])
+    assert (np.abs(found.estimate.coefficients[0] - true.coefficients[0]) < 1e-3 * deviation).all()
+    np.testing.assert_allclose(found.estimate.coefficients[0], true.coefficients[0], rtol=1e-5)
 
 
 @pytest.mark.parametrize("name", OTHER_CHAINS)
@@ -180,7 +182,7 @@ def test_what_the_data_can_tell_is_not_shrunk(fanuc):
     model = model_of(fanuc, "joint_offset@3")
     true = replace(made_estimate(model, seed=16), coefficients=(np.array([0.1]),))
     found = fit(model, seen_exactly(model, true, made_states(6, 30, seed=17)), NOISE)
-    np.testing.assert_allclose(found.estimate.coefficients[0], 0.1, rtol=1e-9)
+    np.testing.assert_allclose(found.estimate.coefficients[0], 0.1, rtol=1e-8)
 
 
 def test_identified_compliance_and_force_scale_cannot_both_be_told(fanuc):

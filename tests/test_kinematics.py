@@ -12,6 +12,7 @@ from support import OTHER_CHAINS, PinocchioPoint, chain_of, homogeneous, random_
 from elastocal import kinematics
 from elastocal.kinematics import (
     jacobians,
+    motion,
     pose_differences,
     poses,
     poses_and_jacobians,
@@ -19,6 +20,7 @@ from elastocal.kinematics import (
     poses_of_points,
     rotation_vectors,
 )
+from elastocal.links import extended_chain
 from elastocal.robot import with_target_offset
 
 # Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
@@ -290,3 +292,36 @@ def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
             np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
     for found, wanted in zip(poses_of_points(kuka.chain, angles, points), together, strict=False):
         np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS])
+def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, request):
+    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+    rng = np.random.default_rng(31)
+    angles, wrench = random_angles(rng, chain, 7), rng.standard_normal((7, 6))
+    points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
+    moved = motion(chain, angles, points)
+    for number, point in enumerate(points):
+        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+        np.testing.assert_allclose(moved.position[number].T, position, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING)
+        found = moved.jacobian(point.after, moved.position[number])
+        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
+        some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
+        np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
+        moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
+        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
+        np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
+
+
+def test_coordinates_that_nothing_moves_change_no_digit(kuka_extended):
+    chain = extended_chain(kuka_extended)
+    moved = np.zeros((5, chain.coordinates))
+    moved[:, :6] = random_angles(np.random.default_rng(32), kuka_extended.chain, 5)
+    nearly = np.where(moved == 0.0, 1e-300, moved)
+    for still, walked in zip(
+        poses_and_jacobians(chain, moved, chain.end_effector),
+        poses_and_jacobians(chain, nearly, chain.end_effector),
+        strict=True,
+    ):
+        np.testing.assert_allclose(still, walked, rtol=0, atol=1e-15)

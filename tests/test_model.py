@@ -1,17 +1,17 @@
 """The composite model: predictions by hand-made chains, sensitivities by central differences of its own exact residuals."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, chain_of, random_angles
-from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
+from synthetic import made_estimate, made_model, made_readings, made_states, seen_exactly, slopes, small_steps, with_noise
 
 from elastocal.campaign import Campaign, Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.elastostatics import exact_deflections, joint_torques, loaded_point
+from elastocal.elastostatics import exact_deflections, joint_torques
 from elastocal.kinematics import poses
 from elastocal.model import (
     circumstances,
@@ -25,6 +25,7 @@ from elastocal.model import (
     residuals,
     stepped,
 )
+from elastocal.robot import Mass
 
 TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2)), Target("C", "6DoF", None)
 
@@ -115,14 +116,41 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     estimate, states = made_estimate(model), made_states(6, 6, seed=4)
     seen = seen_exactly(model, estimate, states)
     position, rotation = predict(model, estimate, seen, circumstances(model, estimate, states))
-    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, loaded_point(fanuc.chain, None, "end_effector"))
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
-        expected = poses(fanuc.chain, states.joint_angles + torques * fanuc.compliance, target)
-        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-14)
-    bent = exact_deflections(fanuc.chain, states.joint_angles, torques * fanuc.compliance, fanuc.chain.end_effector)
+        expected = poses(fanuc.chain, states.joint_angles + turned, target)
+        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-9)
+    bent = exact_deflections(fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector)
     assert np.abs(bent).max() > 1e-4
+
+
+def equilibrium(chain, compliance, states, weighing=None):
+    """Turn of each joint where the springs hold the load at the pose to which it has turned them, by scipy's root finder."""
+    end = replace(chain.end_effector, offset_m=(0, 0, 0))
+
+    def unbalanced(turned, q, wrench):
+        torque = joint_torques(chain, q + turned, wrench, end)
+        return turned - compliance * (torque if weighing is None else torque + weighing(q + turned))
+
+    pairs = zip(states.joint_angles, states.wrench, strict=True)
+    return np.array([root(unbalanced, np.zeros(len(q)), (q, wrench), tol=1e-15).x for q, wrench in pairs])
+
+
+def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_finds_it(fanuc):
+    model = made_model(fanuc.chain, fitted_frames=False, compliance=fanuc.compliance)
+    estimate, states = made_estimate(model), made_states(6, 40, seed=12)
+    states.wrench[:] *= (3000.0 / np.linalg.norm(states.wrench[:, :3], axis=1))[:, None]
+    found = displaced_coordinates(model, estimate, circumstances(model, estimate, states))[:, :6]
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
+    end = fanuc.chain.end_effector
+    ends = [poses(fanuc.chain, q, end)[0] for q in (found, states.joint_angles + turned)]
+    assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-8
+    # At the commanded pose the load would be off by far more than a tracker's noise.
+    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, end)
+    there = poses(fanuc.chain, states.joint_angles + fanuc.compliance * torques, end)[0]
+    assert np.linalg.norm(there - ends[1], axis=1).max() > 5e-5
 
 
 def test_wrench_acts_at_the_last_measuring_point_and_not_at_a_target_on_it(fanuc):
@@ -161,10 +189,10 @@ def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
     estimate, states = made_estimate(model, seed=10), made_states(6, 5, seed=11)
     around = circumstances(model, estimate, states)
     found = displaced_coordinates(model, estimate, around)
-    torque = joint_torques(fanuc.chain, states.joint_angles, states.wrench, fanuc.chain.end_effector)
+    torque = joint_torques(model.sites.chain, found, states.wrench, model.sites.chain.end_effector)[:, :6]
     expected = states.joint_angles + fanuc.compliance * torque
     expected[:, 1] += estimate.coefficients[0][0] + estimate.coefficients[1][0] * torque[:, 1] ** 3
-    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-9)
     at_base = found[:, list(model.sites.base)]
     np.testing.assert_allclose(at_base[:, :2], estimate.coefficients[2][0] * states.wrench[:, :2], rtol=1e-9, atol=1e-18)
     used = {*range(6), *model.sites.base}
@@ -194,16 +222,26 @@ def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
 @pytest.mark.parametrize(("frame", "fitted"), [("tracker", True), ("base", False)])
 @pytest.mark.parametrize("compliance", ["nominal", "identify"])
 def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fitted, compliance):
-    campaign = Campaign(
-        "c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, SimpleNamespace(time_s=np.array([7.0, 5.0]))
-    )
+    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
+    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    readings = replace(readings, time_s=np.array([7.0, 5.0]), row=np.array([4, 9]))
+    campaign = Campaign("c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, readings)
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
     model = declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TARGETS)
     assert model.identifies_compliance == (compliance == "identify")
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
     np.testing.assert_array_equal(model.nominal_compliance, fanuc.compliance)
-    assert model.time_zero_s == 5.0
+    assert model.time_zero_s == 5.0 and model.row_span == (4, 9)
+
+
+def test_declared_model_weighs_what_the_robot_file_weighs(fanuc):
+    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
+    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    robot = replace(fanuc, masses=(Mass(2, 100.0, (0.5, 0.0, 0.0), 0.1),), gravity_m_s2=(0.0, 0.0, 9.0), gear_ratio=(None,) * 6)
+    model = declared_model(Campaign("c", robot, "position", "base", TARGETS, "identify", (), None, {}, readings))
+    assert [effect.key for effect in model.effects] == ["joint_compliance", "declared_weight"]
+    assert model.sites.masses == robot.masses and model.sites.gravity_m_s2 == (0.0, 0.0, 9.0)
 
 
 def test_coordinate_jacobian_is_that_of_each_target(case):

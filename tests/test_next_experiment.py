@@ -215,4 +215,5 @@ def test_more_of_the_hand_would_not_tell_an_exact_alias(planar):
     rows = [rows_of(final, found, rival, final.model.targets, replace(seen, states=s)) for s in (seen.states, states)]
     without_rival = left_over(np.concatenate([np.delete(part, -2, axis=1) for part in rows]))
     assert without_rival > 100
-    assert left_over(np.concatenate(rows)) < 1e-3 * without_rival
+    # Loads at the deflected pose tell them apart, to the order of deflection over reach.
+    assert left_over(np.concatenate(rows)) < 5e-3 * without_rival

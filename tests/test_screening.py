@@ -14,7 +14,7 @@ from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactl
 from elastocal.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting import fit
-from elastocal.model import circumstances, effect_columns, linearize
+from elastocal.model import effect_columns, linearize
 from elastocal.screening import absorbed, cross_validated_gains, directions, leverage_adjusted, score
 
 TARGET = (Target("A", "6DoF", None),)
@@ -64,7 +64,7 @@ def nothing_missing(base):
 
 def whitened_rows(fitted, seen, candidate):
     """Residual, sensitivities of the model and of a candidate, whitened: as a textbook would have them."""
-    around = circumstances(fitted.model, fitted.estimate, seen.states)
+    around = fitted.circumstances
     line = linearize(fitted.model, fitted.estimate, seen, around)
     made = effect_columns([(candidate, [s.start for s in candidate.shapes])], around, line.coordinate_jacobian, seen.state)
     size = np.array([p.plausible for p in candidate.parameters])

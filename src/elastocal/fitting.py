@@ -13,12 +13,14 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
+from elastocal.effects.protocol import with_springs
 from elastocal.model import (
     bends,
     circumstances,
     joint_compliances,
     limits,
     linearize,
+    mass_corrections,
     parameter_values,
     parameters,
     residuals,
@@ -149,7 +151,7 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
         before, lacking = lacking, discrepancy(found, observations, found.tame)
         if abs(lacking - before) <= 0.01 * max(lacking, before):
             break
-        found = _robustly(model, observations, around, noise, found.estimate, lacking)
+        found = _robustly(model, observations, found.circumstances, noise, found.estimate, lacking)
     return found
 
 
@@ -190,10 +192,6 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
-    def at(estimate):
-        now = replace(around, compliance=joint_compliances(model, estimate))
-        return now, linearize(model, estimate, observations, now)
-
     def objective(estimate, residual):
         """Half the squared distances, those of outliers counted linearly, and half the squares of what has a prior."""
         distance = np.sqrt((whitener.apply(residual) ** 2).mean(axis=1))
@@ -201,8 +199,10 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
         return rows * lost.sum() + 0.5 * penalty @ parameter_values(model, estimate) ** 2
 
     converged, scale = False, None
-    around, line = at(estimate)
+    line = linearize(model, estimate, observations, around)
     for step_number in range(_STEPS):
+        # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
+        around = line.circumstances
         jacobian = line.coordinate_jacobian[..., : model.sites.joints]
         whitener = whitening(observations, jacobian, noise, discrepancy)
         if step_number:
@@ -231,17 +231,21 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
         before, origin = objective(estimate, line.residual), estimate
         for halving in range(_HALVINGS + 1):
             estimate = stepped(model, origin, 0.5**halving * step)
-            around, line = at(estimate)
-            wanted = before - _LEAST_FALL * 0.5**halving * slope
-            if objective(estimate, line.residual) <= wanted + _ROUNDING * max(before, 1.0):
+            line = linearize(model, estimate, observations, around)
+            after = objective(estimate, line.residual)
+            least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
+            if after > before - least and not halving:
+                # What it fell from was under the loads of the step before.
+                before = objective(origin, residuals(model, origin, observations, around))
+            if after <= before - least:
                 break
         else:
             estimate = origin
-            around, line = at(estimate)
+            line = linearize(model, estimate, observations, around)
             # The first step has another objective than those that follow: all observations count alike.
             if step_number:
                 break
-    around = replace(around, compliance=joint_compliances(model, estimate))
+    around = with_springs(line.circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
     residual = residuals(model, estimate, observations, around)
     return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around, converged)
 

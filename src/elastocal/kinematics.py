@@ -6,11 +6,143 @@ for every configuration stay plain numbers and cost nothing.
 """
 
 import math
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 # So many configurations at a time keep all intermediate arrays in a second-level cache.
 BLOCK = 8192
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.
+
+    Attributes
+    ----------
+    position : ndarray (T, 3, S)
+        m, base frame.
+    rotation : ndarray (T, 3, 3, S)
+    twist : ndarray (6, K, S)
+        For each moving transform, in the order of their coordinates, the velocity of what lies behind it, per unit of the
+        coordinate: of the body's point at the base's origin, then the angular one (the spatial twist of Murray, Li and Sastry
+        1994, 3.4).
+    place, coordinate : ndarray of int (K,)
+        How many transforms come before each, and the coordinate that moves it.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    twist: np.ndarray
+    place: np.ndarray
+    coordinate: np.ndarray
+
+    def jacobian(self, after, position, rows=6, chosen=slice(None)):
+        """Geometric Jacobian of points behind so many transforms of the chain.
+
+        Parameters
+        ----------
+        after : int
+        position : ndarray (3, S')
+            Where the points are, m.
+        rows : {3, 6}
+            Linear velocities alone, or also angular ones.
+        chosen : slice or ndarray of int (S',), optional
+            Configuration of each.
+
+        Returns
+        -------
+        ndarray (rows, C, S')
+        """
+        twist = self.twist[..., chosen]
+        angular, product = twist[3:], np.empty_like(twist[0])
+        moved = np.empty_like(twist[:rows])
+        for i in range(3):
+            np.multiply(angular[i - 2], position[i - 1], out=moved[i])
+            np.multiply(angular[i - 1], position[i - 2], out=product)
+            moved[i] -= product
+            moved[i] += twist[i]
+        moved[3:] = angular[: rows - 3]
+        return self._behind_none(moved, after)
+
+    def generalized_forces(self, after, force, moment):
+        """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
+
+        Parameters
+        ----------
+        after : int
+        force, moment : ndarray (3, S)
+            The moment about the base's origin.
+
+        Returns
+        -------
+        ndarray (C, S)
+        """
+        on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
+        return self._behind_none(on_each, after)
+
+    def by_coordinate(self, values):
+        """Values (..., K', S) of the transforms of the first coordinates, or of all, summed for each: (..., C', S)."""
+        if self._one_each:
+            return values
+        coordinate = self.coordinate[: values.shape[-2]]
+        out = np.zeros((*values.shape[:-2], coordinate[-1] + 1, values.shape[-1]))
+        np.add.at(out, (..., coordinate, slice(None)), values)
+        return out
+
+    def _behind_none(self, values, after):
+        """By coordinate, without transforms behind a place of the chain."""
+        behind = self.place >= after
+        if behind.any():
+            values[..., behind, :] = 0.0
+        return self.by_coordinate(values)
+
+    @cached_property
+    def _one_each(self):
+        return len(np.unique(self.coordinate)) == len(self.coordinate)
+
+
+def motion(chain, coordinates, points):
+    """Poses of several measuring points and the twist of every transform that moves, in one walk along the chain.
+
+    Parameters
+    ----------
+    chain : Chain
+    coordinates : ndarray (S, C)
+        rad and m.
+    points : sequence of MeasuringPoint
+
+    Returns
+    -------
+    Motion
+    """
+    components = np.ascontiguousarray(np.asarray(coordinates, float).T)
+    size = components.shape[1]
+    walked = chain.transforms
+    position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
+    moving = sorted((t.coordinate, place) for place, t in enumerate(walked) if t.coordinate is not None)
+    order = {place: number for number, (_, place) in enumerate(moving)}
+    axis, origin = np.empty((2, 3, len(moving), size))
+    for part in _blocks(size):
+        frames, screws = _sweep(chain, components[:, part], points, lines=True)
+        for number, frame in enumerate(frames):
+            _store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
+        for screw in screws:
+            for i in range(3):
+                axis[i, order[screw.place], part], origin[i, order[screw.place], part] = screw.axis[i], screw.origin[i]
+    driven, places = np.array(moving, int).T
+    signs = np.array([walked[place].sign for place in places])[:, None]
+    if (signs < 0).any():
+        axis *= signs
+    twist = np.empty((6, len(moving), size))
+    twist[3:] = axis
+    for i in range(3):
+        np.multiply(origin[i - 2], axis[i - 1], out=twist[i])
+        twist[i] -= origin[i - 1] * axis[i - 2]
+    shifts = np.array([walked[place].kind == "T" for place in places], bool)
+    twist[:3, shifts], twist[3:, shifts] = axis[:, shifts], 0.0
+    return Motion(position, rotation, twist, places, driven)
 
 
 def poses(chain, coordinates, point):
@@ -224,26 +356,45 @@ def _blocks(size):
     return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
 
 
-def _sweep(chain, coordinates, points):
+@dataclass(frozen=True, slots=True)
+class _Screw:
+    """A moving transform: its place in the chain, and its axis; the origin is none where points behind it can only turn."""
+
+    place: int
+    kind: str
+    sign: float
+    axis: list
+    origin: list
+    coordinate: int
+
+
+def _sweep(chain, coordinates, points, lines=False):
     """Walk the chain up to the last of the points.
 
-    Gives axes and target of each point, and (place, kind, sign, axis, origin) of each coordinate on the way. The origin is none
-    where all points behind lie on the axis and only turn.
+    Gives axes and target of each point, and the screw of each moving transform on the way. Without ``lines`` the origin of a
+    screw is none where all points behind lie on the axis and only turn; with them the walk goes on to the end of the chain.
     """
-    transforms = chain.transforms[: max(point.after for point in points)]
-    turns = iter(_cosines_and_sines(coordinates, [transform for transform in transforms if transform.kind == "R"]))
+    transforms = chain.transforms if lines else chain.transforms[: max(point.after for point in points)]
+    # Springs that no configuration moves cost nothing.
+    still = set(np.flatnonzero(~coordinates.any(axis=1)).tolist())
+    rotations = [transform for transform in transforms if transform.kind == "R" and transform.coordinate not in still]
+    turns = iter(_cosines_and_sines(coordinates, rotations))
     axes = before_turns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     origin, turned_about = [0.0, 0.0, 0.0], None
-    screws = [None] * chain.coordinates
+    screws = []
     frames = {0: (axes, origin)}
     for number, transform in enumerate(transforms):
         axis, coordinate, sign = transform.axis, transform.coordinate, transform.sign
         if coordinate is not None:
-            moves = transform.kind == "T" or not all(
-                _lies_on(axis, transforms[number : point.after], point) for point in points if point.after > number
+            moves = (
+                lines
+                or transform.kind == "T"
+                or not all(_lies_on(axis, transforms[number : point.after], point) for point in points if point.after > number)
             )
-            screws[coordinate] = (number, transform.kind, sign, axes[axis], origin if moves else None)
-        if transform.kind == "T":
+            screws.append(_Screw(number, transform.kind, sign, axes[axis], origin if moves else None, coordinate))
+        if coordinate in still:
+            pass
+        elif transform.kind == "T":
             amount = transform.constant if coordinate is None else _product(sign, coordinates[coordinate])
             origin = _moved(origin, amount, axes[axis])
         else:
@@ -312,27 +463,39 @@ def _store_pose(axes, origin, position, rotation):
 
 
 def _store_twists(screws, after, target, jacobian):
-    levers = {}
-    for column, screw in enumerate(screws):
-        if screw is None or screw[0] >= after:
-            jacobian[:, column] = 0.0
-            continue
-        _, kind, sign, axis, origin = screw
-        linear, angular = jacobian[:3, column], jacobian[3:, column]
-        if kind == "T":
-            _store(axis, linear)
-            angular[:] = 0.0
-        elif origin is None:
-            linear[:] = 0.0
-            _store(axis, angular)
+    """Columns of a Jacobian; a coordinate that moves several transforms has the sum of their twists."""
+    levers, filled = {}, set()
+    for screw in screws:
+        if screw.place >= after:
+            break
+        if screw.coordinate in filled:
+            twist = np.zeros((6, jacobian.shape[2]))
+            _store_twist(screw, target, levers, twist)
+            jacobian[:, screw.coordinate] += twist
         else:
-            # Joints that meet in one point, as in a spherical wrist, share their lever.
-            if id(origin) not in levers:
-                levers[id(origin)] = [_product_difference(1.0, p, 1.0, o) for p, o in zip(target, origin, strict=True)]
-            _store_cross(axis, levers[id(origin)], linear)
-            _store(axis, angular)
-        if sign < 0:
-            jacobian[:, column] *= -1.0
+            _store_twist(screw, target, levers, jacobian[:, screw.coordinate])
+        filled.add(screw.coordinate)
+    for coordinate in set(range(jacobian.shape[1])) - filled:
+        jacobian[:, coordinate] = 0.0
+
+
+def _store_twist(screw, target, levers, twist):
+    axis, origin = screw.axis, screw.origin
+    linear, angular = twist[:3], twist[3:]
+    if screw.kind == "T":
+        _store(axis, linear)
+        angular[:] = 0.0
+    elif origin is None:
+        linear[:] = 0.0
+        _store(axis, angular)
+    else:
+        # Joints that meet in one point, as in a spherical wrist, share their lever.
+        if id(origin) not in levers:
+            levers[id(origin)] = [_product_difference(1.0, p, 1.0, o) for p, o in zip(target, origin, strict=True)]
+        _store_cross(axis, levers[id(origin)], linear)
+        _store(axis, angular)
+    if screw.sign < 0:
+        twist *= -1.0
 
 
 def _store(vector, out):

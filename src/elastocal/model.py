@@ -2,7 +2,8 @@
 
 Effects move the robot through the coordinates of its `Sites`; the exact kinematics of that chain predicts every reading, and
 the chain's Jacobian times the displacement per parameter is the sensitivity. Residuals are in base axes, whatever frame was
-measured in.
+measured in. Springs yield to the total load, the external one and the weight that the robot file declares, taken where the
+robot has yielded to it.
 """
 
 from dataclasses import dataclass, replace
@@ -10,9 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.effects import declared_weight
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.effects.protocol import Parameter, circumstances_of
-from elastocal.kinematics import pose_differences, poses_and_jacobians_of_points, poses_of_points
+from elastocal.effects.protocol import MASS_PARAMETERS, Circumstances, Parameter, at_coordinates, circumstances_of, with_springs
+from elastocal.kinematics import motion, pose_differences, poses_of_points
 from elastocal.sites import Sites, sites_of
 
 _LENGTH = ("dx", "dy", "dz")
@@ -21,6 +23,11 @@ _TURN = ("rx", "ry", "rz")
 _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 # Relative step of the central difference in a shape parameter.
 _SHAPE_STEP = 1e-4
+# Of the forward difference in what loads the springs, in plausible sizes: laws of gears bend little over that.
+_SPRING_STEP = 1e-4
+# Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
+# 3 kN, from ten micrometres at the commanded pose.
+_PASSES = 2
 
 
 @dataclass(frozen=True)
@@ -39,9 +46,11 @@ class Model:
     nominal_compliance : ndarray (n,)
         rad/(N m).
     effects : tuple of Candidate
-        Joint compliances, where they are identified, among them.
+        Joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
     time_zero_s : float
         From which effects count the time: the first reading to be fitted.
+    row_span : (int, int) or None
+        First and last row of the readings to be fitted, between which the campaign made its progress.
     """
 
     sites: Sites
@@ -51,6 +60,7 @@ class Model:
     nominal_compliance: np.ndarray
     effects: tuple = ()
     time_zero_s: float = 0.0
+    row_span: tuple | None = None
 
     @property
     def identifies_compliance(self):
@@ -108,11 +118,14 @@ class Linearization:
         Of each target with respect to the coordinates of the sites.
     sensitivities : ndarray (M, rows, P)
         With respect to `parameters`.
+    circumstances : Circumstances
+        Where the robot has yielded to, by this estimate.
     """
 
     residual: np.ndarray
     coordinate_jacobian: np.ndarray
     sensitivities: np.ndarray
+    circumstances: Circumstances
 
 
 def declared_model(campaign, effects=()):
@@ -128,16 +141,18 @@ def declared_model(campaign, effects=()):
     -------
     Model
     """
-    sites = sites_of(campaign.robot.chain)
+    sites = sites_of(campaign.robot)
     springs = (joint_compliance(sites),) if campaign.compliance == "identify" else ()
+    weight = (declared_weight.candidate(sites),) if sites.masses else ()
     return Model(
         sites,
         campaign.targets,
         campaign.frame == "tracker",
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
-        (*springs, *effects),
+        (*springs, *weight, *effects),
         0.0 if campaign.readings.time_s is None else float(campaign.readings.time_s.min()),
+        (int(campaign.readings.row.min()), int(campaign.readings.row.max())) if len(campaign.readings) else None,
     )
 
 
@@ -148,22 +163,39 @@ def circumstances(model, estimate, states):
     ----------
     model : Model
     estimate : Estimate
-        Its joint compliances, where they are parameters, turn loads into deflections.
+        Its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are taken.
     states : States
 
     Returns
     -------
     Circumstances
     """
-    return circumstances_of(model.sites, joint_compliances(model, estimate), states, model.time_zero_s)
+    compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
+    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span)
+    for _ in range(_PASSES):
+        around = at_coordinates(around, displaced_coordinates(model, estimate, around))
+    return around
 
 
 def joint_compliances(model, estimate):
     """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones where they are parameters."""
+    return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
+
+
+def mass_corrections(model, estimate):
+    """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Circumstances`."""
+    return _values_of(declared_weight.EFFECT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
+
+
+def _values_of(name, model, estimate, otherwise):
     for effect, values in zip(model.effects, estimate.coefficients, strict=True):
-        if effect.effect == "joint_compliance":
+        if effect.effect == name:
             return values
-    return model.nominal_compliance
+    return otherwise
+
+
+def _with_springs_of(model, estimate, circumstances):
+    return with_springs(circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
 
 
 def parameters(model, estimate):
@@ -276,19 +308,22 @@ def linearize(model, estimate, observations, circumstances):
     -------
     Linearization
     """
-    coordinates = displaced_coordinates(model, estimate, circumstances)
-    count, rows = len(observations), model.rows
-    position, rotation, at_points = poses_and_jacobians_of_points(model.sites.chain, coordinates, _points(model, estimate))
-    seen = observations.target, observations.state
-    position, rotation = position[seen], rotation[seen]
+    around = _with_springs_of(model, estimate, circumstances)
+    coordinates = displaced_coordinates(model, estimate, around)
+    count, rows, chain, points = len(observations), model.rows, model.sites.chain, _points(model, estimate)
+    moved = motion(chain, coordinates, (*model.sites.followed, *points))
+    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+    # Component first, so that every effect's arithmetic runs along the observations.
+    jacobian = np.empty((rows, chain.coordinates, count))
+    for index, point in enumerate(points):
+        seen = np.flatnonzero(observations.target == index)
+        state, number = observations.state[seen], len(model.sites.followed) + index
+        at = moved.position[number][:, state]
+        position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
+        jacobian[..., seen] = moved.jacobian(point.after, at, rows, state)
     residual = _differences(
         measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
     )
-    # Component first, so that every effect's arithmetic runs along the observations.
-    jacobian = np.empty((rows, model.sites.chain.coordinates, count))
-    for index, at_point in enumerate(at_points):
-        mask = observations.target == index
-        jacobian[..., mask] = np.moveaxis(at_point, 0, -1)[:rows][..., observations.state[mask]]
     jacobian = np.moveaxis(jacobian, -1, 0)
     columns = []
     if model.fitted_frames:
@@ -300,10 +335,14 @@ def linearize(model, estimate, observations, circumstances):
         if target.offset_m is None:
             columns.append(_target_columns(rotation, observations.target == index, rows))
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        columns.append(effect_columns([(effect, shapes)], circumstances, jacobian, observations.state))
-        columns.append(_shape_columns(effect, values, shapes, circumstances, jacobian, observations.state))
+        if effect.effect in _SPRINGS:
+            laws = _spring_laws(effect, model, estimate, around)
+        else:
+            laws = effect.displacement(around, *shapes)
+        columns.append(_columns(laws, jacobian, observations.state))
+        columns.append(_shape_columns(effect, values, shapes, around, jacobian, observations.state))
     sensitivities = np.concatenate(columns, axis=-1) if columns else np.empty((count, rows, 0))
-    return Linearization(residual, jacobian, sensitivities)
+    return Linearization(residual, jacobian, sensitivities, replace(around, motion=moved))
 
 
 def effect_columns(effects, circumstances, coordinate_jacobian, state):
@@ -323,6 +362,10 @@ def effect_columns(effects, circumstances, coordinate_jacobian, state):
     ndarray (M, rows, D)
     """
     laws = [law for effect, shapes in effects for law in effect.displacement(circumstances, *shapes)]
+    return _columns(laws, coordinate_jacobian, state)
+
+
+def _columns(laws, coordinate_jacobian, state):
     columns = np.empty((coordinate_jacobian.shape[1], len(laws), len(state)))
     jacobian = np.moveaxis(coordinate_jacobian, 0, -1)
     for number, law in enumerate(laws):
@@ -337,15 +380,62 @@ def displaced_coordinates(model, estimate, circumstances):
     -------
     ndarray (S, C)
     """
-    displaced = np.zeros((len(circumstances.joint_angles), model.sites.chain.coordinates))
-    displaced[:, : model.sites.joints] = circumstances.joint_angles
+    around = _with_springs_of(model, estimate, circumstances)
+    displaced = np.zeros((len(around.joint_angles), model.sites.chain.coordinates))
+    displaced[:, : model.sites.joints] = around.joint_angles
     if not model.identifies_compliance:
-        displaced[:, : model.sites.joints] += circumstances.load[:, : model.sites.joints] * model.nominal_compliance
+        displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        for value, law in zip(values, effect.displacement(circumstances, *shapes), strict=True):
-            for coordinate, per_unit in law.items():
-                displaced[:, coordinate] += value * per_unit
+        # The errors of masses are part of the total load.
+        if effect.effect != declared_weight.EFFECT:
+            _displace(displaced, effect, values, shapes, around)
     return displaced
+
+
+def _displace(displaced, effect, values, shapes, around):
+    for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
+        for coordinate, per_unit in law.items():
+            displaced[:, coordinate] += value * per_unit
+
+
+# Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
+_SPRINGS = ("joint_compliance", declared_weight.EFFECT)
+
+
+def _spring_laws(spring, model, estimate, around):
+    """Displacements per unit of compliances or of errors of masses, with all that they do by way of other effects."""
+    laws = spring.displacement(around)
+    through = _through_compliance if spring.effect == "joint_compliance" else _through_load
+    others = [found for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True) if through(found[0])]
+    if not others:
+        return laws
+
+    def of_others(springs):
+        displaced = np.zeros_like(around.load)
+        for other in others:
+            _displace(displaced, *other, springs)
+        return displaced
+
+    values, present = joint_compliances(model, estimate), of_others(around)
+    corrections = mass_corrections(model, estimate)
+    for number, parameter in enumerate(spring.parameters):
+        step = np.zeros(len(laws))
+        step[number] = _SPRING_STEP * parameter.plausible
+        moved = (values + step, corrections) if spring.effect == "joint_compliance" else (values, corrections + step)
+        change = (of_others(with_springs(around, *moved)) - present) / step[number]
+        for coordinate in np.flatnonzero(change.any(axis=0)):
+            laws[number][coordinate] = laws[number].get(coordinate, 0.0) + change[:, coordinate]
+    return laws
+
+
+def _through_compliance(effect):
+    """Whether an effect is a load that the joint compliances turn into angles."""
+    return effect.family in ("gravity", "load")
+
+
+def _through_load(effect):
+    """Whether an effect goes with the total load."""
+    return "load" in effect.needs and effect.effect not in _SPRINGS
 
 
 def stepped(model, estimate, step):

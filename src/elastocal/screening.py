@@ -13,6 +13,7 @@ from scipy.linalg import cho_solve
 from scipy.sparse import csr_matrix
 from scipy.stats import f as f_distribution
 
+from elastocal.effects.protocol import offered
 from elastocal.model import effect_columns, linearize
 
 # A candidate whose sensitivities keep less than this share off the model's own cannot be told.
@@ -110,7 +111,7 @@ def directions(fitted, observations, candidates, least_retained=LEAST_RETAINED, 
     basis = np.linalg.qr(known)[0]
     residual = fitted.whitened(line.residual).reshape(-1)
     residual = residual - basis @ (basis.T @ residual)
-    lacking = {candidate.key: _lacks(candidate, observations.states) for candidate in candidates}
+    lacking = {candidate.key: _lacks(candidate, fitted.model.sites, observations.states) for candidate in candidates}
     tested, columns, retained, strength = [], [], [], []
     untestable = {key: reason for key, reason in lacking.items() if reason}
     for candidate in candidates:
@@ -328,15 +329,9 @@ def _tail(statistic, rest, parameters, freedom):
     return f_distribution.sf(ratio, parameters, freedom - parameters)
 
 
-def _lacks(candidate, states):
+def _lacks(candidate, sites, states):
     """Why the data cannot tell a candidate at all; empty where they might."""
-    there = {
-        "load": bool(states.wrench.any()),
-        "approach": states.approach is not None and bool(states.approach.any()),
-        "time": states.time_s is not None and np.ptp(states.time_s) > 0,
-        "temperature": states.temperature_c is not None and np.ptp(states.temperature_c) > 0,
-    }
-    missing = sorted(need for need in candidate.needs if not there[need])
+    missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
     for joint in candidate.joints if candidate.distinct_angles else ():
@@ -350,4 +345,4 @@ def _shapes_tried(candidate):
     if not candidate.shapes:
         return [np.zeros(0)]
     (shape,) = candidate.shapes
-    return [np.array([value]) for value in np.geomspace(shape.lowest, shape.highest, _SHAPES_TRIED + 2)[1:-1]]
+    return [np.array([value]) for value in shape.values(_SHAPES_TRIED)]

@@ -18,7 +18,7 @@ def candidates(sites):
     tx, ty, tz, rx, ry, _ = sites.base
 
     def displacement(circumstances):
-        load = circumstances.load
+        load = circumstances.total
         return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
 
     def rocking(circumstances):

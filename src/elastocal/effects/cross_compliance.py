@@ -16,7 +16,7 @@ def candidates(sites):
 
     def of(one, other):
         def displacement(circumstances):
-            return [{one: circumstances.load[:, other], other: circumstances.load[:, one]}]
+            return [{one: circumstances.total[:, other], other: circumstances.total[:, one]}]
 
         return Candidate(NAME, FAMILY, (one + 1, other + 1), "", _PARAMETERS, displacement, frozenset({"load"}))
 

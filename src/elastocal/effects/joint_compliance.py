@@ -10,7 +10,7 @@ def candidate(sites):
     """Compliances of all joints as one candidate."""
 
     def displacement(circumstances):
-        return [{joint: circumstances.load[:, joint]} for joint in range(sites.joints)]
+        return [{joint: circumstances.total[:, joint]} for joint in range(sites.joints)]
 
     parameters = tuple(Parameter(f"c{joint + 1}", "rad/(N m)", 1e-5) for joint in range(sites.joints))
     return Candidate("joint_compliance", "declared", (), "", parameters, displacement, frozenset({"load"}))

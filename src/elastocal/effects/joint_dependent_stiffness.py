@@ -16,7 +16,7 @@ def candidates(sites):
 
     def at(joint):
         def displacement(circumstances):
-            angle, torque = circumstances.joint_angles[:, joint], circumstances.load[:, joint]
+            angle, torque = circumstances.joint_angles[:, joint], circumstances.total[:, joint]
             return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))

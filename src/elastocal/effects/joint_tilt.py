@@ -17,7 +17,7 @@ def candidates(sites):
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
         def displacement(circumstances):
-            return [{c: circumstances.load[:, c]} for c in coordinates]
+            return [{c: circumstances.total[:, c]} for c in coordinates]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
 

@@ -29,7 +29,7 @@ def _candidate(sites, links, detail):
     def displacement(circumstances):
         bent, twisted = {}, {}
         for link in links:
-            bending, torsion = _deflection(sites, link, circumstances.load)
+            bending, torsion = _deflection(sites, link, circumstances.total)
             bent |= bending
             twisted |= torsion
         return [bent, twisted]

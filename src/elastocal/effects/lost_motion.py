@@ -21,7 +21,7 @@ def candidates(sites):
         taken_up = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
         def displacement(circumstances, torque):
-            return [{joint: np.tanh(circumstances.load[:, joint] / torque)}]
+            return [{joint: np.tanh(circumstances.total[:, joint] / torque)}]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}), (taken_up,))
 

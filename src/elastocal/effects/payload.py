@@ -5,7 +5,7 @@ Catalogue row 9: theta = c J^T w of the tool's weight. Linear in mass and mass t
 
 import numpy as np
 
-from elastocal.effects.protocol import STANDARD_GRAVITY, Candidate, Parameter
+from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "payload", "gravity"
 _PARAMETERS = (Parameter("mass", "kg", 10.0), *(Parameter(f"moment_{axis}", "kg m", 2.0) for axis in "xyz"))
@@ -13,12 +13,12 @@ _PARAMETERS = (Parameter("mass", "kg", 10.0), *(Parameter(f"moment_{axis}", "kg 
 
 def displacement(circumstances):
     """Joint deflections per kilogram at the end-effector, and per kilogram metre along its axes."""
-    down = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    gravity = np.array(circumstances.sites.gravity_m_s2)
     levers = [np.zeros_like(circumstances.wrench[:, :3]), *np.moveaxis(circumstances.end_rotation, -1, 0)]
     columns = []
     for lever, mass in zip(levers, (1.0, 0.0, 0.0, 0.0), strict=True):
-        force = np.broadcast_to(mass * down, lever.shape)
-        turned = circumstances.joint_deflections(np.concatenate([force, np.cross(lever, down)], axis=-1))
+        force = np.broadcast_to(mass * gravity, lever.shape)
+        turned = circumstances.joint_deflections(np.concatenate([force, np.cross(lever, gravity)], axis=-1))
         columns.append(dict(enumerate(turned.T)))
     return columns
 

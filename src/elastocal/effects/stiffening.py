@@ -24,7 +24,7 @@ def _cubic(sites, joint):
     cubic = Parameter("cubic", "rad/(N m)^3", _MOVED_M / lever_m(sites, joint) / full**3, sign=-1)
 
     def displacement(circumstances):
-        return [{joint: circumstances.load[:, joint] ** 3}]
+        return [{joint: circumstances.total[:, joint] ** 3}]
 
     return Candidate(NAME, FAMILY, (joint + 1,), "", (cubic,), displacement, frozenset({"load"}))
 
@@ -35,7 +35,7 @@ def _two_slopes(sites, joint):
     meeting = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
     def displacement(circumstances, torque):
-        load = circumstances.load[:, joint]
+        load = circumstances.total[:, joint]
         return [{joint: load - np.clip(load, -torque, torque)}]
 
     return Candidate(NAME, FAMILY, (joint + 1,), "two slopes", (beyond,), displacement, frozenset({"load"}), (meeting,))

@@ -66,7 +66,7 @@ def case_from(descriptions, columns):
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = described_campaign(descriptions["campaign"], robot, readings_from(columns), source)
-    sites = sites_of(robot.chain)
+    sites = sites_of(robot)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
     return Case(campaign, averaged(without_wild_repeats(campaign.readings)), model, candidates)
