@@ -260,6 +260,7 @@ def everything(arm):
     tubes = {k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3)}
     return Structure(
         base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
+        flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
         tilt={1: (1e-7, 1e-7), 4: (2e-7, 2e-7)},
         tubes=tubes,
         masses=(Mass(2, 300.0), Mass(3, 200.0, 0.4, (0.0, 0.0, 0.1))),

@@ -28,6 +28,8 @@ COMPARABLE = {
     "transmission_ratio": 0.02,
     "joint_tilt": 0.02,
     "cross_compliance": 0.02,
+    "flange_flexibility": 0.02,
+    "tracker_scale": 0.02,
     # A dead band with edges is not a tanh where the torque is small.
     "lost_motion": 0.3,
     "force_scale": 0.02,
@@ -79,6 +81,8 @@ def test_a_defects_readings_depend_on_its_seed_and_on_nothing_else(fanuc_specime
 def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(weightless, schedule, kind):
     """Class A of the catalogue at load zero; the elastic, the gearbox but for hysteresis, and the load not."""
     defect = drawn_defect(kind, weightless.arm, 3)
+    # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
+    schedule = replace(schedule, time_s=3.0 * schedule.time_s)
     unloaded = schedule.load == 0
     change = np.abs(seen_poses(with_defects(weightless, [defect]), schedule)[0] - seen_poses(weightless, schedule)[0]).max(
         axis=(1, 2)
@@ -199,7 +203,7 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
 @pytest.mark.parametrize("joint", [1, 4])
 def test_a_runout_moves_what_turns_with_the_joint_by_the_circle_of_its_axis(weightless, schedule, joint):
     """And by its lean: at the joint itself by no more than the size."""
-    bad = with_defects(weightless, [Defect("outside:bearing_runout", (joint,), 3e-5, 2)])
+    bad = with_defects(weightless, [Defect("bearing_runout", (joint,), 3e-5, 2)])
     # Under a load the levers change too.
     bare = schedule.load == 0
     change = np.linalg.norm(seen_poses(bad, schedule)[0] - seen_poses(weightless, schedule)[0], axis=2)[bare]

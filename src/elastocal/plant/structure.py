@@ -77,6 +77,8 @@ class Structure:
     ----------
     base : tuple of float or None
         Compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)).
+    flange : tuple of float or None
+        Compliances between the last stretch and the flange along x, y, z (m/N) and about x, y, z (rad/(N m)) of its frame.
     tilt : dict of int to (float, float)
         Of a joint, from 1: compliances across its axis, rad/(N m), in the order of the remaining axes.
     loose : tuple of int
@@ -96,6 +98,7 @@ class Structure:
     """
 
     base: tuple | None = None
+    flange: tuple | None = None
     tilt: dict = field(default_factory=dict)
     loose: tuple = ()
     tubes: dict = field(default_factory=dict)
