@@ -1,8 +1,8 @@
 """Wrong ratio of a gear, or coupling from a joint before it: theta_i = e_i q_i + e_ih q_h.
 
 Catalogue row 17, kinematic part: linear in the angle and not periodic. Any joint may be coupled to the one before it. In a
-wrist whose last two motors sit in the forearm and drive through hollow shafts both follow the first wrist joint (Spong,
-Hutchinson and Vidyasagar 2006, 3.3): the last one from two joints before it.
+wrist whose last two motors sit in the forearm and drive through hollow shafts both follow the first wrist joint: the last one
+is coupled to the joint two before it.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter
