@@ -364,9 +364,21 @@ def offered(sites, states):
     return frozenset(name for name, present in there.items() if present)
 
 
-def per_joint(sites, make):
-    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each joint."""
-    return [make(joint) for joint in range(sites.joints)]
+def per_joint(sites, make, prismatic=False):
+    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
+
+    Parameters
+    ----------
+    sites : Sites
+    make : callable
+    prismatic : bool
+        Whether the effect has a meaning for prismatic joints; most of them are about what turns.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    return [make(joint) for joint in range(sites.joints) if prismatic or not sites.prismatic[joint]]
 
 
 def by_warmth(candidate_of):

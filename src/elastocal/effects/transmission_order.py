@@ -19,7 +19,7 @@ _STEP = 0.75
 
 def candidates(sites):
     """One candidate a joint and band."""
-    return [_candidate(joint, low, high) for joint in range(sites.joints) for low, high in _BANDS]
+    return [_candidate(joint, low, high) for joint in range(sites.joints) if not sites.prismatic[joint] for low, high in _BANDS]
 
 
 def _candidate(joint, low, high):
