@@ -301,6 +301,36 @@ def test_another_seed_holds_out_other_poses(cell):
     assert len(found) > 1
 
 
+def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
+    found = set()
+    for seed in range(20):
+        cell.document["holdout"] = {"blocks": 3, "seed": seed}
+        training, held_out = split(cell.read())
+        assert poses_of(training).isdisjoint(poses_of(held_out))
+        found.add(frozenset(poses_of(held_out)))
+    # Blocks part the poses: whatever the seed, it is one of three, which together are all.
+    assert len(found) == 3 and sum(map(len, found)) == POSES == len(frozenset.union(*found))
+    cell.document["holdout"] = {"blocks": 3}
+    assert cell.read().holdout == {"blocks": 3, "seed": 1}
+
+
+def test_a_block_does_not_depend_on_the_order_of_the_rows(cell):
+    cell.document["holdout"] = {"blocks": 3, "seed": 2}
+    before = poses_of(split(cell.read())[1])
+    order = np.random.default_rng(1).permutation(len(cell.table["pose"]))
+    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
+    assert poses_of(split(cell.read())[1]) == before
+
+
+@pytest.mark.parametrize("named", [7, [7]])
+def test_sessions_are_held_out_as_a_whole(cell, named):
+    with_sessions(cell)
+    cell.document["holdout"] = {"session": named}
+    training, held_out = split(cell.read())
+    assert {session for session, _ in poses_of(held_out)} == {7}
+    assert {session for session, _ in poses_of(training)} == {0}
+
+
 def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
     with_sessions(cell)
     cell.document["holdout"] = {"poses": [4, [7, 2]]}
@@ -388,6 +418,16 @@ def test_other_campaign_that_is_not_there_is_refused(cell):
         ({"holdout": {"poses": [3]}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
         ({"holdout": {"poses": [1, 2, 3, 4, 5, 6]}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
         ({"holdout": {"fraction": 0.6}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
+        ({"holdout": {"fraction": 0.3, "blocks": 3}}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
+        ({"holdout": {"session": 0, "seed": 1}}, "holdout", ["session, seed together", "{session}"]),
+        ({"holdout": {"blocks": 1}}, "holdout.blocks", ["found 1", "2 or more"]),
+        ({"holdout": {"blocks": 2.5}}, "holdout.blocks", ["2.5", "integer"]),
+        ({"holdout": {"blocks": 11}}, "holdout.blocks", ["11", "at most as many as poses, 10"]),
+        ({"holdout": {"blocks": 9}}, "holdout", ["1 held out", "2 held out"]),
+        ({"holdout": {"session": 3}}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
+        ({"holdout": {"session": [0, "x"]}}, "holdout.session[1]", ["'x'", "integer"]),
+        ({"holdout": {"session": []}}, "holdout.session", ["session"]),
+        ({"holdout": {"session": 0}}, "holdout", ["0 poses to fit and 10 held out"]),
         ({"holdout": {"fraction": 0.1}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
     ],
 )

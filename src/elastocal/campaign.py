@@ -13,12 +13,14 @@ import yaml
 
 from elastocal.documents import check_document, read_document
 from elastocal.errors import InputError
+from elastocal.joint_space import blocks
 from elastocal.measurements import CSV, PARQUET, check_column_names, closest_first, read_measurements, shown, write_measurements
 from elastocal.robot import Robot, robot_from_document
 from elastocal.whole_files import appearing_whole
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
+HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 
@@ -127,7 +129,7 @@ class Campaign:
     noise : dict or None
         ``position_m`` and maybe ``orientation_rad``, where the campaign declares them.
     holdout : dict
-        ``fraction`` and ``seed``, or ``poses``, or ``campaign``.
+        ``fraction`` and ``seed``, ``blocks`` and ``seed``, ``session``, ``poses`` or ``campaign``.
     readings : Readings
     """
 
@@ -421,15 +423,16 @@ def _targets(described, chain, source):
 
 
 def _holdout(described, folder, source):
-    ways = [way for way in ("fraction", "poses", "campaign") if way in described]
-    if len(ways) != 1 or ("seed" in described and ways != ["fraction"]):
-        allowed = "one of {fraction, seed}, {poses} or {campaign}"
+    ways = [way for way in HOLDOUTS if way in described]
+    drawn = ways in (["fraction"], ["blocks"])
+    if len(ways) != 1 or ("seed" in described and not drawn):
+        allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"
         raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
     if "campaign" in described and not (folder / described["campaign"] / DOCUMENT).is_file():
         raise InputError(
             source, "holdout.campaign", repr(described["campaign"]), f"a folder with a {DOCUMENT}, relative to this one"
         )
-    return {"fraction": described["fraction"], "seed": described.get("seed", 1)} if ways == ["fraction"] else dict(described)
+    return {"seed": 1} | described if drawn else dict(described)
 
 
 def _poses(readings):
@@ -442,11 +445,24 @@ def _poses(readings):
 def _held_out(holdout, readings, source):
     """Mask (N,) of the readings that are held out."""
     pairs, index = _poses(readings)
-    total, chosen = len(pairs), np.zeros(len(pairs), bool)
+    total = len(pairs)
     if "campaign" in holdout:
         if total < FEWEST_TRAINING_POSES:
             raise InputError(source, "holdout", f"{total} poses to fit", f"{FEWEST_TRAINING_POSES} or more poses")
-        return chosen[index]
+        return np.zeros(len(index), bool)
+    chosen = _chosen_poses(holdout, readings, pairs, index, source)
+    held_out = int(chosen.sum())
+    if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
+        found = f"{total - held_out} poses to fit and {held_out} held out"
+        raise InputError(
+            source, "holdout", found, f"at least {FEWEST_TRAINING_POSES} to fit and {FEWEST_HELD_OUT_POSES} held out"
+        )
+    return chosen[index]
+
+
+def _chosen_poses(holdout, readings, pairs, index, source):
+    """Mask (P,) of the poses that are held out; `pairs` and `index` as of `_poses`."""
+    total, chosen = len(pairs), np.zeros(len(pairs), bool)
     if "poses" in holdout:
         for entry in holdout["poses"]:
             match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
@@ -455,16 +471,24 @@ def _held_out(holdout, readings, source):
                     source, "holdout.poses", str(entry), f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
                 )
             chosen |= match
-    else:
-        order = np.random.Generator(np.random.PCG64(holdout["seed"])).permutation(total)
-        chosen[order[: round(holdout["fraction"] * total)]] = True
-    held_out = int(chosen.sum())
-    if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
-        found = f"{total - held_out} poses to fit and {held_out} held out"
-        raise InputError(
-            source, "holdout", found, f"at least {FEWEST_TRAINING_POSES} to fit and {FEWEST_HELD_OUT_POSES} held out"
-        )
-    return chosen[index]
+        return chosen
+    if "session" in holdout:
+        wanted, there = np.atleast_1d(holdout["session"]), np.unique(pairs[:, 0])
+        for session in wanted:
+            if session not in there:
+                raise InputError(
+                    source, "holdout.session", str(session), f"sessions that were measured: {', '.join(map(str, there))}"
+                )
+        return np.isin(pairs[:, 0], wanted)
+    draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
+    if "blocks" in holdout:
+        if holdout["blocks"] > total:
+            raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as poses, {total}")
+        middle = np.zeros((total, readings.joint_angles.shape[1]))
+        np.add.at(middle, index, readings.joint_angles)
+        return blocks(middle / np.bincount(index)[:, None], holdout["blocks"]) == draws.integers(holdout["blocks"])
+    chosen[draws.permutation(total)[: round(holdout["fraction"] * total)]] = True
+    return chosen
 
 
 def _readings(table, robot, targets):

@@ -1,6 +1,6 @@
 """Faults of the data, looked for before any physics."""
 
-from elastocal.faults.catalogue import known_faults
+from elastocal.faults.catalogue import fault_modules
 
 
 def faults(campaign, readings):
@@ -16,8 +16,12 @@ def faults(campaign, readings):
     tuple of Fault
         A fault is not looked for where another one makes that meaningless: see `faults.protocol`.
     """
-    found = []
-    for module in known_faults().values():
-        if not {fault.name for fault in found} & set(module.AFTER):
-            found += module.find(campaign, readings)
+    found, decisive = [], set()
+    for name, module in fault_modules().items():
+        if decisive & set(module.AFTER):
+            continue
+        new = module.find(campaign, readings)
+        found += new
+        if any(fault.decisive for fault in new):
+            decisive.add(name)
     return tuple(found)

@@ -19,6 +19,8 @@ from elastocal.observations import each_approach, without_wild_repeats
 FEWEST_FOR_JOINTS = 60
 # Fewer than this say nothing of their own.
 FEWEST = 9
+# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
+FINEST = 1e-8
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
 # power.
 _UPPER = 0.8
@@ -38,6 +40,8 @@ class Noise:
         Repeatability of each joint.
     degrees_of_freedom : int
         Contrasts of repeats behind the figures; 0 where they are declared.
+    pose_rad : float
+        Error of each joint that all readings of a pose have in common.
     """
 
     source: str
@@ -45,6 +49,21 @@ class Noise:
     orientation_rad: float
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
+    pose_rad: float = 0.0
+
+    @property
+    def of_readings(self):
+        """The same without what the readings of a pose have in common."""
+        return replace(self, pose_rad=0.0)
+
+    def scaled(self, factor):
+        """The same with the noise of single readings multiplied."""
+        return replace(
+            self,
+            position_m=factor * self.position_m,
+            orientation_rad=factor * self.orientation_rad,
+            joint_rad=factor * self.joint_rad,
+        )
 
 
 def declared_noise(campaign):
@@ -68,7 +87,7 @@ def noise_from_repeats(model, estimate, readings):
     Returns
     -------
     Noise or None
-        None where there are too few repeats.
+        None where there are too few repeats, or where they do not differ at all.
     """
     contrasts, jacobians = _contrasts(model, estimate, readings)
     total = sum(part.size for part in contrasts)
@@ -78,6 +97,9 @@ def noise_from_repeats(model, estimate, readings):
     every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
     position = np.sqrt((every[:, :3] ** 2).mean())
     orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
+    if min(position, orientation) < FINEST:
+        # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
+        return None
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor

@@ -37,6 +37,9 @@ import numpy as np
 from elastocal.errors import InputError
 
 AXES = "xyz"
+# The longest serial arms of the market reach 4.7 m and their lengths, the column's included, sum to 7; any of them written in
+# centimetres, inches or millimetres is beyond this.
+LONGEST_REACH_M = 10.0
 _TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
 _NUMBER = re.compile(r"\d+(\.\d*)?|\.\d+")
 # Standard acceleration (ISO 80000-3), on a floor.
@@ -424,9 +427,10 @@ def robot_from_document(document, source="robot"):
     Raises
     ------
     InputError
-        Where the chain does not parse or a list has another length than the robot has joints.
+        Where the chain does not parse or reaches farther than any machine, or a list has another length than there are joints.
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
+    _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
     n = chain.coordinates
     if len(document["compliance_urad_per_Nm"]) != n:
         found = f"{len(document['compliance_urad_per_Nm'])} entries"
@@ -555,6 +559,13 @@ def _compensator(described, joints, source):
     if described["joint"] > joints:
         raise InputError(source, "compensator.joint", str(described["joint"]), f"a joint from 1 to {joints}")
     return Compensator(**described)
+
+
+def _check_reach(chain, key, source):
+    reach = sum(abs(transform.constant) for transform in chain.transforms if transform.kind == "T")
+    if reach > LONGEST_REACH_M:
+        allowed = f"lengths in metres (not millimetres) that reach {LONGEST_REACH_M:g} m at most"
+        raise InputError(source, key, f"a chain that reaches {reach:.4g} m", allowed)
 
 
 def _links(chain, described, source):

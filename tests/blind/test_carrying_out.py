@@ -82,7 +82,7 @@ def test_random_poses_are_read_like_the_proposed_and_others_than_the_campaigns(f
     _, proposed, theirs = first_and_further(folder, "proposed", STATES)
     np.testing.assert_array_equal(after.readings.load[new], proposed.readings.load[theirs])
     force = np.linalg.norm(after.readings.wrench[new, :3], axis=1)
-    np.testing.assert_allclose(force, np.abs(np.array(LADDER)[after.readings.load[new]]) * design_of(CASE).force_N, atol=1e-9)
+    np.testing.assert_allclose(force, np.abs(np.array(LADDER)[after.readings.load[new]]) * 1000.0, atol=1e-9)
     known = {tuple(row) for row in before.readings.joint_angles.round(9)}
     assert not known & {tuple(row) for row in after.readings.joint_angles[new].round(9)}
     low, high = arm_from_file(ROBOTS / "kuka.yaml").limits.T

@@ -11,6 +11,9 @@ def test_right_place_is_the_right_effect_at_the_right_joints():
     document = truth(("joint_offset", 3))
     assert case_row(document, verdict("named", effect("joint_offset", 3)), oracle())["right_place"]
     assert not case_row(document, verdict("named", effect("joint_offset", 4)), oracle())["right_place"]
+    several = truth(("joint_offset", 3), ("joint_offset", 5))
+    assert case_row(several, verdict("named", effect("joint_offset", 3, 5)), oracle())["right_place"]
+    assert not case_row(several, verdict("named", effect("joint_offset", 3)), oracle())["right_place"]
 
 
 @pytest.mark.parametrize(
@@ -32,10 +35,30 @@ def test_worse_is_beyond_two_standard_errors(said, expected):
     assert (row["worse"], row["warned"], row["worse_unwarned"]) == expected
 
 
-def test_standard_error_is_that_of_the_interval():
-    row = case_row(truth(("payload",)), verdict("named", reduction=(0.5 - 0.196, 0.5 + 0.196)), oracle())
+def test_standard_error_is_the_verdicts_own():
+    """The interval of few poses is wider than 1.96 of them on either side, and not in the middle."""
+    said = verdict("named", reduction=(0.2, 0.6))
+    said["heldout"]["reduction_std_error"] = 0.07
+    row = case_row(truth(("payload",)), said, oracle())
     assert row["reduction"] == pytest.approx(0.5)
-    assert row["reduction_std_error"] == pytest.approx(0.1, rel=1e-3)
+    assert row["reduction_std_error"] == 0.07
+
+
+@pytest.mark.parametrize(
+    ("effects", "reduction", "expected"),
+    [
+        ([effect("payload")], (-0.14, -0.06), (True, True)),
+        ([effect("payload")], (-0.25, 0.05), (True, False)),
+        ([], (-0.14, -0.06), (False, False)),
+        ([effect("wrong_unit") | {"family": "data"}], (-0.14, -0.06), (False, False)),
+        ([effect("wrong_unit") | {"family": "data"}, effect("payload")], (-0.14, -0.06), (True, True)),
+    ],
+)
+def test_an_adopted_effect_that_makes_it_worse_counts_whether_warned_of_or_not(effects, reduction, expected):
+    for warnings in ([], ["the held-out rms grew"]):
+        said = verdict("named", *effects, before=1e-4, after=1.1e-4, reduction=reduction, warnings=warnings)
+        row = case_row(truth(("payload",)), said, oracle())
+        assert (row["adopted"], row["worse_adopted"]) == expected
 
 
 def test_exact_aliases_are_told_by_the_truth_and_its_joints():
@@ -46,6 +69,17 @@ def test_exact_aliases_are_told_by_the_truth_and_its_joints():
     ]
     assert rows == [True, True, False, False, True, True, False, False]
     assert ("force_scale", ()) in EXACT_ALIASES
+
+
+def test_an_arm_without_a_compensator_has_no_alias_of_one():
+    place = ("transmission_harmonic", 2)
+    on = {robot: case_row(truth(place, robot=robot), silence(), oracle())["exact_alias"] for robot in ("gp180", "iiwa14")}
+    assert on == {"gp180": True, "iiwa14": False}
+
+
+def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors():
+    row = case_row(truth(("payload",)), verdict("named", effect("wrong_unit")) | {"heldout": None}, oracle())
+    assert np.isnan(row["after_rms_m"]) and not row["worse"]
 
 
 def test_size_is_given_against_the_noise():

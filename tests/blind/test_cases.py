@@ -5,25 +5,37 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal.blind.cases import (
     FOREIGN,
-    LEVELS,
+    HARD,
     NAMED,
+    PROOF,
     SETTINGS,
     SIZES,
+    TUNED,
     Case,
     block_of,
     cases_of,
+    declared_of,
+    defects_of,
     design_of,
     make_case,
     specimen_of,
     write_manifest,
 )
 from elastocal.campaign import read_campaign
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.campaigns import schedule_of
+from elastocal.plant.defects import KINDS, with_defects
+from elastocal.plant.drives import Visits
+from elastocal.plant.physical_robot import seen_poses
+from elastocal.plant.sizing import Yardstick
+from elastocal.plant.weights import centre_std_m
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 
@@ -42,16 +54,49 @@ def made(case, folder):
 
 def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol_asks_for():
     cases = cases_of(SIZES["full"], 1)
-    proof = [case for case in cases if case.robot != "kuka"]
-    assert sum(case.group == "none" for case in proof) >= 500
+    proof = [case for case in cases if case.robot in PROOF]
+    assert sum(case.group == "none" for case in proof) == 1000
+    for setting in HARD:
+        assert sum(not case.effects and case.setting == setting for case in proof) == 200
     for effect in NAMED:
-        for level in LEVELS:
-            assert sum(c.group == "single" and c.effects == (effect,) and c.levels == (level,) for c in proof) >= 40
+        # An arm without a gravity compensator has none that is wrong.
+        for level in (25.0, 50.0, 200.0):
+            found = sum(c.group == "single" and c.effects == (effect,) and c.levels == (level,) for c in proof)
+            assert found == (8 if effect.startswith("compensator") else 16)
     for effect in FOREIGN:
-        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) >= 40
-    assert sum(c.group == "pair" and c.levels == (200.0, 200.0) for c in proof) >= 150
+        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) == 16
+    for level in (50.0, 200.0):
+        assert sum(c.group == "pair" and c.levels == (level, level) for c in proof) == 200
+    for group in ("several_joints", "gear_gravity"):
+        assert sum(c.group == group for c in proof) == 200
     assert {case.setting for case in cases if case.group != "sweep"} == set(SETTINGS)
-    assert {case.robot for case in cases} == {"kuka", "fanuc", "abb"}
+    assert {case.robot for case in cases} == {*PROOF, *TUNED}
+
+
+def test_only_the_full_size_shows_the_robots_of_the_proof():
+    for size in ("smoke", "quick", "development"):
+        assert {case.robot for case in cases_of(SIZES[size], 1)} <= set(TUNED)
+    assert len(cases_of(SIZES["quick"], 1)) <= 150
+
+
+def test_cases_to_develop_on_are_in_no_other_size_even_at_the_same_seed():
+    developed = {case.seed for case in cases_of(SIZES["development"], 1)}
+    assert not developed & {case.seed for size in ("quick", "full") for case in cases_of(SIZES[size], 1)}
+    assert {case.group for case in cases_of(SIZES["development"], 1)} >= {
+        "several_joints",
+        "gear_gravity",
+        "moved",
+        "undeclared",
+    }
+
+
+def test_robots_that_cannot_have_a_compensator_are_those_without_one():
+    for name in (*PROOF, *TUNED):
+        arm = arm_from_file(ROBOTS / f"{name}.yaml")
+        absent = {effect for effect in KINDS if not KINDS[effect].places(arm)}
+        cases = [case for case in cases_of(SIZES["full"], 1) if case.robot == name]
+        assert not absent & {effect for case in cases for effect in (*case.effects, case.rival)}
+        assert absent <= {"compensator_torque", "compensator_stiffness"}
 
 
 def test_names_are_distinct_and_tell_neither_effect_nor_order():
@@ -116,6 +161,71 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert campaign.frame == ("tracker" if setting == "unknown_frame" else "base")
 
 
+def test_weight_is_hidden_where_it_is_the_effect_and_declared_elsewhere(tmp_path):
+    hidden, truth = made(a_case(("link_weight",), (50.0,)), tmp_path)
+    assert not hidden.robot.masses and len(truth["masses"]) in (1, 5)
+    told, truth = made(a_case(("payload",), (50.0,)), tmp_path)
+    assert len(told.robot.masses) == len(truth["masses"]) == 7
+
+
+def test_one_mechanism_at_several_joints_has_its_non_centrality_all_together(tmp_path):
+    case = replace(a_case(("joint_offset",), (200.0,)), group="several_joints")
+    robot, design = specimen_of(case, ROBOTS), design_of(case)
+    sized = defects_of(case, robot, design)
+    joints = [defect.joints for defect, _ in sized]
+    assert len(joints) >= 3 and len(set(joints)) == len(joints)
+    assert {defect.effect for defect, _ in sized} == {"joint_offset"}
+    yardstick = Yardstick(robot, schedule_of(robot.arm, design, case.seed), declared=declared_of(case, robot.arm))
+    together = yardstick.signal(with_defects(robot, [defect for defect, _ in sized]))
+    assert together.retained == pytest.approx(200.0, rel=0.011)
+    _, truth = made(case, tmp_path)
+    assert truth["case"]["effects"] == ["joint_offset"] and len(truth["defects"]) == len(joints)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_gear_defects_under_gravity_sit_at_the_shoulder_or_the_elbow(seed):
+    case = replace(a_case(("stiffening",), (200.0,), seed=seed), group="gear_gravity")
+    ((defect, _),) = defects_of(case, specimen_of(case, ROBOTS), design_of(case))
+    assert defect.joints in ((2,), (3,))
+
+
+def test_an_error_of_the_pose_is_common_to_its_readings_and_other_at_other_poses():
+    case = a_case(setting="pose_common_15urad")
+    robot, design = specimen_of(case, ROBOTS), design_of(case)
+    assert design.repeats == 1 and design.declared_noise == (60e-6, 60e-6)
+    schedule = schedule_of(robot.arm, design, case.seed)
+    visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
+    turn = robot.drives[0](visits)
+    for pose in range(design.poses):
+        assert np.ptp(turn[schedule.pose == pose], axis=0).max() == 0.0
+    each = turn[np.unique(schedule.pose, return_index=True)[1]]
+    # 180 draws: their standard deviation is within 20 % of what it is drawn with in all but one of a thousand seeds.
+    assert each.std() == pytest.approx(1.5e-5, rel=0.2)
+
+
+def test_centres_off_the_line_lie_beyond_what_is_declared_and_three_kilonewtons_are_pulled():
+    usual, off = (specimen_of(a_case(setting=setting), ROBOTS) for setting in ("usual", "off_line_centres"))
+    declared = declared_of(a_case(), usual.arm)
+    moved = [np.subtract(b.aside_m, a.aside_m) for a, b in zip(usual.structure.masses, off.structure.masses, strict=True)]
+    assert 0.03 < np.abs(moved).max() <= 0.06
+    assert max(centre_std_m(mass) for mass in declared) < 0.07
+    schedule = schedule_of(usual.arm, design_of(a_case(setting="force_3kN")), 1)
+    assert np.linalg.norm(schedule.force, axis=1).max() == pytest.approx(3000.0)
+
+
+@pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])
+def test_a_stand_that_is_knocked_moves_all_readings_after_one_row_among_the_training_poses(setting):
+    case = replace(a_case(("outside:moved_setup",), (200.0,), setting=setting), group="moved")
+    robot, design = specimen_of(case, ROBOTS), design_of(case)
+    bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
+    schedule = schedule_of(robot.arm, design, case.seed)
+    change = np.abs(seen_poses(bad, schedule)[0] - seen_poses(robot, schedule)[0]).max(axis=(1, 2))
+    first = int(np.argmax(change > 1e-9))
+    assert (change[:first] < 1e-12).all() and (change[first:] > 1e-6).all()
+    poses = np.unique(schedule.pose[schedule.training & (np.arange(len(change)) < first)]).size
+    assert 2 <= poses <= 12
+
+
 def test_repeatability_scatters_the_joints_of_a_robot_by_its_setting():
     laws = specimen_of(a_case(setting="repeatability"), ROBOTS).drives
     assert len(laws) == 1
@@ -135,7 +245,7 @@ def test_nothing_of_the_truth_lies_in_the_blind_folder(tmp_path):
     case = a_case(("lost_motion",), (50.0,), seed=187654321)
     made(case, tmp_path)
     files = sorted(path.name for path in (tmp_path / "blind").rglob("*") if path.is_file())
-    assert files == ["campaign.yaml", "measurements.parquet"]
+    assert files == ["campaign.yaml", "measurements.parquet", "robot.yaml"]
     content = b"".join(path.read_bytes() for path in (tmp_path / "blind").rglob("*") if path.is_file())
     for word in (b"lost_motion", b"seed", b"usual", str(case.seed).encode(), tmp_path.name.encode()):
         assert word not in content

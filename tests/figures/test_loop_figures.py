@@ -214,6 +214,7 @@ def test_bars_for_every_model_and_measure():
     for axis, metric in zip(figure.axes, ("mean", "rms", "p95", "max"), strict=True):
         assert [bar.get_width() for bar in axis.patches] == pytest.approx([1e6 * step[f"heldout_{metric}_m"] for step in steps])
         assert len([line for line in axis.lines if line.get_gid() == "interval"]) == len(steps)
+        assert len([line for line in axis.lines if line.get_gid() == "open interval"]) == (len(steps) if metric == "p95" else 0)
         assert len([line for line in axis.lines if line.get_gid() == "noise floor"]) == 1
     assert [bool(bar.get_hatch()) for bar in figure.axes[0].patches] == [False, False, False, True]
 

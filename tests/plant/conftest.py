@@ -15,7 +15,7 @@ else:
     arms, campaigns, robots = (import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot"))
 
 
-@pytest.fixture(scope="session", params=["kuka", "fanuc", "abb"])
+@pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
 def name(request):
     """Each robot of the blind proof in turn."""
     return request.param
@@ -34,6 +34,12 @@ def fanuc_arm():
 @pytest.fixture(scope="session")
 def fanuc_specimen(fanuc_arm):
     return robots.specimen(fanuc_arm, 4)
+
+
+@pytest.fixture(scope="session")
+def weightless(fanuc_arm):
+    """The same, of an arm that weighs nothing: what only its loads and defects do."""
+    return robots.specimen(fanuc_arm, 4, weighs=False)
 
 
 @pytest.fixture(scope="session")

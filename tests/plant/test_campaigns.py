@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import yaml
 from analysed_robots import ROBOTS
 
 from elastocal.campaign import read_campaign, split
@@ -15,10 +16,15 @@ from elastocal.plant.defects import Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.folders import write_blind_campaign, write_truth
 from elastocal.plant.physical_robot import Warmth, seen_poses, specimen
 from elastocal.plant.tracker import Tracker, rotation_vector
+from elastocal.plant.weights import declared_masses
+
+FILES = ["campaign.yaml", "measurements.parquet", "robot.yaml"]
 
 
 def made(folder, robot, design, seed=2, **more):
-    return write_blind_campaign(folder, "case0", "fanuc", robot, design, schedule_of(robot.arm, design, seed), **more)
+    return write_blind_campaign(
+        folder, "case0", ROBOTS / "fanuc.yaml", robot, design, schedule_of(robot.arm, design, seed), **more
+    )
 
 
 def test_the_default_design_is_a_ladder_at_thirty_poses_with_repeats_on_ten(fanuc_arm):
@@ -49,7 +55,7 @@ def test_the_analysis_reads_the_folder_and_holds_out_the_designed_poses(tmp_path
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "abb", "fanuc_cpa"])
 def test_angles_stand_in_the_folder_as_the_controller_shows_them(tmp_path, small, name):
     robot = specimen(arm_from_file(ROBOTS / f"{name}.yaml"), 1)
-    write_blind_campaign(tmp_path / "c", "c", name, robot, small, schedule_of(robot.arm, small, 2))
+    write_blind_campaign(tmp_path / "c", "c", ROBOTS / f"{name}.yaml", robot, small, schedule_of(robot.arm, small, 2))
     readings = read_campaign(tmp_path / "c", ROBOTS).readings
     np.testing.assert_allclose(readings.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
 
@@ -149,11 +155,23 @@ def test_the_folder_is_the_same_whatever_the_truth_but_for_the_readings(tmp_path
     defect = Defect("lost_motion", (2,), 1e-4, 1)
     made(tmp_path / "good", fanuc_specimen, small)
     made(tmp_path / "bad", with_defects(fanuc_specimen, [defect]), small)
-    assert sorted(path.name for path in (tmp_path / "bad").iterdir()) == ["campaign.yaml", "measurements.parquet"]
+    assert sorted(path.name for path in (tmp_path / "bad").iterdir()) == FILES
     assert (tmp_path / "good/campaign.yaml").read_bytes() == (tmp_path / "bad/campaign.yaml").read_bytes()
     content = b"".join(path.read_bytes() for path in (tmp_path / "bad").iterdir())
     for word in (b"lost_motion", b"defect", b"truth", b"seed"):
         assert word not in content
+
+
+def test_the_campaigns_robot_file_tells_the_declared_weights_and_nothing_where_none_are(tmp_path, fanuc_specimen, small):
+    declared = declared_masses(fanuc_specimen.arm)
+    truth = made(tmp_path / "told", fanuc_specimen, small, declared=declared)
+    made(tmp_path / "hidden", fanuc_specimen, small)
+    told, hidden = (yaml.safe_load((tmp_path / name / "robot.yaml").read_text()) for name in ("told", "hidden"))
+    assert [(m["link"], m["mass_kg"]) for m in told["masses"]] == [(m.link, m.mass_kg) for m in declared]
+    assert "masses" not in hidden and hidden == {key: value for key, value in told.items() if key != "masses"}
+    assert told["chain"] == yaml.safe_load((ROBOTS / "fanuc.yaml").read_text())["chain"]
+    off = [abs(m["mass_kg"] / d.mass_kg - 1) for m, d in zip(truth["masses"], declared, strict=True)]
+    assert min(off) > 0 and max(off) < 0.31
 
 
 def test_the_truth_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_specimen):
@@ -177,12 +195,12 @@ def test_castings_warm_up_behind_the_thermometer_and_reach_it():
     np.testing.assert_allclose(1200.0 * slope[5:-5], (shown - castings)[5:-5], atol=0.02)
 
 
-def test_links_grow_in_proportion_to_their_castings_warmth(fanuc_specimen, small):
-    schedule = schedule_of(fanuc_specimen.arm, small, 2)
-    grown = seen_poses(replace(fanuc_specimen, expansion_per_K=1e-5), schedule)
-    nominal = seen_poses(fanuc_specimen, schedule)
+def test_links_grow_in_proportion_to_their_castings_warmth(weightless, small):
+    schedule = schedule_of(weightless.arm, small, 2)
+    grown = seen_poses(replace(weightless, expansion_per_K=1e-5), schedule)
+    nominal = seen_poses(weightless, schedule)
     unloaded = schedule.load == 0
-    share = 1e-5 * (fanuc_specimen.warmth.of_castings(schedule.time_s) - 20.0)
+    share = 1e-5 * (weightless.warmth.of_castings(schedule.time_s) - 20.0)
     np.testing.assert_allclose(grown[0][unloaded], (nominal[0] * (1 + share)[:, None, None])[unloaded], atol=1e-12)
     assert np.abs(rotation_vector(grown[1] @ np.swapaxes(nominal[1], -1, -2))[unloaded]).max() < 1e-12
 

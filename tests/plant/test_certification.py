@@ -13,10 +13,13 @@ from support import OTHER_CHAINS, robot_of
 from elastocal.elastostatics import generalized_forces as joint_torques
 from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
 from elastocal.links import extended_chain, spring_compliance
-from elastocal.plant.arm import arm_from_document, arm_from_file
+from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
+from elastocal.plant.campaigns import usual_force_N
 from elastocal.plant.multibody import machine_of
+from elastocal.plant.random_numbers import stream
 from elastocal.plant.statics import Loading, equilibrium, generalized_forces
 from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
+from elastocal.plant.weights import declared_masses, gravity_torque, on_stretches, true_masses
 from elastocal.robot import Link, Tube, stretches
 
 STATES = 100
@@ -40,9 +43,10 @@ def at_rest(arm, angles, wrench, structure=None, compliance=None):
 def deflections(arm, angles, wrench, **more):
     """Of each measuring point, m and rad, ndarray (points, S, 6)."""
     machine, bent = at_rest(arm, angles, wrench, **more)
-    _, position, rotation = generalized_forces(
+    rest = generalized_forces(
         machine, np.where(np.isin(np.arange(machine.model.nq), machine.drive), bent.coordinates, 0.0), loading_of(angles)
     )
+    position, rotation = rest[1].position, rest[1].rotation
     points = range(position.shape[1])
     return np.array(
         [pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p]) for p in points]
@@ -60,7 +64,7 @@ def linear_deflections(chain, coordinates, wrench, compliance):
     return np.array([np.einsum("sij,sj->si", poses_and_jacobians(chain, coordinates, p)[2], turn) for p in chain.points])
 
 
-@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10"])
+@pytest.mark.parametrize("key", ["kuka", "fanuc", "abb", "ur10", "gp180", "iiwa14"])
 def test_poses_without_load_are_those_of_the_kinematics(key):
     arm, robot = arm_from_file(ROBOTS / f"{key}.yaml"), analysed(key)
     angles, wrench = angles_and_wrenches(arm)
@@ -96,16 +100,18 @@ def test_joints_that_turn_backwards_fixed_rotations_and_points_inside_links_are_
 
 def test_joint_springs_deflect_all_points_as_the_reduced_model_to_second_order(arm, name):
     robot = analysed(name)
-    angles, wrench = angles_and_wrenches(arm)
+    angles, wrench = angles_and_wrenches(arm, usual_force_N(arm))
+    # Of a heavy arm under a kilonewton 1; deflections of second order go with its square.
+    more = arm.softness * arm.load_share
     linear = linear_deflections(robot.chain, angles, wrench, np.diag(robot.compliance))
     rest = deflections(arm, angles, wrench) - linear
     metres = np.linalg.norm(rest[..., :3], axis=-1)
     # Second order: theta F L / K, a thousandth of millimetres. The FANUC's first joint is the softest of them.
-    assert np.sqrt((metres**2).mean(axis=1)).max() < 6e-6
-    assert metres.max() < 2.5e-3 * np.linalg.norm(linear[..., :3], axis=-1).max() + 1e-9
+    assert np.sqrt((metres**2).mean(axis=1)).max() < 6e-6 * more**2
+    assert metres.max() < 2.5e-3 * more * np.linalg.norm(linear[..., :3], axis=-1).max() + 1e-9
     halved = deflections(arm, angles, 0.5 * wrench) - 0.5 * linear
     # And nothing of first order: a quarter of it remains at half the force.
-    np.testing.assert_allclose(halved[..., :3], 0.25 * rest[..., :3], atol=2e-8)
+    np.testing.assert_allclose(halved[..., :3], 0.25 * rest[..., :3], atol=2e-8 * more**3)
 
 
 def test_a_tube_in_segments_bends_twists_and_stretches_as_the_catalogues_cantilever():
@@ -184,6 +190,55 @@ def test_weight_turns_the_joints_as_pinocchio_says(arm):
     data = model.createData()
     wanted = -np.array([pin.computeGeneralizedGravity(model, data, row) for row in angles])
     np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.80665), (3.0, -9.0, 2.0)])
+def test_weight_by_levers_is_what_mujocos_model_has_whichever_way_gravity_pulls(arm, gravity):
+    masses = on_stretches(true_masses(declared_masses(arm), stream(1, "test")), arm)
+    machine = machine_of(arm, Structure(masses=masses, gravity_m_s2=gravity))
+    angles, _ = angles_and_wrenches(arm)
+    coordinates = np.zeros((STATES, machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    found = gravity_torque(arm, masses, gravity, angles)
+    data = mujoco.MjData(machine.model)
+    for row, torque in zip(coordinates[:20], found[:20], strict=True):
+        data.qpos[:] = row
+        mujoco.mj_forward(machine.model, data)
+        np.testing.assert_allclose(torque, -data.qfrc_bias[machine.gear], atol=1e-9 * np.abs(found).max())
+
+
+def test_declared_centres_stand_in_the_frame_that_turns_with_their_joint(arm):
+    """A target put there by a fixed chain of its own moves as the model's centre of mass does."""
+    declared = declared_masses(arm)
+    machine = machine_of(arm, Structure(masses=on_stretches(declared, arm)))
+    angles, _ = angles_and_wrenches(arm)
+    coordinates = np.zeros((STATES, machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    data = mujoco.MjData(machine.model)
+    origin, rotation = link_frames(arm, angles)
+    for state in range(10):
+        data.qpos[:] = coordinates[state]
+        mujoco.mj_kinematics(machine.model, data)
+        for mass in declared:
+            wanted = origin[state, mass.link] + rotation[state, mass.link] @ mass.centre_m
+            np.testing.assert_allclose(data.xipos[machine.links[mass.link]], wanted, atol=1e-9)
+
+
+def test_base_and_links_yield_under_the_arms_own_weight(arm):
+    """Without a load and with stiff gears, what sags is the foot under the moment of all weights."""
+    masses = on_stretches(declared_masses(arm), arm)
+    angles, wrench = angles_and_wrenches(arm)
+    tilt = 5e-9 * arm.softness
+    structure = Structure(base=(0.0, 0.0, 0.0, tilt, tilt, 0.0), masses=masses)
+    found = at_rest(arm, angles, 0.0 * wrench, structure=structure, compliance=1e-15 * arm.compliance)[1]
+    weights = [mass for mass in declared_masses(arm)]
+    origin, rotation = link_frames(arm, angles)
+    centres = np.stack([origin[:, m.link] + rotation[:, m.link] @ m.centre_m for m in weights], axis=1)
+    pull = np.array([m.mass_kg for m in weights])[:, None] * np.array([0.0, 0.0, -9.80665])
+    turn = tilt * np.cross(centres, pull).sum(axis=1) * [1.0, 1.0, 0.0]
+    still = at_rest(arm, angles, 0.0 * wrench)[1].position[:, -1]
+    moved = found.position[:, -1] - still
+    np.testing.assert_allclose(moved, np.cross(turn, still), atol=2e-3 * np.abs(moved).max())
 
 
 def everything(arm):

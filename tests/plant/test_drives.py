@@ -10,7 +10,7 @@ from elastocal.plant.drives import CablePull, Repeatability, SlippingZero, Trans
 def visits(rng):
     """Two states an approach."""
     approach = np.repeat(np.arange(100), 2)
-    return Visits(rng.uniform(-3, 3, (100, 4))[approach], approach, 25.0 * np.arange(200), 5)
+    return Visits(rng.uniform(-3, 3, (100, 4))[approach], approach, approach, 25.0 * np.arange(200), 5)
 
 
 def test_an_offset_and_a_ratio_turn_their_joint_alone(visits):
@@ -26,7 +26,7 @@ def test_a_transmission_error_may_have_any_order(visits):
     q = visits.angle[:, 1]
     np.testing.assert_allclose(found, 1e-4 * np.sin(17.3 * q + 0.4) + 5e-5 * np.sin(2 * q))
     # Of an order that is no integer, a turn does not bring it back.
-    turned = Visits(visits.angle + 2 * np.pi, visits.approach, visits.time_s, 5)
+    turned = Visits(visits.angle + 2 * np.pi, visits.approach, visits.pose, visits.time_s, 5)
     assert np.abs(TransmissionError(1, ((17.3, 1e-4, 0.4),))(turned)[:, 1] - 1e-4 * np.sin(17.3 * q + 0.4)).max() > 1e-5
 
 
@@ -48,5 +48,5 @@ def test_a_slipping_zero_walks_at_some_moves_and_stands_between_them(visits):
 def test_the_same_seed_gives_the_same_draws_and_another_seed_others(visits):
     law = Repeatability((1e-5,) * 4)
     np.testing.assert_array_equal(law(visits), law(visits))
-    other = Visits(visits.angle, visits.approach, visits.time_s, 6)
+    other = Visits(visits.angle, visits.approach, visits.pose, visits.time_s, 6)
     assert (law(visits) != law(other)).all()

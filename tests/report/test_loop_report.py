@@ -206,8 +206,11 @@ def test_every_effect_of_the_catalogue_is_described_without_formulas():
 def test_before_and_after_have_intervals_and_multiples():
     table = table_rows(step_rows(), 5e-5)
     assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect", "control"]
-    assert table["rows"][0]["cells"][3] == ["300", "[240, 360]", "6.00 × floor"]
-    assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][3] == ["50.000", "[40.000, 60.000]"]
+    cells = table["rows"][0]["cells"]
+    assert cells[1] == ["180", "[144, 216]", "3.60 × floor"]
+    assert cells[2] == ["270", "≥ 216", "5.40 × floor"]
+    assert cells[3] == ["300", "–", "6.00 × floor"]
+    assert table_rows(step_rows(largest_m=0.05), None)["rows"][0]["cells"][0] == ["25.000", "[20.000, 30.000]"]
 
 
 def test_what_was_measured_tells_training_from_held_out():

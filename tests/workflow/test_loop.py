@@ -54,7 +54,16 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
     assert verdict["campaign"] == "made" and verdict["verdict"] == "named"
     assert {"source", "position_m", "orientation_rad"} <= set(verdict["noise"])
     heldout = verdict["heldout"]
-    assert set(heldout) >= {"before", "after", "noise_floor_rms_m", "reduction_ci95", "poses"}
+    assert set(heldout) >= {
+        "before",
+        "after",
+        "noise_floor_rms_m",
+        "reduction_ci95",
+        "reduction_std_error",
+        "poses",
+        "share_below_max",
+        "outside_range",
+    }
     assert set(heldout["before"]) == set(heldout["after"]) == metrics
     assert heldout["after"]["rms_m"] < heldout["before"]["rms_m"] and len(heldout["reduction_ci95"]) == 2
     compliance = verdict["compliance_urad_per_Nm"]
@@ -87,6 +96,9 @@ def test_every_file_of_the_contract_is_there(diagnosed, kuka):
     for metric in ("mean", "rms", "p95", "max"):
         assert {f"train_{metric}_m", f"heldout_{metric}_m"} <= set(steps.columns)
         assert any(column.startswith("heldout_") and f"{metric}_over_floor" in column for column in steps.columns)
+    splits = pd.read_csv(report(diagnosed, "splits.csv"))
+    assert splits.split.tolist() == ["held out", *["joint space"] * 5] and splits.block[0] == "all"
+    assert splits.after_rms_m[0] == pytest.approx(steps.set_index("kind").loc["effect", "heldout_rms_m"])
     residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas()
     assert len(residuals) == len(table) and sorted(residuals.row) == list(range(1, len(table) + 1))
     assert {f"{stage}_{name}" for stage in ("before", "after") for name, *_ in COMPONENTS} <= set(residuals.columns)

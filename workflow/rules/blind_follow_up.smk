@@ -27,7 +27,7 @@ rule propose_follow_ups:
 rule carry_out_follow_ups:
     input:
         proposals=rules.propose_follow_ups.output.proposals,
-        robots=expand("config/robots/{robot}.yaml", robot=["kuka", "fanuc", "abb"]),
+        robots=expand("config/robots/{robot}.yaml", robot=BLIND_ROBOTS),
         sources=sources("carry_out_follow_ups.py"),
     output:
         campaigns=directory("data/follow_up/{block}"),
@@ -72,6 +72,7 @@ rule score_follow_ups:
         separable="reports/blind/follow_up_separable.csv",
         others="reports/blind/follow_up_other.csv",
         poses="reports/blind/follow_up_poses.csv",
+        promises="reports/blind/follow_up_promises.csv",
         cases="reports/blind/follow_up_cases.csv",
     log:
         "results/logs/score_follow_ups.log",

@@ -1,7 +1,7 @@
 """Closing the loop on a campaign: readings, noise, declared model, missing effects, held-out errors, verdict, report.
 
 Needs a campaign's folder: the user's own, or data/campaigns/{campaign}/, which is simulated or imported from public data. Writes
-results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. No step before judge_held_out reads held-out poses.
+results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. No step before judge_campaign reads held-out poses.
 """
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
@@ -10,6 +10,7 @@ LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confoundin
 LOOP_REPORTS = [
     "verdict.json",
     "before_after.csv",
+    "splits.csv",
     "candidates.parquet",
     "residuals.parquet",
     "next_experiment.csv",
@@ -76,151 +77,49 @@ rule read_campaign:
         "../scripts/read_campaign.py"
 
 
-rule check_data:
+rule diagnose_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
         training=rules.read_campaign.output.training,
-        sources=sources("check_data.py"),
+        sources=sources("diagnose_campaign.py"),
     output:
-        faults="results/loop/{campaign}/faults.json",
-    log:
-        "results/logs/check_data/{campaign}.log",
-    benchmark:
-        "results/timings/check_data/{campaign}.tsv"
-    script:
-        "../scripts/check_data.py"
-
-
-rule estimate_noise:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        training=rules.read_campaign.output.training,
-        sources=sources("estimate_noise.py"),
-    output:
-        noise="results/loop/{campaign}/noise.json",
-    log:
-        "results/logs/estimate_noise/{campaign}.log",
-    benchmark:
-        "results/timings/estimate_noise/{campaign}.tsv"
-    script:
-        "../scripts/estimate_noise.py"
-
-
-rule fit_declared:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        training=rules.read_campaign.output.training,
-        noise=rules.estimate_noise.output.noise,
-        sources=sources("fit_declared.py"),
-    output:
-        parameters="results/loop/{campaign}/declared_parameters.parquet",
-        correlations="results/loop/{campaign}/declared_correlations.parquet",
-    log:
-        "results/logs/fit_declared/{campaign}.log",
-    benchmark:
-        "results/timings/fit_declared/{campaign}.tsv"
-    script:
-        "../scripts/fit_declared.py"
-
-
-rule trace_effects:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        training=rules.read_campaign.output.training,
-        faults=rules.check_data.output.faults,
-        noise=rules.estimate_noise.output.noise,
-        declared=rules.fit_declared.output.parameters,
-        sources=sources("trace_effects.py"),
-    output:
-        looks="results/loop/{campaign}/looks.parquet",
-        found="results/loop/{campaign}/found.parquet",
-        parameters="results/loop/{campaign}/final_parameters.parquet",
-        correlations="results/loop/{campaign}/final_correlations.parquet",
+        diagnosis="results/loop/{campaign}/diagnosis.json",
+        steps="results/loop/{campaign}/steps.parquet",
+        correlations="results/loop/{campaign}/correlations.parquet",
+        models="results/loop/{campaign}/models.parquet",
         confounding="results/loop/{campaign}/confounding.parquet",
+        candidates="reports/loop/{campaign}/candidates.parquet",
     log:
-        "results/logs/trace_effects/{campaign}.log",
+        "results/logs/diagnose_campaign/{campaign}.log",
     benchmark:
-        "results/timings/trace_effects/{campaign}.tsv"
-    params:
-        replicates=config["loop"]["replicates"],
-        seed=config["seed"],
-    script:
-        "../scripts/trace_effects.py"
-
-
-rule weigh_rivals:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        training=rules.read_campaign.output.training,
-        noise=rules.estimate_noise.output.noise,
-        found=rules.trace_effects.output.found,
-        parameters=rules.trace_effects.output.parameters,
-        sources=sources("weigh_rivals.py"),
-    output:
-        rivals="results/loop/{campaign}/rivals.parquet",
-        doubts="results/loop/{campaign}/doubts.json",
-        experiment="reports/loop/{campaign}/next_experiment.csv",
-    log:
-        "results/logs/weigh_rivals/{campaign}.log",
-    benchmark:
-        "results/timings/weigh_rivals/{campaign}.tsv"
+        "results/timings/diagnose_campaign/{campaign}.tsv"
     params:
         seed=config["seed"],
-        states=config["loop"]["proposed_states"],
     script:
-        "../scripts/weigh_rivals.py"
+        "../scripts/diagnose_campaign.py"
 
 
-rule judge_held_out:
+rule judge_campaign:
     input:
         descriptions=rules.read_campaign.output.descriptions,
         training=rules.read_campaign.output.training,
         held_out=rules.read_campaign.output.held_out,
-        noise=rules.estimate_noise.output.noise,
-        declared=rules.fit_declared.output.parameters,
-        looks=rules.trace_effects.output.looks,
-        found=rules.trace_effects.output.found,
-        parameters=rules.trace_effects.output.parameters,
-        rivals=rules.weigh_rivals.output.rivals,
-        sources=sources("judge_held_out.py"),
+        diagnosis=rules.diagnose_campaign.output.diagnosis,
+        steps=rules.diagnose_campaign.output.steps,
+        sources=sources("judge_campaign.py"),
     output:
+        verdict="reports/loop/{campaign}/verdict.json",
         before_after="reports/loop/{campaign}/before_after.csv",
-        errors="results/loop/{campaign}/held_out_errors.json",
+        splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
     log:
-        "results/logs/judge_held_out/{campaign}.log",
+        "results/logs/judge_campaign/{campaign}.log",
     benchmark:
-        "results/timings/judge_held_out/{campaign}.tsv"
+        "results/timings/judge_campaign/{campaign}.tsv"
     params:
         seed=config["seed"],
     script:
-        "../scripts/judge_held_out.py"
-
-
-rule state_verdict:
-    input:
-        descriptions=rules.read_campaign.output.descriptions,
-        training=rules.read_campaign.output.training,
-        faults=rules.check_data.output.faults,
-        noise=rules.estimate_noise.output.noise,
-        declared=rules.fit_declared.output.parameters,
-        looks=rules.trace_effects.output.looks,
-        found=rules.trace_effects.output.found,
-        parameters=rules.trace_effects.output.parameters,
-        rivals=rules.weigh_rivals.output.rivals,
-        doubts=rules.weigh_rivals.output.doubts,
-        before_after=rules.judge_held_out.output.before_after,
-        errors=rules.judge_held_out.output.errors,
-        sources=sources("state_verdict.py"),
-    output:
-        verdict="reports/loop/{campaign}/verdict.json",
-        candidates="reports/loop/{campaign}/candidates.parquet",
-    log:
-        "results/logs/state_verdict/{campaign}.log",
-    benchmark:
-        "results/timings/state_verdict/{campaign}.tsv"
-    script:
-        "../scripts/state_verdict.py"
+        "../scripts/judge_campaign.py"
 
 
 rule summarize_campaigns:

@@ -7,7 +7,7 @@ sealed file, and what it writes is a campaign like the first.
 from dataclasses import replace
 from pathlib import Path
 
-from elastocal.blind.cases import defects_of, design_of, specimen_of
+from elastocal.blind.cases import declared_of, defects_of, design_of, robot_file, specimen_of
 from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
 from elastocal.plant.campaigns import continued, schedule_of
 from elastocal.plant.defects import with_defects
@@ -38,7 +38,13 @@ def carry_out(case, shown, wrench, folder, robots_folder):
             angle = robot.arm.angles_shown_as(angles[:poses])
             schedule = continued(first, angle, loads[:poses], design.seconds_per_state, ladder=LADDER)
             write_blind_campaign(
-                Path(folder) / folder_name(arm, poses) / case.name, case.name, case.robot, bad, design, schedule
+                Path(folder) / folder_name(arm, poses) / case.name,
+                case.name,
+                robot_file(case, robots_folder),
+                bad,
+                design,
+                schedule,
+                declared_of(case, robot.arm),
             )
 
 

@@ -5,7 +5,7 @@ The analyst's side, which knows neither truths nor the plant; `carrying_out` is 
 
 from pathlib import Path
 
-from elastocal.verdict import CLASS, NAMED
+from elastocal.diagnosis.verdict import CLASS, NAMED
 
 # Poses after which a verdict is stated anew.
 POSES = (5, 10, 20)
@@ -14,7 +14,7 @@ LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 # Where the poses come from: the loop's proposal, or drawn as those of the campaign were.
 ARMS = ("proposed", "random")
 # Most cases of a block that are followed up, by the size of the benchmark; it bounds the time and looks at no outcome.
-MOST = {"smoke": 1, "quick": 2, "full": 2}
+MOST = {"smoke": 1, "quick": 2, "development": 2, "full": 2}
 
 
 def followed_up(verdicts, most):

@@ -34,7 +34,8 @@ def _candidate(sites, links, detail):
             twisted |= torsion
         return [bent, twisted]
 
-    return Candidate(NAME, FAMILY, tuple(k for k in links if k), detail, _PARAMETERS, displacement, frozenset({"load"}))
+    joints = tuple(k for k in links if k)
+    return Candidate(NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), place=detail)
 
 
 def _deflection(sites, link, load):

@@ -37,6 +37,8 @@ class Parameter:
         None, as nearly everywhere, for no prior. Reported with the estimate.
     sign : {-1, 0, 1}
         That such an effect has by its physics; 0 where it may have either.
+    order : int
+        Of a harmonic, whose plausible size falls with it; 1 elsewhere.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Parameter:
     plausible: float
     prior_std: float | None = None
     sign: int = 0
+    order: int = 1
 
 
 @dataclass(frozen=True)
@@ -100,6 +103,9 @@ class Candidate:
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be told from a smooth one.
+    place : str
+        Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
+        location are variants of its law, of which only one can hold.
     """
 
     effect: str
@@ -111,6 +117,12 @@ class Candidate:
     needs: frozenset = frozenset()
     shapes: tuple = ()
     distinct_angles: int = 0
+    place: str = ""
+
+    @property
+    def location(self):
+        """Where the effect acts: its joints, with the place where they do not tell it."""
+        return (*self.joints, self.place) if self.place else self.joints
 
     @property
     def key(self):

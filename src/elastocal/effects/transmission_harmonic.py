@@ -24,12 +24,14 @@ def candidates(sites):
 def _candidate(joint, low, high):
     orders = range(low, high + 1)
     parameters = tuple(
-        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD) for order in orders for wave in ("cos", "sin")
+        Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD, order=order)
+        for order in orders
+        for wave in ("cos", "sin")
     )
 
     def displacement(circumstances):
         angle = circumstances.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in orders for wave in (np.cos, np.sin)]
 
-    detail = f"orders {low}-{high}"
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=_SAMPLES_PER_PERIOD * high)
+    detail, angles = f"orders {low}-{high}", _SAMPLES_PER_PERIOD * high
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=angles, place=detail)

@@ -1,4 +1,4 @@
-"""All faults that are looked for: each module of this package that has a NAME."""
+"""All faults that are looked for: each module of this package that has NAMES."""
 
 import pkgutil
 from functools import cache
@@ -8,16 +8,16 @@ import elastocal.faults
 
 
 @cache
-def known_faults():
-    """Modules of the package by the name of their fault, each behind those that it comes after.
+def fault_modules():
+    """Modules that look for faults by their own names, each behind those that it comes after.
 
     Returns
     -------
     dict of str to module
     """
     names = sorted(module.name for module in pkgutil.iter_modules(elastocal.faults.__path__))
-    modules = [import_module(f"elastocal.faults.{name}") for name in names]
-    waiting = {module.NAME: module for module in modules if hasattr(module, "NAME")}
+    modules = {name: import_module(f"elastocal.faults.{name}") for name in names}
+    waiting = {name: module for name, module in modules.items() if hasattr(module, "NAMES")}
     ordered = {}
     while waiting:
         ready = [name for name, module in waiting.items() if not set(module.AFTER) & set(waiting)]
@@ -25,3 +25,13 @@ def known_faults():
             raise ValueError(f"faults that come after each other: {', '.join(waiting)}")
         ordered |= {name: waiting.pop(name) for name in ready}
     return ordered
+
+
+def known_faults():
+    """Names of all faults that may be found.
+
+    Returns
+    -------
+    set of str
+    """
+    return {name for module in fault_modules().values() for name in module.NAMES}

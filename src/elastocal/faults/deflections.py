@@ -1,6 +1,6 @@
 """What the loads did to the robot, beside what the written loads should have done by its nominal compliances.
 
-No NAME: what the faults of loads have in common.
+No NAMES: what the faults of loads have in common.
 """
 
 from dataclasses import dataclass, replace

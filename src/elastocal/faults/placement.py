@@ -1,6 +1,6 @@
 """Where the nominal robot puts each reading, without loads, once frames and targets are fitted to most of the readings.
 
-No NAME: what the faults of positions have in common.
+No NAMES: what the faults of positions have in common.
 """
 
 from dataclasses import dataclass, replace

@@ -1,12 +1,12 @@
 """What every fault of the data is: a name, in plain words what the readings look like, and how much better they fit without it.
 
-A fault is a module of this package with
+Faults are looked for by the modules of this package, each with
 
-- ``NAME`` and ``FAMILY``, as in the design's table;
-- ``AFTER``, the names of faults whose presence makes it meaningless to look for this one;
-- ``find(campaign, readings)``, which lists the faults of this name that the readings show.
+- ``NAMES`` of the faults that it may find and their ``FAMILY``, as in the design's table;
+- ``AFTER``, the modules whose decisive faults make it meaningless to look for these;
+- ``find(campaign, readings)``, which lists the faults of these names that the readings show.
 
-Nothing else knows the faults by name: a new module is a new fault. On doubt none is found: a false alarm stops a trace that
+Nothing else knows the faults by name: a new module is new faults. On doubt none is found: a false alarm stops a trace that
 was right, a miss only leaves it to what comes after.
 """
 
@@ -36,7 +36,8 @@ class Fault:
 
     Attributes
     ----------
-    name : {"wrong_unit", "wrong_sign", "shuffled_rows", "outliers"}
+    name : str
+        One of the ``NAMES`` of a module.
     joints : tuple of int
         Joints concerned, counted from 1; empty where there are none.
     detail : str
@@ -48,6 +49,8 @@ class Fault:
         Rows of the file concerned; empty where all are.
     decisive : bool
         Whether the readings must be corrected before anything is traced.
+    alternatives : tuple of str
+        What would explain the readings as well, in plain words.
     """
 
     name: str
@@ -57,3 +60,4 @@ class Fault:
     evidence: tuple
     rows: tuple
     decisive: bool
+    alternatives: tuple = ()

@@ -25,7 +25,7 @@ from elastocal.faults.placement import (
 from elastocal.faults.protocol import Fault, Value
 from elastocal.observations import state_clusters
 
-NAME, FAMILY, AFTER = "shuffled_rows", "data", ("wrong_sign", "wrong_unit")
+NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives", "loads")
 
 # A row is out of place beyond so many robust standard deviations of the others, and back in place within so many.
 _OUT_OF_PLACE, _IN_PLACE = 20.0, 5.0
@@ -100,7 +100,7 @@ def _shifted(campaign, readings, as_written):
         return []
     shift = shifts[best]
     detail = f"the measured columns fit one {shift.kind} further {'down' if shift.steps > 0 else 'up'}"
-    return [Fault(NAME, (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
+    return [Fault(NAMES[0], (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
 
 
 def _moved(readings, shift):
@@ -201,7 +201,7 @@ def _matched(readings, as_written, beside, rest):
     detail = f"{back.sum()} of {len(readings)} rows fit with the measured columns of another one of them"
     concerned = tuple(sorted(readings.row[rows[back]].tolist()))
     share = Value("share of the readings", float(back.mean() * len(rows) / len(readings)), "–")
-    return [Fault(NAME, (), detail, (share,), (before, after), concerned, True)]
+    return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
 
 
 def _places(position, rotation):
@@ -295,4 +295,4 @@ def _loads_fault(states, here, there, before, left):
     count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
     detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
     share = Value("share of the loaded states", count / len(states.wrench), "–")
-    return [Fault(NAME, (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]
+    return [Fault(NAMES[0], (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]

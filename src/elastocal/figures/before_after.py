@@ -53,7 +53,7 @@ def before_after(steps, noise_floor_m=None):
             value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
             color, _, hatch = LOOKS[step["kind"]]
             axis.barh(row, value, height=0.42, color=color, hatch=hatch, edgecolor="#8a8a8a" if hatch else color, linewidth=0.5)
-            axis.plot([low, high], [row, row], color="black", linewidth=1.1, gid="interval")
+            _interval(axis, value, low, high, row)
             axis.plot(scale * step[f"train_{metric}_m"], row, "D", color="white", markeredgecolor="black", markersize=3.4)
         if noise_floor_m:
             axis.axvline(scale * noise_floor_m, color="black", linestyle=":", linewidth=1.2, gid="noise floor")
@@ -69,6 +69,13 @@ def before_after(steps, noise_floor_m=None):
     axes[0, 0].set_yticklabels(labels, fontsize=7.5)
     figure.legend(handles=_legend({step["kind"] for step in steps}, noise_floor_m), loc="outside lower center", ncols=3)
     return figure
+
+
+def _interval(axis, value, low, high, row):
+    """A line from end to end; an arrow where it is open above; nothing where there is none."""
+    axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
+    if np.isinf(high):
+        axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
 
 
 def step_name(name, most=3):

@@ -6,8 +6,6 @@ import numpy as np
 
 from elastocal.campaign import Campaign, described_campaign
 from elastocal.effects.catalogue import candidates_on, declared_candidates
-from elastocal.fitting import fit
-from elastocal.loop.fit_columns import estimate_from
 from elastocal.loop.reading_columns import readings_from
 from elastocal.model import Model, declared_model
 from elastocal.noise import Noise
@@ -36,17 +34,6 @@ class Case:
     observations: Observations
     model: Model
     candidates: dict
-
-    def fitted(self, model, columns, noise):
-        """A fit found before, from the columns of its parameters table."""
-        sessions = np.unique(self.observations.states.session)
-        estimate, discrepancy = estimate_from(columns, model, sessions)
-        return fit(model, self.observations, noise, estimate, discrepancy)
-
-    def with_found(self, keys):
-        """The declared model with some candidates, and these candidates."""
-        added = [self.candidates[key] for key in keys]
-        return self.model.with_effects(added), added
 
 
 def case_from(descriptions, columns):

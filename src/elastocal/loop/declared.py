@@ -5,11 +5,17 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal.fitting import fit
-from elastocal.loop.case import noise_facts
-from elastocal.noise import Noise, taken_noise
+from elastocal.loop.case import noise_facts, noise_from
+from elastocal.noise import FINEST, Noise, taken_noise
 from elastocal.registration import registered
 
 _ASSUMED_M = 1e-4
+
+
+def estimated_noise(case):
+    """Noise as `noise_of`, and the warnings, as objects."""
+    facts = noise_of(case)
+    return noise_from(facts), facts["warnings"]
 
 
 def noise_of(case):
@@ -29,6 +35,6 @@ def noise_of(case):
     if noise is None:
         assumed = Noise("residual", _ASSUMED_M, _ASSUMED_M, np.zeros(case.campaign.robot.joints))
         left = fit(case.model, case.observations, assumed, start).residual
-        typical = [float(np.sqrt((part**2).mean())) for part in (left[:, :3], left[:, -3:])]
+        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
         noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
     return {"noise": noise_facts(noise), "warnings": warnings}

@@ -5,21 +5,18 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.model import Estimate, parameters
 
-_FIT = "fit"
-
 
 def parameter_columns(fitted):
     """Columns of the parameters table of a fit."""
     named = parameters(fitted.model, fitted.estimate)
-    values = _absolute_values(fitted.model, fitted.estimate)
     return {
-        "owner": [owner for owner, _ in named] + [_FIT],
-        "parameter": [parameter.name for _, parameter in named] + ["discrepancy"],
-        "unit": [parameter.unit for _, parameter in named] + ["m"],
-        "value": np.append(values, fitted.discrepancy_m),
-        "std_error": np.append(np.sqrt(np.diag(fitted.covariance)), np.nan),
-        "held": np.append(fitted.held, False),
-        "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named] + [np.nan]),
+        "owner": [owner for owner, _ in named],
+        "parameter": [parameter.name for _, parameter in named],
+        "unit": [parameter.unit for _, parameter in named],
+        "value": _absolute_values(fitted.model, fitted.estimate),
+        "std_error": np.sqrt(np.diag(fitted.covariance)),
+        "held": fitted.held,
+        "prior_std": np.array([np.nan if p.prior_std is None else p.prior_std for _, p in named]),
     }
 
 
@@ -38,7 +35,7 @@ def correlation_columns(fitted):
 
 
 def estimate_from(columns, model, sessions):
-    """The estimate of a model, and the discrepancy of its fit, from the columns of the parameters table.
+    """The estimate of a model from the columns of its parameters.
 
     Parameters
     ----------
@@ -49,7 +46,6 @@ def estimate_from(columns, model, sessions):
     Returns
     -------
     Estimate
-    discrepancy_m : float
     """
     values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
 
@@ -59,7 +55,7 @@ def estimate_from(columns, model, sessions):
 
     frames = [placed(f"frame {session}", (0.0, 0.0, 0.0)) for session in sessions]
     targets = [placed(f"target {target.name}", target.offset_m or (0.0, 0.0, 0.0)) for target in model.targets]
-    estimate = Estimate(
+    return Estimate(
         tuple(int(session) for session in sessions),
         np.array([turn for _, turn in frames]),
         np.array([shift for shift, _ in frames]),
@@ -68,7 +64,6 @@ def estimate_from(columns, model, sessions):
         tuple(np.array([values[effect.key, p.name] for p in effect.parameters]) for effect in model.effects),
         tuple(np.array([values[effect.key, s.name] for s in effect.shapes]) for effect in model.effects),
     )
-    return estimate, float(values[_FIT, "discrepancy"])
 
 
 def _absolute_values(model, estimate):

@@ -36,11 +36,12 @@ def readings_from(columns):
     )
 
 
-def residual_columns(readings, held_out, position, before, after):
+def residual_columns(readings, held_out, outside, position, before, after):
     """Columns of the residuals table."""
     count, joints = readings.joint_angles.shape
     columns = {name: getattr(readings, name) for name in IDENTITY}
-    columns |= {"held_out": np.full(count, held_out), "time_s": _or_missing(readings.time_s, (count,))}
+    columns |= {"held_out": np.full(count, held_out), "outside_range": outside}
+    columns |= {"time_s": _or_missing(readings.time_s, (count,))}
     columns |= {f"q{j + 1}": readings.joint_angles[:, j] for j in range(joints)}
     columns |= dict(zip(WRENCH_NAMES, readings.wrench.T, strict=True))
     columns |= dict(zip("xyz", position.T, strict=True))

@@ -11,12 +11,6 @@ _IDENTITY = (
     Column("target", "int32", "", "number of the target, in the order of the campaign, from 0", minimum=0),
     Column("row", "int32", "", "row in the file of measurements, 1 for the first of data", minimum=1),
 )
-_CANDIDATE = (
-    Column("candidate", "text", "", "effect @ joints [variant]"),
-    Column("effect", "text", "", "name in the catalogue"),
-    Column("family", "text", "", "family in the catalogue"),
-    Column("joints", "text", "", "joints concerned, from 1, joined by +"),
-)
 
 
 def _angles_and_wrench(joints):
@@ -45,17 +39,14 @@ def readings(joints):
     )
 
 
-PARAMETERS = TableSchema(
-    "parameters",
-    (
-        Column("owner", "text", "", "frame of a session, target, effect, or the fit itself"),
-        Column("parameter", "text", "", "name of the parameter"),
-        Column("unit", "text", "", "unit of value, standard error and prior"),
-        Column("value", "float64", "", "estimate; placement of the base for frames, of the target in its point for targets"),
-        Column("std_error", "float64", "", "standard error; 0 where held", missing=True),
-        Column("held", "bool", "", "whether these data cannot tell the parameter, which keeps its value"),
-        Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
-    ),
+PARAMETER_COLUMNS = (
+    Column("owner", "text", "", "frame of a session, target, effect, or the fit itself"),
+    Column("parameter", "text", "", "name of the parameter"),
+    Column("unit", "text", "", "unit of value, standard error and prior"),
+    Column("value", "float64", "", "estimate; placement of the base for frames, of the target in its point for targets"),
+    Column("std_error", "float64", "", "standard error; 0 where held", missing=True),
+    Column("held", "bool", "", "whether these data cannot tell the parameter, which keeps its value"),
+    Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
 )
 
 CORRELATIONS = TableSchema(
@@ -67,69 +58,6 @@ CORRELATIONS = TableSchema(
     ),
 )
 
-LOOKS = TableSchema(
-    "looks",
-    (
-        Column("look", "int32", "", "number of the look at all candidates, from 0", minimum=0),
-        *_CANDIDATE,
-        Column("shape", "float64", "", "value of the shape parameter, where there is one", missing=True),
-        Column("parameters", "int32", "", "directions in which the candidate can be told", minimum=0),
-        Column("statistic", "float64", "", "squared length of the whitened residual along them", missing=True),
-        Column("p_value", "float64", "", "of this test alone", missing=True),
-        Column("p_family", "float64", "", "of the smallest p-value of all candidates, by a bootstrap over poses", missing=True),
-        Column("bic_gain", "float64", "", "by how much the extended Bayesian criterion falls", missing=True),
-        Column(
-            "heldout_gain", "float64", "", "cross-validated fall of the squared whitened error; first look only", missing=True
-        ),
-        Column("heldout_gain_std_error", "float64", "", "its standard error over poses", missing=True),
-        Column("retained", "float64", "", "share of the sensitivities that the model does not make itself", missing=True),
-        Column("noncentrality", "float64", "", "of the test if the effect had its plausible size", missing=True),
-        Column("chosen", "bool", "", "whether this look took the candidate"),
-        Column("note", "text", "", "why it was not tested, or refused"),
-    ),
-)
-
-CANDIDATES = TableSchema(
-    "candidates",
-    (
-        *(column for column in LOOKS.columns if column.name not in ("look", "chosen")),
-        Column("chosen", "bool", "", "whether any look took the candidate"),
-        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
-    ),
-)
-
-FOUND = TableSchema(
-    "found",
-    (
-        *_CANDIDATE,
-        Column("p_family", "float64", "", "when it was chosen"),
-        Column("gain", "float64", "", "cross-validated fall of the squared whitened error on left-out poses"),
-        Column("gain_std_error", "float64", "", "its standard error over poses"),
-    ),
-)
-
-RIVALS = TableSchema(
-    "rivals",
-    (
-        Column("found", "text", "", "name of the effect found"),
-        Column("candidate", "text", "", "what might stand in its place"),
-        Column("angle_deg", "float64", "deg", "angle of its sensitivities to what was found"),
-        Column("bic_difference", "float64", "", "by how much the Bayesian criterion is worse with it"),
-        Column("parameters", "int32", "", "directions in which it can be told"),
-        Column("found_parameters", "int32", "", "directions in which what was found can be told"),
-        Column("alternative", "bool", "", "whether these data cannot tell it from what was found"),
-    ),
-)
-
-CONFOUNDING = TableSchema(
-    "confounding",
-    (
-        Column("one", "text", "", "candidate"),
-        Column("other", "text", "", "candidate"),
-        Column("angle_deg", "float64", "deg", "smallest angle between what they make off the declared model"),
-    ),
-)
-
 
 def residuals(joints):
     """Every reading, before and after."""
@@ -138,6 +66,7 @@ def residuals(joints):
         (
             *_IDENTITY,
             Column("held_out", "bool", "", "whether no step but the last has seen it"),
+            Column("outside_range", "bool", "", "whether its held-out pose lies outside the range of the fitted poses"),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
             *_angles_and_wrench(joints),
             *(Column(axis, "float64", "m", f"measured position along {axis}, base axes") for axis in "xyz"),

@@ -68,5 +68,5 @@ def _errors(part, draws):
         for name, value in summary(error.distance).items():
             row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value
         row[f"{stage}_rms_low_mm"], row[f"{stage}_rms_high_mm"] = 1e3 * limit["rms_m"]
-    row["rms_reduction_low"], row["rms_reduction_high"] = reductions[1]
+    row["rms_reduction_low"], row["rms_reduction_high"] = reductions[1].low, reductions[1].high
     return row

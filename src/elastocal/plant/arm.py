@@ -13,6 +13,10 @@ import yaml
 
 from elastocal.errors import InputError
 
+STANDARD_GRAVITY = 9.80665
+_RELATIVE_STD = 0.1
+# What counts as heavy, and gears as stiff as a heavy arm's.
+_HEAVY_KG, _STIFF_RAD_PER_NM = 140.0, 2e-6
 _WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
 
 
@@ -52,6 +56,27 @@ class Stretch:
 
 
 @dataclass(frozen=True)
+class LinkMass:
+    """What one link weighs.
+
+    Attributes
+    ----------
+    link : int
+        0 is the column; k turns with joint k.
+    mass_kg : float
+    centre_m : tuple of float
+        In the frame directly behind the rotation of joint `link`; of the column in the axes of the base.
+    relative_std : float
+        How well the mass is known, and each component of the centre as a share of the centre's distance.
+    """
+
+    link: int
+    mass_kg: float
+    centre_m: tuple
+    relative_std: float
+
+
+@dataclass(frozen=True)
 class Arm:
     """An arm, all fixed rotations and lengths sorted into stretches.
 
@@ -68,6 +93,14 @@ class Arm:
         rad.
     reported_matrix, reported_offset : ndarray (n, n), (n,)
         Angles from what the controller shows: q = matrix @ shown + offset.
+    masses : tuple of LinkMass
+        As the robot file declares them; empty where it does not.
+    gravity_m_s2 : tuple of float
+        In the axes of the base.
+    rated_kg : float or None
+        Rated load, where the file has one.
+    compensated : bool
+        Whether the arm has a gravity compensator at the shoulder.
     """
 
     name: str
@@ -77,11 +110,35 @@ class Arm:
     limits: np.ndarray
     reported_matrix: np.ndarray
     reported_offset: np.ndarray
+    masses: tuple = ()
+    gravity_m_s2: tuple = (0.0, 0.0, -STANDARD_GRAVITY)
+    rated_kg: float | None = None
+    compensated: bool = True
 
     @property
     def joints(self):
         """Number of drives, n."""
         return len(self.axes)
+
+    @property
+    def reach_m(self):
+        """Length of all that joint 1 carries, stretched out."""
+        return float(sum(np.linalg.norm(stretch.vector_m) for stretch in self.stretches[1:]))
+
+    @property
+    def payload_kg(self):
+        """Rated load; where the file has none, 8 kg m^-3 times the cube of the reach, as arms of 1 to 3 m have."""
+        return 8.0 * self.reach_m**3 if self.rated_kg is None else self.rated_kg
+
+    @property
+    def load_share(self):
+        """Of the forces that suit a heavy arm, 1 from a rated load of 140 kg on."""
+        return min(1.0, self.payload_kg / _HEAVY_KG)
+
+    @property
+    def softness(self):
+        """How many times softer the gears are than a heavy arm's, at least 1."""
+        return max(1.0, float(np.median(self.compliance)) / _STIFF_RAD_PER_NM)
 
     @property
     def points(self):
@@ -161,7 +218,39 @@ def arm_from_document(document, source="robot"):
         np.radians(np.array(document["joint_limits_deg"], float)),
         np.array(shown.get("matrix", np.eye(n)), float),
         np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
+        tuple(_link_mass(entry) for entry in document.get("masses", ())),
+        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -STANDARD_GRAVITY)))),
+        document.get("payload_kg"),
+        # A file that tells nothing of weights tells nothing of a compensator either.
+        "compensator" in document or "masses" not in document,
     )
+
+
+def _link_mass(entry):
+    centre = tuple(map(float, entry["centre_m"]))
+    return LinkMass(int(entry["link"]), float(entry["mass_kg"]), centre, float(entry.get("relative_std", _RELATIVE_STD)))
+
+
+def link_frames(arm, angles):
+    """Frames behind the rotation of each drive.
+
+    Parameters
+    ----------
+    arm : Arm
+    angles : ndarray (S, n)
+        rad.
+
+    Returns
+    -------
+    origin : ndarray (S, n + 1, 3)
+        Of link 0, the column, and of each link behind it, base axes, m.
+    rotation : ndarray (S, n + 1, 3, 3)
+    """
+    origin, rotation = [np.zeros((len(angles), 3))], [np.broadcast_to(np.eye(3), (len(angles), 3, 3))]
+    for joint, (stretch, axis) in enumerate(zip(arm.stretches[:-1], arm.axes, strict=True)):
+        origin.append(origin[-1] + rotation[-1] @ stretch.vector_m)
+        rotation.append(rotation[-1] @ stretch.rotation @ turned(angles[:, joint, None] * axis))
+    return np.stack(origin, axis=1), np.stack(rotation, axis=1)
 
 
 def turned(vector):

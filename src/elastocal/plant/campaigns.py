@@ -9,6 +9,10 @@ from elastocal.plant.random_numbers import stream
 from elastocal.plant.tracker import rotation_vector
 
 COVARIATES = ("approach", "time", "temperature")
+# Stands for the last measuring point of any arm.
+FLANGE = "flange"
+# On arms of such a reach a lever of half a metre is usual.
+_LONG_M = 2.5
 
 
 @dataclass(frozen=True)
@@ -20,19 +24,21 @@ class Design:
     poses : int
     held_out : int
         The last poses, which no step of the analysis may see before its last.
-    force_N : float
-        Largest force; its direction is random in each pose.
+    force_N : float or None
+        Largest force; its direction is random in each pose. None: what suits the arm, `usual_force_N`.
+    force_times : float
+        How many times that force is really meant.
     ladder : tuple of float
         Shares of it, 0 first: each is a load.
     lever_m : tuple of float
-        From the flange to where the force acts, base axes.
+        From the flange to where the force acts, base axes; shorter in proportion on an arm of less than 2.5 m.
     repeats, repeated_poses : int
         How often loads 0 and 1 of the first poses are read.
     approach_each_load : bool
         Whether each load is approached afresh; otherwise loads of one pose follow each other without a move.
     seconds_per_state : float
     points : tuple of str
-        Measuring points with a target each; empty for all.
+        Measuring points with a target each, or `FLANGE`; empty for all.
     covariates : tuple of str
         Which of `COVARIATES` are written down.
     declared_noise : (float, float) or None
@@ -47,7 +53,8 @@ class Design:
 
     poses: int = 30
     held_out: int = 9
-    force_N: float = 1000.0
+    force_N: float | None = None
+    force_times: float = 1.0
     ladder: tuple = (0.0, 1.0, 0.5, -0.5, -1.0)
     lever_m: tuple = (0.0, 0.5, 0.0)
     repeats: int = 4
@@ -61,6 +68,15 @@ class Design:
     measured: str = "pose"
     frame: str = "base"
     reach: float = 1.0
+
+    def targets_on(self, arm):
+        """Names of the measuring points that have a target."""
+        return tuple(arm.points[-1] if point == FLANGE else point for point in self.points) or arm.points
+
+
+def usual_force_N(arm):  # noqa: N802 - units in names keep their case
+    """A kilonewton on arms that carry 140 kg and more, and as much less on smaller ones."""
+    return 1000.0 * arm.load_share
 
 
 def schedule_of(arm, design, seed):
@@ -94,8 +110,9 @@ def schedule_of(arm, design, seed):
     # A repeat comes from the same side, so that it is one: what differs between repeats is then chance and not friction.
     sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
     sense = sense[pose, load if design.approach_each_load else 0 * load]
-    force = design.force_N * np.array(design.ladder)[load, None] * direction[pose]
-    lever = np.broadcast_to(np.array(design.lever_m), force.shape)
+    largest = design.force_times * (usual_force_N(arm) if design.force_N is None else design.force_N)
+    force = largest * np.array(design.ladder)[load, None] * direction[pose]
+    lever = np.broadcast_to(min(arm.reach_m / _LONG_M, 1.0) * np.array(design.lever_m), force.shape)
     time = design.seconds_per_state * np.arange(1, len(states) + 1)
     training = pose < design.poses - design.held_out
     return Schedule(
@@ -177,7 +194,7 @@ def measured_table(robot, design, schedule):
         position, rotation = robot.tracker.in_own_frame(position, rotation)
     arm, shown = robot.arm, robot.arm.shown_angles(schedule.angle)
     joints, wrench = range(1, arm.joints + 1), schedule.shown_wrench
-    points = design.points or arm.points
+    points = design.targets_on(arm)
     common = {"pose": schedule.pose, "load": schedule.load, "repeat": schedule.repeat}
     after = {f"q{j}": shown[:, j - 1] for j in joints} | dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), wrench.T, strict=True))
     covariates = {

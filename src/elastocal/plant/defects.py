@@ -13,14 +13,20 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.plant import drives, gears
-from elastocal.plant.arm import Arm
+from elastocal.plant.arm import STANDARD_GRAVITY, Arm
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.structure import Compensator, Mass, TaperedTube
-from elastocal.plant.tracker import Drift, EccentricNest
+from elastocal.plant.tracker import Drift, EccentricNest, Move
+from elastocal.plant.weights import declared_masses, on_stretches, usual_gravity_torque
 
 OUTSIDE = "outside:"
 _AXES = "xyz"
 _SHORTEST_LINK_M = 0.1
+_HEAVY_REACH_M = 2.5
+# In the first half of the training poses, with repeats and without, at a state in 25 s.
+_KNOCKED_S = (700.0, 2000.0)
+# Share of the largest torque below which a weight does not turn a joint.
+_NO_TORQUE = 0.003
 
 
 @dataclass(frozen=True)
@@ -64,6 +70,8 @@ class Kind:
         Covariates without which the catalogue cannot see it.
     largest : float
         Size beyond which the law means nothing.
+    scale : tuple of float
+        Powers of how soft an arm is and of how large its loads are, with which the plausible size goes.
     """
 
     unit: str
@@ -72,6 +80,11 @@ class Kind:
     apply: Callable
     needs: tuple = ()
     largest: float = np.inf
+    scale: tuple = (0.0, 0.0)
+
+    def plausible_on(self, arm):
+        """A size such as this arm may have; `plausible` is a heavy one's."""
+        return self.plausible * arm.softness ** self.scale[0] * arm.load_share ** self.scale[1]
 
 
 KINDS = {}
@@ -121,7 +134,9 @@ def drawn_defect(effect, arm, seed):
     Defect
     """
     places = _kind(effect).places(arm)
-    return Defect(effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible, seed)
+    return Defect(
+        effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible_on(arm), seed
+    )
 
 
 def _kind(effect):
@@ -150,7 +165,30 @@ def _each_joint(arm):
 
 
 def _shoulder(arm):
-    return [(2,)]
+    """Where a gravity compensator can be, on arms that have one."""
+    return [(2,)] if arm.compensated else []
+
+
+def _turned_by(arm, masses):
+    """Joints, from 1, that weights turn where the arm stands upright."""
+    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -STANDARD_GRAVITY))
+    return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
+
+
+def _weighing_links(arm):
+    """The upper arm and the forearm with the joints that their weight turns, list of (link, joints)."""
+    found = []
+    for (link,) in _each_link(arm):
+        turned = _turned_by(arm, [Mass(link, 1.0)])
+        # Of links that turn the same joints the first counts, and of all links two: the hand's weight is like a tool's.
+        if turned and turned[-1] == link:
+            found.append((link, turned))
+    return found[:2]
+
+
+def _weighed(arm):
+    everything, single = _turned_by(arm, on_stretches(declared_masses(arm), arm)), _weighing_links(arm)
+    return list(dict.fromkeys([*(turned for _, turned in single), everything]))
 
 
 def _each_link(arm):
@@ -162,9 +200,9 @@ def _each_pair(arm):
     return list(combinations(range(1, arm.joints + 1), 2))
 
 
-def _register(effect, unit, plausible, places, needs=(), largest=np.inf):
+def _register(effect, unit, plausible, places, needs=(), largest=np.inf, scale=(0.0, 0.0)):
     def keep(apply):
-        KINDS[effect] = Kind(unit, plausible, places, apply, needs, largest)
+        KINDS[effect] = Kind(unit, plausible, places, apply, needs, largest, scale)
         return apply
 
     return keep
@@ -192,8 +230,13 @@ def _with_structure(robot, **changes):
 
 
 def _usual_torque_Nm(robot, joint):  # noqa: N802 - units in names keep their case
-    """Torque on a joint that a kilonewton makes: by the arm's reach before the wrist, by the tool's half metre behind it."""
-    return 1500.0 if joint < robot.arm.joints - 3 else 450.0
+    """Torque on a joint as its gear is made for: that of the weight it carries, and of a usual load on top.
+
+    Of a kilonewton at a heavy arm: 1500 N m by the arm's reach before the wrist, 450 N m by the tool's half metre behind it.
+    """
+    arm, structure = robot.arm, robot.structure
+    load = (1500.0 if joint < arm.joints - 3 else 450.0) * arm.load_share * min(1.0, arm.reach_m / _HEAVY_REACH_M)
+    return load + float(usual_gravity_torque(arm, structure.masses, structure.gravity_m_s2)[joint])
 
 
 def _drawn_frame(robot, error, draws):
@@ -238,14 +281,25 @@ def _link_geometry(robot, joints, size, draws):
 # Gravity
 
 
-@_register("link_weight", "kg", 100.0, lambda arm: [(2,), (2, 3)])
+@_register("link_weight", "kg", 100.0, _weighed, scale=(0.0, 1.0))
 def _link_weight(robot, joints, size, draws):
-    """Weight of the upper arm (turns joint 2) or of the forearm (turns joints 2 and 3), beside the line of the link."""
-    along, aside = draws.uniform(0.25, 0.6), tuple(draws.uniform(-0.06, 0.06, 3))
-    return _with_structure(robot, masses=(*robot.structure.masses, Mass(joints[-1] + 1, size, along, aside))), {}
+    """Weight of the upper arm, which turns joint 2, of the forearm, which turns the elbow too, or of all links.
+
+    By the joints that it turns: of one link beside its line, or of all as their masses are declared.
+    """
+    arm, structure = robot.arm, robot.structure
+    one = dict((turned, link) for link, turned in _weighing_links(arm))
+    turned = tuple(joint + 1 for joint in joints)
+    if turned in one:
+        along, aside = draws.uniform(0.25, 0.6), tuple(draws.uniform(-0.06, 0.06, 3))
+        return _with_structure(robot, masses=(*structure.masses, Mass(one[turned], size, along, aside))), {}
+    masses = on_stretches(declared_masses(arm), arm)
+    total = sum(mass.mass_kg for mass in masses if mass.stretch > 1)
+    more = tuple(replace(mass, mass_kg=size * mass.mass_kg / total) for mass in masses if mass.stretch > 1)
+    return _with_structure(robot, masses=(*structure.masses, *more)), {}
 
 
-@_register("payload", "kg", 10.0, _nowhere)
+@_register("payload", "kg", 10.0, _nowhere, scale=(0.0, 1.0))
 def _payload(robot, joints, size, draws):
     centre = 0.15 * _direction(draws)
     return _with_structure(robot, payload=Mass(robot.arm.joints, size, 1.0, tuple(centre))), {"mass": size} | _named(
@@ -284,7 +338,7 @@ def _transmission_ratio(robot, joints, size, draws):
 # Elasticity
 
 
-@_register("link_elasticity", "1/(N m^2)", 1e-7, _each_link)
+@_register("link_elasticity", "1/(N m^2)", 1e-7, _each_link, scale=(1.0, 0.0))
 def _link_elasticity(robot, joints, size, draws):
     """A tapered tube that also shears and stretches, as a thin-walled one of a quarter metre does."""
     bending, gyration = 1.0 / size, 0.25**2 / 8.0
@@ -293,7 +347,7 @@ def _link_elasticity(robot, joints, size, draws):
     return _with_structure(robot, tubes=robot.structure.tubes | {joints[0] + 1: tube}), {}
 
 
-@_register("joint_tilt", "rad/(N m)", 2e-7, _each_joint)
+@_register("joint_tilt", "rad/(N m)", 2e-7, _each_joint, scale=(1.0, 0.0))
 def _joint_tilt(robot, joints, size, draws):
     values = size * draws.uniform(0.4, 1.0, 2)
     across = [axis for axis, part in zip(_AXES, robot.arm.axes[joints[0]], strict=True) if abs(part) < 0.5]
@@ -301,7 +355,7 @@ def _joint_tilt(robot, joints, size, draws):
     return _with_structure(robot, tilt=tilt), {f"tilt_about_{axis}": v for axis, v in zip(across, values, strict=True)}
 
 
-@_register("base_compliance", "rad/(N m)", 6e-8, _nowhere)
+@_register("base_compliance", "rad/(N m)", 6e-8, _nowhere, scale=(1.0, 0.0))
 def _base_compliance(robot, joints, size, draws):
     """Anchor bolts: the two tilts and the two shifts differ a little."""
     uneven, horizontal, vertical = draws.uniform(0.85, 1.15, 4), 0.2 * size, 0.1 * size
@@ -309,7 +363,7 @@ def _base_compliance(robot, joints, size, draws):
     return _with_structure(robot, base=base), {"vertical": vertical}
 
 
-@_register("cross_compliance", "rad/(N m)", 8e-8, _each_pair)
+@_register("cross_compliance", "rad/(N m)", 8e-8, _each_pair, scale=(1.0, 0.0))
 def _cross_compliance(robot, joints, size, draws):
     size = size * draws.choice([-1.0, 1.0])
     return _with_gear(robot, gears.Coupling(tuple(joints), size)), {"compliance": size}
@@ -362,7 +416,7 @@ def _hysteresis(robot, joints, size, draws):
 # Load
 
 
-@_register("force_scale", "1", 0.02, _nowhere)
+@_register("force_scale", "1", 0.02, _nowhere, largest=0.1)
 def _force_scale(robot, joints, size, draws):
     return replace(robot, cell=replace(robot.cell, scale=1.0 / (1.0 + size) - 1.0)), {"scale": size}
 
@@ -374,7 +428,7 @@ def _force_misalignment(robot, joints, size, draws):
     return wrong, _if_at_flange(wrong, _named("about_", turn))
 
 
-@_register("force_bias", "N", 20.0, _nowhere)
+@_register("force_bias", "N", 20.0, _nowhere, scale=(0.0, 1.0))
 def _force_bias(robot, joints, size, draws):
     """What is felt beyond what is shown is minus the bias of the display."""
     felt = size * _direction(draws)
@@ -414,7 +468,7 @@ def _cable_pull(robot, joints, size, draws):
     return _with_drive(robot, drives.CablePull(joint, (joint - 1, joint), size * draws.choice([-1.0, 1.0]))), {}
 
 
-@_register(OUTSIDE + "asymmetric_gear", "rad/(N m)^2", 1e-10, _each_joint)
+@_register(OUTSIDE + "asymmetric_gear", "rad/(N m)^2", 1e-10, _each_joint, scale=(1.0, -1.0))
 def _asymmetric_gear(robot, joints, size, draws):
     return _with_gear(robot, gears.Asymmetric(joints[0], size * draws.choice([-1.0, 1.0]))), {}
 
@@ -437,7 +491,7 @@ def _foreign_angle_stiffness(robot, joints, size, draws):
     return _with_gear(robot, law), {}
 
 
-@_register(OUTSIDE + "stiffening_link", "rad/(N m)^3", 1e-13, _each_link)
+@_register(OUTSIDE + "stiffening_link", "rad/(N m)^3", 1e-13, _each_link, scale=(1.0, -2.0))
 def _stiffening_link(robot, joints, size, draws):
     """A bolted link whose flanges open with the cube of the bending moment; without it the link is rigid."""
     stretch = joints[0] + 1
@@ -451,7 +505,7 @@ def _stiffening_link(robot, joints, size, draws):
 @_register(OUTSIDE + "foot_slip", "m", 8e-5, _nowhere)
 def _foot_slip(robot, joints, size, draws):
     """A foot between its bolts: it shifts by a clearance as soon as the push exceeds friction, and no further."""
-    friction = draws.uniform(100.0, 300.0)
+    friction = draws.uniform(100.0, 300.0) * robot.arm.load_share
     changed = _with_structure(robot, base=(0.0,) * 6)
 
     def slip(push):
@@ -471,12 +525,19 @@ def _tracker_scale(robot, joints, size, draws):
     return replace(robot, tracker=replace(robot.tracker, scale=size)), {}
 
 
+@_register(OUTSIDE + "moved_setup", "m", 1e-3, _nowhere)
+def _moved_setup(robot, joints, size, draws):
+    """The tracker's stand is knocked between two rows: a shift, and a turn about the stand of as much at three metres."""
+    move = Move(draws.uniform(*_KNOCKED_S), tuple(size * _direction(draws)), tuple(size / 3.0 * _direction(draws)))
+    return replace(robot, tracker=replace(robot.tracker, move=move)), {}
+
+
 @_register(OUTSIDE + "eccentric_nest", "m", 1e-4, _nowhere)
 def _eccentric_nest(robot, joints, size, draws):
     return replace(robot, nest=EccentricNest(size)), {}
 
 
-@_register(OUTSIDE + "cell_crosstalk", "1/N", 5e-5, _nowhere)
+@_register(OUTSIDE + "cell_crosstalk", "1/N", 5e-5, _nowhere, scale=(0.0, -1.0))
 def _cell_crosstalk(robot, joints, size, draws):
     return replace(robot, cell=replace(robot.cell, crosstalk_per_N=size)), {}
 

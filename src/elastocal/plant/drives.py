@@ -15,6 +15,7 @@ class Visits:
         As the controller believes, rad.
     approach : ndarray of int (S,)
         Number of the approach; states of one number were reached by the same move.
+    pose : ndarray of int (S,)
     time_s : ndarray (S,)
     seed : int
         Of what is random about the drives.
@@ -22,6 +23,7 @@ class Visits:
 
     angle: np.ndarray
     approach: np.ndarray
+    pose: np.ndarray
     time_s: np.ndarray
     seed: int
 
@@ -119,6 +121,18 @@ class Repeatability:
     def __call__(self, visits):
         draws = np.random.default_rng([visits.seed, 11])
         return np.array(self.sigma_rad) * visits.each_approach(draws, visits.angle.shape[1])
+
+
+@dataclass(frozen=True)
+class PoseError:
+    """An error of the angles common to all readings of a pose; `sigma_rad` (n,). No defect: every arm has it."""
+
+    sigma_rad: tuple
+
+    def __call__(self, visits):
+        draws = np.random.default_rng([visits.seed, 13])
+        drawn = draws.standard_normal((int(visits.pose.max()) + 1, visits.angle.shape[1]))
+        return np.array(self.sigma_rad) * drawn[visits.pose]
 
 
 def _one(visits, joint, turn):

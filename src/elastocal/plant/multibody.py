@@ -5,6 +5,7 @@ so that MuJoCo's own inverse dynamics can judge an equilibrium that was found wi
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import mujoco
@@ -12,7 +13,6 @@ import numpy as np
 
 from elastocal.errors import InputError
 from elastocal.plant.arm import turned
-from elastocal.plant.structure import STANDARD_GRAVITY
 
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NO_MASS, _NO_INERTIA = "1e-12", "1e-12 1e-12 1e-12"
@@ -33,6 +33,12 @@ class Machine:
         Of structural springs, m/N or rad/(N m); zero elsewhere.
     sites : dict of str to int
         Measuring points.
+    links : ndarray of int (n + 1,)
+        Bodies of the foot and of the links behind the drives.
+    beyond : ndarray of bool (coordinates, bodies)
+        Which bodies each coordinate moves: all from its own on, for the tree is a chain.
+    slides : ndarray of bool (coordinates,)
+        Which coordinates are lengths; the others are angles.
     flange : str
     compensator : structure.Compensator or None
     xml : str
@@ -44,6 +50,9 @@ class Machine:
     springs: dict
     compliance: np.ndarray
     sites: dict
+    links: np.ndarray
+    beyond: np.ndarray
+    slides: np.ndarray
     flange: str
     compensator: object
     xml: str
@@ -93,7 +102,7 @@ def machine_of(arm, structure, gear_compliance=None):
     """
     root = Element("mujoco", model="plant")
     SubElement(root, "compiler", angle="radian", autolimits="false")
-    SubElement(root, "option", gravity=f"0 0 {-STANDARD_GRAVITY if structure.gravity else 0.0!r}")
+    SubElement(root, "option", gravity=_text(structure.gravity_m_s2))
     tree = _Tree(SubElement(root, "worldbody"))
     tree.descend("foot")
     for number, name in enumerate(f"{kind}{axis}" for kind in ("base_", "base_r") for axis in "xyz"):
@@ -121,7 +130,7 @@ def machine_of(arm, structure, gear_compliance=None):
 
 
 def _indexed(arm, structure, tree, xml):
-    model = mujoco.MjModel.from_xml_string(xml)
+    model = _compiled(xml)
     place = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
     compliance = np.zeros(model.nq)
     for name, value in tree.compliance.items():
@@ -135,10 +144,19 @@ def _indexed(arm, structure, tree, xml):
         {name: index for name, index in place.items() if not name.startswith(("drive", "gear"))},
         compliance,
         {name: model.site(name).id for name in arm.points},
+        np.array([model.body(name).id for name in ("foot", *(f"arm{j}" for j in numbers))]),
+        np.arange(model.nbody) >= model.jnt_bodyid[:, None],
+        model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE,
         arm.points[-1],
         structure.compensator,
         xml,
     )
+
+
+@lru_cache(maxsize=4)
+def _compiled(xml):
+    """A case asks for the same few models again and again."""
+    return mujoco.MjModel.from_xml_string(xml)
 
 
 def _add_stretch(tree, number, stretch, structure):

@@ -10,9 +10,10 @@ from elastocal.plant.gears import GearStates, LinearSprings
 from elastocal.plant.load_cell import LoadCell
 from elastocal.plant.multibody import machine_of
 from elastocal.plant.random_numbers import stream
-from elastocal.plant.statics import Loading, equilibrium, generalized_forces
+from elastocal.plant.statics import Loading, equilibrium, places
 from elastocal.plant.structure import Structure
 from elastocal.plant.tracker import EccentricNest, Tracker
+from elastocal.plant.weights import declared_masses, off_the_line, on_stretches, true_masses
 
 _REFERENCE_C = 20.0
 
@@ -80,21 +81,31 @@ class PhysicalRobot:
     nest: EccentricNest | None = None
 
 
-def specimen(arm, seed, spread=0.15):
-    """One robot of a series: its gears are softer or stiffer than the robot file says, evenly up to a share of `spread`.
+def specimen(arm, seed, spread=0.15, weighs=True, off_line_m=0.0):
+    """One robot of a series: other gears than the robot file says, and other weights.
 
     Parameters
     ----------
     arm : Arm
     seed : int
     spread : float
+        Largest share by which a gear is softer or stiffer, evenly drawn.
+    weighs : bool
+        False: an arm whose controller takes care of its weight.
+    off_line_m : float
+        By how much centres of mass lie off the lines of their links at most, across each, beyond what is declared.
 
     Returns
     -------
     PhysicalRobot
         Faultless.
     """
-    return PhysicalRobot(arm, arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints))
+    compliance = arm.compliance * stream(seed, "specimen").uniform(1.0 - spread, 1.0 + spread, arm.joints)
+    masses = true_masses(declared_masses(arm), stream(seed, "weights")) if weighs else ()
+    if off_line_m:
+        masses = off_the_line(masses, arm, off_line_m, stream(seed, "centres off the line"))
+    structure = Structure(masses=on_stretches(masses, arm), gravity_m_s2=arm.gravity_m_s2)
+    return PhysicalRobot(arm, compliance, structure)
 
 
 @dataclass(frozen=True)
@@ -139,8 +150,58 @@ class Schedule:
         return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
 
 
-def seen_poses(robot, schedule):
+def seen_poses(robot, schedule, start=None):
     """Poses of all targets as a tracker without noise reads them.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    schedule : Schedule
+    start : Equilibrium, optional
+        Of a robot that differs little; saves time.
+
+    Returns
+    -------
+    position : ndarray (S, targets, 3)
+        m, base frame; targets as in ``robot.arm.points``.
+    rotation : ndarray (S, targets, 3, 3)
+    """
+    return seen_at_rest(robot, schedule, at_rest(robot, schedule, start)[1])
+
+
+def at_rest(robot, schedule, start=None):
+    """The arm in equilibrium.
+
+    Parameters
+    ----------
+    robot, schedule, start
+        As in `seen_poses`.
+
+    Returns
+    -------
+    machine : Machine
+    rest : Equilibrium
+    """
+    machine = machine_of(robot.arm, robot.structure)
+    drive, growth, warm = driven(robot, schedule)
+    facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
+    if robot.cell.in_flange:
+        coordinates = np.zeros((len(drive), machine.model.nq))
+        coordinates[:, machine.drive] = drive
+        facing = places(machine, coordinates, growth).rotation[:, -1]
+    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth)
+    laws = (LinearSprings(robot.compliance), *robot.gears)
+
+    def gear_deflection(torque, unloaded):
+        states = GearStates(torque, unloaded, schedule.angle, schedule.sense, warm, schedule.previous)
+        return sum(law(states) for law in laws)
+
+    begin = None if start is None else start.coordinates[:, start.gear]
+    return machine, equilibrium(machine, loading, gear_deflection, robot.structure_laws, begin)
+
+
+def driven(robot, schedule):
+    """Where the drives really stand, and how warm everything is.
 
     Parameters
     ----------
@@ -149,30 +210,22 @@ def seen_poses(robot, schedule):
 
     Returns
     -------
-    position : ndarray (S, targets, 3)
-        m, base frame; targets as in ``robot.arm.points``.
-    rotation : ndarray (S, targets, 3, 3)
+    drive : ndarray (S, n)
+        rad.
+    growth : ndarray (S,)
+        Relative growth of all lengths.
+    warm : ndarray (S,)
+        Temperature of the castings, °C.
     """
-    machine = machine_of(robot.arm, robot.structure)
-    visits = Visits(schedule.angle, schedule.approach, schedule.time_s, schedule.seed)
+    visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
     drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))
     warm = robot.warmth.of_castings(schedule.time_s)
-    growth = robot.expansion_per_K * (warm - _REFERENCE_C)
-    loading = Loading(drive, np.zeros((len(drive), 6)), growth)
-    facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
-    if robot.cell.in_flange:
-        coordinates = np.zeros((len(drive), machine.model.nq))
-        coordinates[:, machine.drive] = drive
-        facing = generalized_forces(machine, coordinates, loading)[2][:, -1]
-    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth)
-    laws = (LinearSprings(robot.compliance), *robot.gears)
+    return drive, robot.expansion_per_K * (warm - _REFERENCE_C), warm
 
-    def gear_deflection(torque, unloaded):
-        states = GearStates(torque, unloaded, schedule.angle, schedule.sense, warm, schedule.previous)
-        return sum(law(states) for law in laws)
 
-    rest = equilibrium(machine, loading, gear_deflection, robot.structure_laws)
-    position, rotation = rest.position, rest.rotation
+def seen_at_rest(robot, schedule, rest):
+    """What a tracker without noise reads of an arm in equilibrium; as `seen_poses`."""
+    position, rotation = rest.position.copy(), rest.rotation
     if robot.nest is not None:
         position[:, -1] = robot.nest.moved(position[:, -1], rotation[:, -1], schedule.angle[:, -1])
     return robot.tracker.seen(position, rotation, schedule.time_s)

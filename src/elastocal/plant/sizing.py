@@ -1,19 +1,23 @@
 """How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
 
-With d the change that a defect makes in the readings, noise free, of the poses that are not held out, and sigma their standard
-deviations, the raw non-centrality is |d / sigma|^2: the signal before anything has absorbed it. What the declared model cannot
-absorb by other compliances of its joints is |M d / sigma|^2, M projecting out the plant's own change of the readings per
-compliance (and, where the frame is unknown, per motion of the frame). The latter is what a test can find.
+With d the change that a defect makes in the readings, noise free, of the poses that are not held out, in standard deviations,
+the raw non-centrality is |d|^2: the signal before anything has absorbed it. What the declared model cannot absorb by other
+compliances X of its joints (and, where the frame is unknown, by a motion of the frame) and by other weights V, declared with a
+standard deviation each, is
+
+    min over b, w of |d - X b - V w|^2 + |w|^2,
+
+V in its standard deviations: what a test can find where the weights are known so well and no better.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.plant.physical_robot import seen_poses
+from elastocal.plant.physical_robot import at_rest, seen_at_rest, seen_poses
 from elastocal.plant.tracker import rotation_vector
+from elastocal.plant.weights import centre_std_m
 
-_STEP = 0.02
 _ROUNDS = 12
 # Below this share of the largest a direction is second order and rounding.
 _SAME = 0.02
@@ -50,29 +54,31 @@ class Yardstick:
         Whether orientations are read too.
     free_frame : bool
         Whether the analysis fits the tracker's frame.
+    declared : tuple of LinkMass
+        Weights as the analysis is told them.
     """
 
-    def __init__(self, robot, schedule, targets=None, orientation=True, free_frame=False):
+    def __init__(self, robot, schedule, targets=None, orientation=True, free_frame=False, declared=()):
         self.robot, self.schedule, self.orientation = robot, schedule, orientation
         self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
-        self.poses = seen_poses(robot, schedule)
-        columns = []
-        for joint, compliance in enumerate(robot.compliance):
-            stiffer = robot.compliance.copy()
-            stiffer[joint] *= 1.0 + _STEP
-            columns.append(self.change(replace(robot, compliance=stiffer))[schedule.training].ravel() / (_STEP * compliance))
+        machine, self._rest = at_rest(robot, schedule)
+        self.poses = seen_at_rest(robot, schedule, self._rest)
+        self._turns = _per_turn(machine, self._rest)
+        columns = [self._turned_by(joint, self._rest.torque[:, machine.gear[joint]]) for joint in range(robot.arm.joints)]
         if free_frame:
             columns += self._frame_columns()
-        columns = np.array(columns).T
-        self._absorbed = np.linalg.qr(columns / np.linalg.norm(columns, axis=0))[0]
+        weights = [self._turned_by(None, turn) for turn in _turns_of_weights(machine, self._rest, robot, declared)]
+        # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
+        columns = [column / np.linalg.norm(column) for column in columns if column.any()]
+        weights = [column for column in weights if column.any()]
+        stacked = np.zeros((len(columns[0]) + len(weights), len(columns) + len(weights)))
+        stacked[: len(columns[0])] = np.array([*columns, *weights]).T
+        stacked[len(columns[0]) :, len(columns) :] = np.eye(len(weights))
+        self._absorbed, self._priors = np.linalg.qr(stacked)[0], len(weights)
 
     def change(self, robot):
         """Change of the readings against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
-        metres, radians = self._change(*seen_poses(robot, self.schedule))
-        parts = [metres / self.robot.tracker.sigma_at(self.poses[0])[:, self.targets, None]]
-        if self.orientation:
-            parts.append(radians / self.robot.tracker.sigma_rad)
-        return np.concatenate(parts, axis=-1)
+        return self._whitened(*self._change(robot))
 
     def signal(self, robot):
         """How a robot differs from the faultless one.
@@ -85,15 +91,18 @@ class Yardstick:
         -------
         Signal
         """
-        metres, radians = self._change(*seen_poses(robot, self.schedule))
-        seen, left = self._seen(robot), self.left(robot)
+        metres, radians = self._change(robot)
+        seen = self._whitened(metres, radians)[self.schedule.training].ravel()
+        left = self._left_of(seen)
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
 
     def left(self, robot):
-        """What the declared model cannot absorb of a robot's change in the readings that are not held out, ndarray."""
-        seen = self._seen(robot)
-        return seen - self._absorbed @ (self._absorbed.T @ seen)
+        """What the declared model cannot absorb of a robot's change in the readings that are not held out, ndarray.
+
+        Its last entries are the weights, in their standard deviations, that absorb the rest.
+        """
+        return self._left_of(self.change(robot)[self.schedule.training].ravel())
 
     def angle_deg(self, robot, others):
         """Angle between what is left of a robot and all that others make together, in any proportion.
@@ -113,13 +122,32 @@ class Yardstick:
         share = np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine)
         return float(np.degrees(np.arccos(min(share, 1.0))))
 
-    def _seen(self, robot):
-        return self.change(robot)[self.schedule.training].ravel()
+    def _left_of(self, seen):
+        seen = np.append(seen, np.zeros(self._priors))
+        return seen - self._absorbed @ (self._absorbed.T @ seen)
 
-    def _change(self, position, rotation):
+    def _change(self, robot):
+        position, rotation = seen_poses(robot, self.schedule, self._rest)
         position_0, rotation_0 = self.poses
         relative = rotation @ np.swapaxes(rotation_0, -1, -2)
         return (position - position_0)[:, self.targets], rotation_vector(relative)[:, self.targets]
+
+    def _whitened(self, metres, radians):
+        parts = [metres / self.robot.tracker.sigma_at(self.poses[0])[:, self.targets, None]]
+        if self.orientation:
+            parts.append(radians / self.robot.tracker.sigma_rad)
+        return np.concatenate(parts, axis=-1)
+
+    def _turned_by(self, joint, turn):
+        """Change of the readings, to first order, where one gear, or each of them, turns by so much (S,) or (S, n) more."""
+        metres, radians = self._turns
+        if joint is None:
+            turn = turn[:, None, :, None]
+            metres, radians = (metres * turn).sum(axis=2), (radians * turn).sum(axis=2)
+        else:
+            turn = turn[:, None, None]
+            metres, radians = metres[:, :, joint] * turn, radians[:, :, joint] * turn
+        return self._whitened(metres[:, self.targets], radians[:, self.targets])[self.schedule.training].ravel()
 
     def _frame_columns(self):
         position = self.poses[0][self.schedule.training][:, self.targets]
@@ -132,6 +160,31 @@ class Yardstick:
                 turned.append(np.broadcast_to(axis, position.shape) / self.robot.tracker.sigma_rad)
             columns += [np.concatenate(parts, axis=-1).ravel() for parts in (shifted, turned)]
         return columns
+
+
+def _per_turn(machine, rest):
+    """Movement of all targets per turn of each gear, two ndarray (S, targets, n, 3): m/rad, and axes where it turns them."""
+    where, gear = rest.where, machine.gear
+    axis, arm = where.axis[:, None, gear], where.position[:, :, None] - where.anchor[:, None, gear]
+    body = machine.model.site_bodyid[list(machine.sites.values())]
+    moves = machine.beyond[gear][:, body].T[None, :, :, None]
+    return moves * np.cross(axis, arm), moves * axis
+
+
+def _turns_of_weights(machine, rest, robot, declared):
+    """Turns of all gears per standard deviation of each mass and each component of its centre, list of ndarray (S, n)."""
+    where, gear, pull = rest.where, machine.gear, np.array(robot.structure.gravity_m_s2)
+    found = []
+    for mass in declared:
+        link = machine.links[mass.link]
+        turn, moves = where.body_rotation[:, link], machine.beyond[gear, link]
+        place = where.body[:, link] + turn @ np.array(mass.centre_m)
+        levers = [(place[:, None] - where.anchor[:, gear]) * mass.relative_std * mass.mass_kg]
+        levers += [turn[:, None, :, axis] * mass.mass_kg * centre_std_m(mass) for axis in range(3)]
+        for lever in levers:
+            torque = (where.axis[:, gear] * np.cross(lever, pull)).sum(axis=2) * moves
+            found.append(robot.compliance * torque)
+    return found
 
 
 def size_for(yardstick, robot_of_size, start, target, quantity="retained", largest=np.inf):

@@ -11,7 +11,10 @@ import mujoco
 import numpy as np
 
 _SWEEPS = 60
-_TOLERANCE = 1e-12
+# Of the largest deflection: a hundredth of a picometre of millimetres.
+_TOLERANCE = 1e-11
+# MuJoCo wants mass in each moving body; what weighs less than this is none.
+_NOTHING_KG = 1e-6
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,35 @@ class Loading:
 
 
 @dataclass(frozen=True)
+class Places:
+    """Where everything is, in S states; base axes, m.
+
+    Attributes
+    ----------
+    anchor, axis : ndarray (S, coordinates, 3)
+        Of the joints.
+    mass : ndarray (S, bodies, 3)
+        Centres of mass.
+    body : ndarray (S, bodies, 3)
+        Origins of the bodies.
+    body_rotation : ndarray (S, bodies, 3, 3)
+    position, rotation : ndarray (S, points, 3), (S, points, 3, 3)
+        Of the measuring points.
+    spring : ndarray (S, 2, 3)
+        Fixed and moving end of the compensator; (S, 0, 3) without.
+    """
+
+    anchor: np.ndarray
+    axis: np.ndarray
+    mass: np.ndarray
+    body: np.ndarray
+    body_rotation: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    spring: np.ndarray
+
+
+@dataclass(frozen=True)
 class Equilibrium:
     """Where an arm came to rest, in S states.
 
@@ -41,23 +73,73 @@ class Equilibrium:
     ----------
     coordinates : ndarray (S, coordinates)
         rad, m.
+    gear : ndarray of int (n,)
+        Which of them are the gears' deflections.
     torque : ndarray (S, coordinates)
         Generalized force that each coordinate's spring transmits, N m, N.
-    position : ndarray (S, points, 3)
-        Of the measuring points, base frame, m.
-    rotation : ndarray (S, points, 3, 3)
+    where : Places
     sweeps : int
     """
 
     coordinates: np.ndarray
+    gear: np.ndarray
     torque: np.ndarray
-    position: np.ndarray
-    rotation: np.ndarray
+    where: Places
     sweeps: int
+
+    @property
+    def position(self):
+        """Of the measuring points, ndarray (S, points, 3), base frame, m."""
+        return self.where.position
+
+    @property
+    def rotation(self):
+        """Of the measuring points, ndarray (S, points, 3, 3)."""
+        return self.where.rotation
+
+
+def places(machine, coordinates, growth):
+    """MuJoCo's kinematics.
+
+    Parameters
+    ----------
+    machine : Machine
+    coordinates : ndarray (S, coordinates)
+    growth : ndarray (S,)
+        Relative growth of all lengths.
+
+    Returns
+    -------
+    Places
+    """
+    model, data = machine.model, mujoco.MjData(machine.model)
+    count, joints, links, points = len(coordinates), model.njnt, model.nbody, model.nsite
+    anchor, axis = np.empty((count, joints, 3)), np.empty((count, joints, 3))
+    mass, body, turn = np.empty((count, links, 3)), np.empty((count, links, 3)), np.empty((count, links, 9))
+    position, rotation = np.empty((count, points, 3)), np.empty((count, points, 9))
+    # MuJoCo's own arrays, seen through views that follow each call.
+    seen = ((anchor, data.xanchor), (axis, data.xaxis), (mass, data.xipos), (body, data.xpos), (turn, data.xmat))
+    seen += ((position, data.site_xpos), (rotation, data.site_xmat))
+    coordinate, bodies, sites, grown = data.qpos, model.body_pos.copy(), model.site_pos.copy(), np.append(0.0, growth)
+    try:
+        for state, row in enumerate(coordinates):
+            if grown[state + 1] != grown[state]:
+                model.body_pos[:] = bodies * (1.0 + grown[state + 1])
+                model.site_pos[:] = sites * (1.0 + grown[state + 1])
+            coordinate[:] = row
+            mujoco.mj_kinematics(model, data)
+            for kept, now in seen:
+                kept[state] = now
+    finally:
+        model.body_pos[:], model.site_pos[:] = bodies, sites
+    mine = list(machine.sites.values())
+    ends = [] if machine.compensator is None else [model.site(name).id for name in ("anchor", "crank")]
+    turn, rotation = turn.reshape(count, links, 3, 3), rotation.reshape(count, points, 3, 3)
+    return Places(anchor, axis, mass, body, turn, position[:, mine], rotation[:, mine], position[:, ends])
 
 
 def generalized_forces(machine, coordinates, loading):
-    """Forces on all coordinates, and poses of all measuring points.
+    """Forces on all coordinates by the principle of virtual work, and where everything is.
 
     Parameters
     ----------
@@ -68,49 +150,44 @@ def generalized_forces(machine, coordinates, loading):
     Returns
     -------
     force : ndarray (S, coordinates)
-    position : ndarray (S, points, 3)
-    rotation : ndarray (S, points, 3, 3)
+        N m, N: a . (M + (p - o) x F + sum (x_k - o) x m_k g) about the axis a through o, of masses m_k at x_k beyond it.
+    where : Places
     """
-    model, data = machine.model, mujoco.MjData(machine.model)
-    flange, sites = machine.sites[machine.flange], list(machine.sites.values())
-    body, heavy = int(model.site_bodyid[flange]), bool(model.body_mass.sum() > 1e-6 and model.opt.gravity.any())
-    force = np.zeros((len(coordinates), model.nv))
-    position, rotation = np.empty((len(coordinates), len(sites), 3)), np.empty((len(coordinates), len(sites), 9))
-    bodies, points = model.body_pos.copy(), model.site_pos.copy()
-    weight = np.empty(model.nv)
-    try:
-        for state, (row, wrench) in enumerate(zip(coordinates, loading.wrench, strict=True)):
-            if loading.growth[state] or (state and loading.growth[state - 1]):
-                model.body_pos[:] = bodies * (1.0 + loading.growth[state])
-                model.site_pos[:] = points * (1.0 + loading.growth[state])
-            data.qpos[:] = row
-            mujoco.mj_kinematics(model, data)
-            mujoco.mj_comPos(model, data)
-            out = force[state]
-            mujoco.mj_applyFT(model, data, wrench[:3], wrench[3:], data.site_xpos[flange], body, out)
-            if heavy:
-                # At rest the bias force is minus what gravity does.
-                mujoco.mj_rne(model, data, 0, weight)
-                out -= weight
-            if machine.compensator is not None:
-                _pull(machine, data, out)
-            position[state], rotation[state] = data.site_xpos[sites], data.site_xmat[sites]
-    finally:
-        model.body_pos[:], model.site_pos[:] = bodies, points
-    return force, position, rotation.reshape(*rotation.shape[:2], 3, 3)
+    model, where = machine.model, places(machine, coordinates, loading.growth)
+    flange = where.position[:, list(machine.sites).index(machine.flange), None]
+    push, moment = loading.wrench[:, None, :3], loading.wrench[:, None, 3:]
+    weighs = model.body_mass > _NOTHING_KG
+    if weighs.any() and model.opt.gravity.any():
+        moved = machine.beyond[:, weighs] * model.body_mass[weighs]
+        kilograms, first = moved.sum(axis=1)[:, None], np.einsum("jk,skc->sjc", moved, where.mass[:, weighs])
+        moment = moment + np.cross(first - kilograms * where.anchor, model.opt.gravity)
+        weight = kilograms * model.opt.gravity
+    else:
+        weight = 0.0
+    moment = moment + np.cross(flange - where.anchor, np.broadcast_to(push, where.anchor.shape))
+    along = np.where(machine.slides[:, None], push + weight, moment)
+    force = (where.axis * along).sum(axis=2)
+    if machine.compensator is not None:
+        force += _pull(machine, where)
+    return force, where
 
 
-def _pull(machine, data, out):
+def _pull(machine, where):
+    """Of the spring between the links before and behind the shoulder's drive."""
     model, spring = machine.model, machine.compensator
-    anchor, crank = model.site("anchor").id, model.site("crank").id
-    line = data.site_xpos[anchor] - data.site_xpos[crank]
-    length = np.sqrt(line @ line)
-    pull = spring.stiffness_N_per_m * (length - spring.free_length_m) / length * line
-    for site, force in ((crank, pull), (anchor, -pull)):
-        mujoco.mj_applyFT(model, data, force, np.zeros(3), data.site_xpos[site], model.site_bodyid[site], out)
+    line = where.spring[:, 0] - where.spring[:, 1]
+    length = np.linalg.norm(line, axis=1, keepdims=True)
+    pull = spring.stiffness_N_per_m * (1.0 - spring.free_length_m / length) * line
+    force = 0.0
+    for name, end, sense in (("anchor", 0, -1.0), ("crank", 1, 1.0)):
+        body = int(model.site_bodyid[model.site(name).id])
+        moment = np.cross(where.spring[:, end, None] - where.anchor, sense * pull[:, None])
+        along = np.where(machine.slides[:, None], sense * pull[:, None], moment)
+        force = force + machine.beyond[:, body] * (where.axis * along).sum(axis=2)
+    return force
 
 
-def equilibrium(machine, loading, gear_deflection, structure_laws=()):
+def equilibrium(machine, loading, gear_deflection, structure_laws=(), start=None):
     """Where the arm comes to rest.
 
     Parameters
@@ -122,6 +199,8 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=()):
         `unloaded` is the torque before the external wrench came on.
     structure_laws : sequence of (str, callable)
         Start of the names of structural springs, and what they deflect by, beyond their compliance, under a force (S,).
+    start : ndarray (S, n), optional
+        Deflections of the gears to begin with, rad, such as those of a robot that differs little.
 
     Returns
     -------
@@ -130,7 +209,7 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=()):
     Raises
     ------
     RuntimeError
-        Where the iteration does not settle to 1e-12 of the largest deflection.
+        Where the iteration does not settle to 1e-11 of the largest deflection.
     """
     gear = machine.gear
     extra = [(index, law) for start, law in structure_laws for name, index in machine.springs.items() if name.startswith(start)]
@@ -138,8 +217,10 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=()):
     coordinates[:, machine.drive] = loading.drive
     nothing = Loading(loading.drive, np.zeros_like(loading.wrench), loading.growth)
     unloaded = generalized_forces(machine, coordinates, nothing)[0][:, gear] if _preloaded(machine) else 0.0 * loading.drive
+    if start is not None:
+        coordinates[:, gear] = start
     for sweep in range(1, _SWEEPS + 1):
-        force, position, rotation = generalized_forces(machine, coordinates, loading)
+        force, where = generalized_forces(machine, coordinates, loading)
         following = force * machine.compliance
         following[:, machine.drive] = loading.drive
         following[:, gear] = gear_deflection(force[:, gear], unloaded)
@@ -149,10 +230,10 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=()):
         change[:, machine.drive] = size[:, machine.drive] = 0.0
         # The poses are those of `coordinates`; once the next would be the same they need no further sweep.
         if change.max(initial=0.0) <= _TOLERANCE * max(size.max(initial=0.0), 1e-9):
-            return Equilibrium(coordinates, force, position, rotation, sweep)
+            return Equilibrium(coordinates, gear, force, where, sweep)
         coordinates = following
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
 
 
 def _preloaded(machine):
-    return machine.compensator is not None or machine.model.body_mass.sum() > 1e-6
+    return machine.compensator is not None or machine.model.body_mass.sum() > _NOTHING_KG

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-STANDARD_GRAVITY = 9.80665
+from elastocal.plant.arm import STANDARD_GRAVITY
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,8 @@ class Structure:
     compensator : Compensator or None
     wrong_vectors_m, wrong_turns : dict of int to tuple
         Of a stretch: by how much its vector and its far end's rotation vector (rad) differ from the robot file.
-    gravity : bool
+    gravity_m_s2 : tuple of float
+        In the axes of the base.
     """
 
     base: tuple | None = None
@@ -101,4 +102,4 @@ class Structure:
     compensator: Compensator | None = None
     wrong_vectors_m: dict = field(default_factory=dict)
     wrong_turns: dict = field(default_factory=dict)
-    gravity: bool = True
+    gravity_m_s2: tuple = (0.0, 0.0, -STANDARD_GRAVITY)

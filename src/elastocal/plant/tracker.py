@@ -34,6 +34,28 @@ class Drift:
 
 
 @dataclass(frozen=True)
+class Move:
+    """A stand that was knocked, or put elsewhere and tied to the old frame badly: from one row on all readings are moved.
+
+    Attributes
+    ----------
+    after_s : float
+        Readings later than this are moved.
+    shift_m, turn_rad : tuple of float
+        Along and about the base axes through where the tracker stands.
+    """
+
+    after_s: float
+    shift_m: tuple
+    turn_rad: tuple
+
+    def moved(self, time_s):
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the readings."""
+        later = (np.asarray(time_s) > self.after_s)[:, None]
+        return later * np.array(self.shift_m), turned(later * np.array(self.turn_rad))
+
+
+@dataclass(frozen=True)
 class Tracker:
     """A laser tracker; the default only has noise.
 
@@ -47,6 +69,7 @@ class Tracker:
     frame_turn : tuple of float
         Rotation vector of its own axes in the base's; readings are in the base frame unless the design says otherwise.
     drift : Drift or None
+    move : Move or None
     refraction_per_m : float
         Bent light: a target at range r is read at r + k r^2.
     scale : float
@@ -63,6 +86,7 @@ class Tracker:
     stand_m: tuple = (6.0, -2.0, 1.5)
     frame_turn: tuple = (0.0, 0.0, 0.0)
     drift: Drift | None = None
+    move: Move | None = None
     refraction_per_m: float = 0.0
     scale: float = 0.0
     outliers: float = 0.0
@@ -85,10 +109,11 @@ class Tracker:
         sight = position - np.array(self.stand_m)
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
         position = position + (self.scale + self.refraction_per_m * far) * sight
-        if self.drift is not None:
-            shift, turn = self.drift.moved(time_s)
-            position = np.einsum("sij,stj->sti", turn, position) + shift[:, None]
-            rotation = turn[:, None] @ rotation
+        for motion, about in ((self.drift, np.zeros(3)), (self.move, np.array(self.stand_m))):
+            if motion is not None:
+                shift, turn = motion.moved(time_s)
+                position = np.einsum("sij,stj->sti", turn, position - about) + about + shift[:, None]
+                rotation = turn[:, None] @ rotation
         return position, rotation
 
     def read(self, position, rotation, draws):

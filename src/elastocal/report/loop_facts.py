@@ -214,9 +214,10 @@ def step_rows(steps, floor_m):
     for step in steps:
         cells = []
         for metric in METRICS:
-            low, high = (digits(step[f"heldout_{metric}_m_{end}"]) for end in ("low", "high"))
+            low, high = (step[f"heldout_{metric}_m_{end}"] for end in ("low", "high"))
             multiple = [f"{step[f'heldout_{metric}_over_floor']:.2f} × floor"] if floor_m else []
-            cells.append([digits(step[f"heldout_{metric}_m"]), f"[{low}, {high}]", *multiple])
+            interval = "–" if np.isnan(low) else f"≥ {digits(low)}" if np.isinf(high) else f"[{digits(low)}, {digits(high)}]"
+            cells.append([digits(step[f"heldout_{metric}_m"]), interval, *multiple])
         name, number = step_words(step["step"]), str(int(step["parameters"]))
         rows.append(
             {"name": name, "kind": step["kind"], "parameters": number, "training": digits(step["train_rms_m"]), "cells": cells}

@@ -1,0 +1,86 @@
+"""How often 95 % intervals of held-out errors hold the truth: `python benchmarks/interval_coverage.py`, two minutes.
+
+Prints the table of docs/held_out_intervals.md.
+"""
+
+import sys
+import warnings
+
+import numpy as np
+from common import ROOT
+from scipy.stats import bootstrap
+
+from elastocal.held_out import intervals
+
+sys.path.insert(0, str(ROOT / "tests"))
+from made_errors import KINDS, campaigns_of, true_figures
+
+POSES, CAMPAIGNS, REPLICATES = (9, 18, 36), 400, 999
+FIGURES = ("mean_m", "rms_m", "p95_m", "reduction", "reduction of none")
+METHODS = ("percentile", "BCa", "ours")
+
+
+def main():
+    """Print one line for each kind of errors and number of poses."""
+    print("| errors | poses |" + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES) + "| p95 open above |")
+    print("|---" * (3 + len(FIGURES)) + "|")
+    for kind in KINDS:
+        truth = true_figures(kind)
+        for poses in POSES:
+            held, open_above = covered(kind, poses, truth)
+            cells = [" / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS) for name in FIGURES]
+            print(f"| {kind} | {poses} | " + " | ".join(cells) + f" | {100 * open_above:.0f} % |", flush=True)
+
+
+def covered(kind, poses, truth):
+    """Shares of campaigns whose intervals hold the truth, and whose 95th percentile has no upper limit."""
+    rng, hits, open_above = np.random.default_rng(7), {}, 0
+    for before, after, false in campaigns_of(kind, CAMPAIGNS, poses, (8, poses)):
+        found = {method: by_scipy(before, after, false, method, rng) for method in METHODS[:2]}
+        limits, reductions = intervals([before, after], REPLICATES, rng)
+        of_none = intervals([after, false], REPLICATES, rng)[1][1]
+        ours = {name: limits[1][name] for name in FIGURES[:3]}
+        ours |= {"reduction": (reductions[1].low, reductions[1].high), "reduction of none": (of_none.low, of_none.high)}
+        open_above += np.isinf(ours["p95_m"][1])
+        for method, of_method in (found | {"ours": ours}).items():
+            for name, (low, high) in of_method.items():
+                hits[name, method] = hits.get((name, method), 0) + (low <= truth[name] <= high)
+    return {key: count / CAMPAIGNS for key, count in hits.items()}, open_above / CAMPAIGNS
+
+
+def by_scipy(before, after, false, method, rng):
+    """The same intervals by `scipy.stats.bootstrap` over poses."""
+    cluster = after.cluster
+    counts = np.bincount(cluster)
+    sums = np.bincount(cluster, after.distance)
+    squares = [np.bincount(cluster, errors.distance**2) for errors in (before, after, false)]
+    parts = np.array_split(after.distance, np.cumsum(counts)[:-1])
+    longest = max(counts)
+    padded = np.array([np.pad(part, (0, longest - len(part)), constant_values=np.inf) for part in parts])
+
+    def quantile(index, axis=-1):
+        rising = np.sort(padded[index.astype(int)].reshape(*index.shape[:-1], -1), axis=-1)
+        place = 0.95 * (np.isfinite(rising).sum(axis=-1, keepdims=True) - 1)
+        low, high = (np.take_along_axis(rising, rank(place).astype(int), axis=-1) for rank in (np.floor, np.ceil))
+        return (low + (place % 1.0) * (high - low))[..., 0]
+
+    def ratio(top, bottom, axis=-1):
+        return top.sum(axis=axis) / bottom.sum(axis=axis)
+
+    def interval(samples, statistic):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = bootstrap(samples, statistic, paired=True, vectorized=True, n_resamples=REPLICATES, method=method, rng=rng)
+        return np.array([found.confidence_interval.low, found.confidence_interval.high])
+
+    return {
+        "mean_m": interval((sums, counts), ratio),
+        "rms_m": np.sqrt(interval((squares[1], counts), ratio)),
+        "p95_m": interval((np.arange(len(counts)),), quantile),
+        "reduction": 1 - np.sqrt(interval((squares[1], squares[0]), ratio))[::-1],
+        "reduction of none": 1 - np.sqrt(interval((squares[2], squares[1]), ratio))[::-1],
+    }
+
+
+if __name__ == "__main__":
+    main()

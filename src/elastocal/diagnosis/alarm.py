@@ -1,0 +1,96 @@
+"""Is anything missing at all? One test, exact by simulation.
+
+The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
+distribution is that of simulated readings of the same design, at the pose error that fits best, with the pose error averaged
+over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
+no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw.
+
+References
+----------
+.. [1] Davison, A. C. and Hinkley, D. V. (1997). Bootstrap methods and their application, section 4.2.
+.. [2] Good, I. J. (1992). The Bayes/non-Bayes compromise: a brief review. JASA 87, 597-606.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
+from elastocal.diagnosis.statistics import null_draws
+
+
+@dataclass(frozen=True)
+class Alarm:
+    """Outcome of the test.
+
+    Attributes
+    ----------
+    p_value : float
+    statistic : float
+        Log of the average Bayes factor against "nothing".
+    raised : bool
+    """
+
+    p_value: float
+    statistic: float
+    raised: bool
+
+
+def alarm_of(problem, products, pose_error_rad, stream):
+    """Test whether the declared model lacks anything.
+
+    Parameters
+    ----------
+    problem : Problem
+    products : Products
+    pose_error_rad : float
+        Pose error of the declared model at which readings are simulated.
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    Alarm
+    """
+    settings, statistics = problem.settings, problem.statistics
+    chosen = _near(statistics.pose_error_rad, pose_error_rad)
+    statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
+    along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
+    along = np.concatenate([statistics.along[..., None], along], axis=2)
+    squares = np.concatenate([statistics.squares[:, None], squares], axis=1)
+    found = _average_bayes_factors(problem, statistics, log_pose, along, squares)
+    p_value = (1 + (found[1:] >= found[0]).sum()) / len(found)
+    return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
+
+
+def _near(pose_error_rad, fitted):
+    """Sizes of the pose error that draws of the fitted one can make likely: its own, and two to either side."""
+    place = int(np.argmin(np.abs(pose_error_rad - fitted)))
+    return np.arange(max(place - 2, 0), min(place + 3, len(pose_error_rad)))
+
+
+def _average_bayes_factors(problem, statistics, log_pose, along, squares):
+    """Log of the average Bayes factor for N sets of readings, ndarray (N,).
+
+    Parameters
+    ----------
+    along : ndarray (T, K, N)
+    squares : ndarray (T, N)
+    """
+    grid, prior = problem.grid(), problem.prior
+    start = (statistics.log_likelihood + log_pose)[:, None]
+    nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
+    blocks = blocks_of(statistics.gram, problem.units, problem.candidates)
+    total = np.full(len(nothing), -np.inf)
+    for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
+        for place, number in enumerate(members):
+            turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
+            log_prior = prior.log_odds_of([problem.units[number]])
+            terms = []
+            for scale, log_weight in zip(grid.scales, grid.log_weights, strict=True):
+                widened = 1.0 + scale**2 * values[:, place]
+                gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
+                occam = -0.5 * np.log(widened).sum(axis=1)[:, None]
+                likelihood = log_likelihood(squares - gain, statistics.freedom)
+                terms.append(log_weight + start + occam + likelihood)
+            total = np.logaddexp(total, log_prior + log_sum_exp(np.concatenate(terms), axis=0))
+    return total - nothing

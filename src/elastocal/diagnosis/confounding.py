@@ -1,0 +1,76 @@
+"""Angles between what candidates contribute beyond the declared model: which of them these data distinguish.
+
+Smallest principal angle between two subspaces, from Gram matrices alone.
+
+References
+----------
+.. [1] Björck, Å. and Golub, G. H. (1973). Numerical methods for computing angles between linear subspaces. Math. Comp. 27.
+"""
+
+import numpy as np
+
+# Directions that keep less than this share of a unit's largest are rounding.
+_ROUNDING = 1e-6
+
+
+def angles_between(problem, numbers):
+    """Smallest angle between each two of some units.
+
+    Parameters
+    ----------
+    problem : Problem
+    numbers : sequence of int
+
+    Returns
+    -------
+    ndarray (N, N)
+        Degrees.
+    """
+    gram = problem.statistics.gram[0]
+    bases = [_orthonormal(gram, problem.units[number].columns) for number in numbers]
+    starts = np.concatenate([[0], np.cumsum([basis.shape[1] for basis in bases])]).astype(int)
+    together = np.zeros((len(gram), starts[-1]))
+    for number, basis, start in zip(numbers, bases, starts, strict=False):
+        together[problem.units[number].columns, start : start + basis.shape[1]] = basis
+    products = together.T @ gram @ together
+    cosines = np.eye(len(bases))
+    for one in range(len(bases)):
+        for other in range(one):
+            block = products[starts[one] : starts[one + 1], starts[other] : starts[other + 1]]
+            cosines[one, other] = cosines[other, one] = np.linalg.norm(block, 2) if block.size else 0.0
+    return np.degrees(np.arccos(np.clip(cosines, 0.0, 1.0)))
+
+
+def nearest_angles(problem, found):
+    """Angle of each unit to the nearest of those found.
+
+    Parameters
+    ----------
+    problem : Problem
+    found : sequence of int
+
+    Returns
+    -------
+    ndarray (number of units,)
+        Degrees; not a number where nothing was found.
+    """
+    nearest = np.full(len(problem.units), np.nan)
+    if not len(found):
+        return nearest
+    gram = problem.statistics.gram[0]
+    mine = [_orthonormal(gram, problem.units[number].columns) for number in found]
+    for number, unit in enumerate(problem.units):
+        basis = _orthonormal(gram, unit.columns)
+        cosines = [
+            np.linalg.norm(basis.T @ gram[np.ix_(unit.columns, problem.units[other].columns)] @ there, 2)
+            for other, there in zip(found, mine, strict=True)
+            if basis.size and there.size
+        ]
+        nearest[number] = np.degrees(np.arccos(min(max(cosines, default=0.0), 1.0)))
+    return nearest
+
+
+def _orthonormal(gram, columns):
+    values, vectors = np.linalg.eigh(gram[np.ix_(columns, columns)])
+    kept = values > _ROUNDING * max(values[-1], np.finfo(float).tiny)
+    return vectors[:, kept] / np.sqrt(values[kept])

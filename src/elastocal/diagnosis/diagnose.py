@@ -1,0 +1,241 @@
+"""The two calls: `diagnose` looks at training poses alone, `judge` opens the held-out ones, once, at the end."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from elastocal.diagnosis import findings
+from elastocal.diagnosis.alarm import Alarm, alarm_of
+from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
+from elastocal.fitting import fit
+from elastocal.hygiene import faults
+from elastocal.loop.declared import estimated_noise
+from elastocal.model import joint_compliances
+from elastocal.random_streams import stream
+
+
+@dataclass(frozen=True)
+class Step:
+    """One model on the way from the nominal robot to all effects found.
+
+    Attributes
+    ----------
+    name : str
+    kind : {"frames", "declared", "effect", "control"}
+    fitted : Fit
+        To the training poses.
+    """
+
+    name: str
+    kind: str
+    fitted: object
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the last linearisation of a diagnosis says; None of it where the data are at fault.
+
+    Attributes
+    ----------
+    linearized : Linearized
+    posterior : Posterior
+    nothing : search.Model
+        The declared model alone.
+    alarm : Alarm
+    conclusion : Conclusion
+    """
+
+    linearized: object
+    posterior: object
+    nothing: object
+    alarm: Alarm
+    conclusion: object
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What training poses say of a campaign.
+
+    Attributes
+    ----------
+    case : Case
+    steps : tuple of Step
+        The last but controls is the final model.
+    evidence : Evidence or None
+    document : dict
+        Contents of verdict.json, but for what held-out poses say.
+    """
+
+    case: object
+    steps: tuple
+    evidence: Evidence | None
+    document: dict = field(repr=False)
+
+    @property
+    def declared(self):
+        """Fit of the declared model."""
+        return next(step.fitted for step in self.steps if step.kind == "declared")
+
+    @property
+    def final(self):
+        """Fit with all effects found."""
+        return [step.fitted for step in self.steps if step.kind in ("declared", "effect")][-1]
+
+
+def diagnose(case, settings, seed, progress=None):
+    """Find what the declared model of a campaign lacks.
+
+    Parameters
+    ----------
+    case : Case
+        Of training poses.
+    settings : Settings
+    seed : int
+        Of the simulated null distribution.
+    progress : callable, optional
+        Told a line after each stage.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    tell = progress or (lambda line: None)
+    known = faults(case.campaign, case.campaign.readings)
+    decisive = [fault for fault in known if fault.decisive]
+    noise, warnings = estimated_noise(case)
+    declared = fit(case.model, case.observations, noise)
+    tell(f"declared model fitted to {len(case.observations)} measurements")
+    bare = fit(replace(case.model, effects=()), case.observations, noise)
+    steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
+    if decisive:
+        found, final = None, declared
+    else:
+        found, final = _explained(case, declared, settings, seed, tell)
+        steps += _effect_steps(case, declared, final, found)
+    document = _document(case, declared, final, found, known, settings, warnings)
+    return Diagnosis(case, tuple(steps), found, document)
+
+
+def _explained(case, declared, settings, seed, tell):
+    """Evidence about the declared model, and again about the model found where that is far from it."""
+    candidates = list(case.candidates.values())
+    averaged = declared_sizes(declared.model)
+    about = declared
+    for round_number in range(settings.linearizations):
+        problem = linearized(about, case.observations, candidates, averaged, settings)
+        found, nothing = posterior(problem.problem)
+        draws = stream(seed, case.campaign.name, "null distribution", round_number)
+        alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
+        conclusion = concluded(problem.problem, found, alarm)
+        evidence = Evidence(problem, found, nothing, alarm, conclusion)
+        tell(_told(conclusion, alarm))
+        if not conclusion.best.named:
+            return evidence, declared
+        model = found.models[conclusion.best.model]
+        noise = remaining_noise(problem.problem, model, declared.noise)
+        final = fit_with_sizes(declared, case.observations, noise, selected(problem.problem, model))
+        if alarm.statistic < settings.relinearize_above:
+            break
+        about = replace(final, noise=noise)
+    return evidence, final
+
+
+def declared_sizes(model):
+    """Declared effects whose sizes are averaged over: those without a prior of their own, but for the springs of the joints."""
+    return [
+        effect
+        for effect in model.effects
+        if effect.family != "declared" and all(p.prior_std is None for p in effect.parameters)
+    ]
+
+
+def _effect_steps(case, declared, final, found):
+    """One step for each mechanism, the most probable first, each with those before it."""
+    conclusion, problem = found.conclusion, found.linearized.problem
+    names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
+    if not names:
+        return []
+    chosen = selected(problem, found.posterior.models[conclusion.best.model])
+    steps = []
+    for number, name in enumerate(names, 1):
+        if number == len(names):
+            steps.append(Step(f"+ {name}", "effect", final))
+            continue
+        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
+        steps.append(Step(f"+ {name}", "effect", fit_with_sizes(declared, case.observations, final.noise, some)))
+    return steps
+
+
+def _document(case, declared, final, found, known, settings, warnings):
+    listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
+    decisive = [fault for fault in listed if fault["decisive"]]
+    entries, probabilities, untestable, misfit = [findings.fault_entry(fault) for fault in decisive], None, {}, None
+    verdict = NAMED if len(decisive) == 1 else SEVERAL
+    said = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
+    if found:
+        problem, conclusion = found.linearized.problem, found.conclusion
+        verdict, untestable = conclusion.verdict, found.linearized.untestable
+        probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
+        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final)
+        said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
+        misfit = _misfit(found, found.nothing)
+    for name, fitted in (("declared", declared), ("final", final)):
+        if not fitted.converged:
+            said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
+    tested = {unit.candidate.key for unit in found.linearized.problem.units if unit.candidate} if found else set()
+    return {
+        "campaign": case.campaign.name,
+        "verdict": verdict,
+        "effects": entries,
+        "probabilities": probabilities,
+        "noise": _noise_facts(declared.noise, final.noise),
+        "misfit": misfit,
+        "heldout": None,
+        "compliance_urad_per_Nm": _compliances(declared, final),
+        "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
+        "candidates_tested": len(tested),
+        "untestable": untestable,
+        "converged": {"declared": declared.converged, "final": final.converged},
+        "warnings": said,
+        "settings": settings.document(),
+    }
+
+
+def _told(conclusion, alarm):
+    best = " + ".join(conclusion.best.mechanisms) or "nothing"
+    return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
+
+
+def _misfit(found, nothing):
+    """Mean square of the residual over that of the noise: declared, and with the most probable model."""
+    problem = found.linearized.problem
+    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.mechanisms else nothing
+    return {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)}
+
+
+def _noise_facts(measured, left):
+    return {
+        "source": measured.source,
+        "position_m": measured.position_m,
+        "orientation_rad": measured.orientation_rad,
+        "joint_rad": measured.joint_rad.tolist(),
+        "degrees_of_freedom": measured.degrees_of_freedom,
+        "pose_rad": left.pose_rad,
+        "factor": left.position_m / measured.position_m,
+    }
+
+
+def _compliances(declared, final):
+    deviations = np.zeros(final.model.sites.joints)
+    if final.model.identifies_compliance:
+        mine = np.flatnonzero([owner == "joint_compliance" for owner, _ in final.parameters])
+        deviations = np.sqrt(np.diag(final.covariance))[mine]
+    found = {
+        "before": joint_compliances(declared.model, declared.estimate),
+        "after": joint_compliances(final.model, final.estimate),
+        "std_error": deviations,
+    }
+    return {name: (1e6 * values).tolist() for name, values in found.items()}

@@ -1,0 +1,229 @@
+"""The last step: every model on poses that no step has seen."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.fitted_range import outside_fitted_range, predictive_variances
+from elastocal.fitting import fit_frames
+from elastocal.held_out import (
+    METRICS,
+    errors_by_range,
+    grown,
+    intervals,
+    noise_floor,
+    placed_estimate,
+    position_errors,
+    share_below_largest,
+    summary,
+)
+from elastocal.loop.reading_columns import residual_columns
+from elastocal.model import circumstances, measured_in_base, residuals
+from elastocal.observations import each_approach, state_clusters
+from elastocal.random_streams import stream
+from elastocal.splits import error_row, split_rows
+
+_REPLICATES = 1000
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """A diagnosis with what held-out poses say of it.
+
+    Attributes
+    ----------
+    document : dict
+        Contents of verdict.json.
+    rows : list of dict
+        Of before_after.csv.
+    """
+
+    document: dict
+    rows: list
+
+
+def judge(diagnosis, held_out, seed):
+    """Open the held-out poses and state the verdict.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    held_out : Case
+        The held-out readings; of another campaign, whose frames and targets are then fitted to them.
+    seed : int
+        Of the bootstrap over poses.
+
+    Returns
+    -------
+    Verdict
+    """
+    case, steps = diagnosis.case, diagnosis.steps
+    rows, heldout, warnings = heldout_errors(steps, case, held_out, seed)
+    gains = _gains(rows)
+    effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
+    document = diagnosis.document | {
+        "effects": effects,
+        "heldout": heldout,
+        "warnings": [*diagnosis.document["warnings"], *warnings],
+    }
+    return Verdict(document, rows)
+
+
+def _gains(rows):
+    """Share by which each step lowers the held-out RMS."""
+    gains, last = {}, None
+    for row in rows:
+        if row["kind"] == "effect":
+            gains[row["step"].removeprefix("+ ")] = float(1 - row["heldout_rms_m"] / last)
+        if row["kind"] in ("declared", "effect"):
+            last = row["heldout_rms_m"]
+    return gains
+
+
+def heldout_errors(steps, case, held_out, seed):
+    """Errors of every step on training and held-out poses.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+    case : Case
+    held_out : Case
+        As in `judge`.
+    seed : int
+
+    Returns
+    -------
+    rows : list of dict
+        Of before_after.csv.
+    heldout : dict
+        As in verdict.json.
+    warnings : list of str
+    """
+    placed = [_placed(step.fitted, case, held_out) for step in steps]
+    errors = [position_errors(model, estimate, held_out.observations) for model, estimate in placed]
+    before = next(number for number, step in enumerate(steps) if step.kind == "declared")
+    after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
+    draws = stream(seed, case.campaign.name, "held-out poses", 0)
+    limits, reductions = intervals(errors, _REPLICATES, draws, before)
+    floor = noise_floor(steps[after].fitted, held_out.observations, *placed[after])
+    rows = []
+    for step, error, limit in zip(steps, errors, limits, strict=True):
+        training = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
+        tested = summary(error.distance)
+        row = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
+        row |= {f"train_{name}": training[name] for name in METRICS}
+        for name in METRICS:
+            row |= {f"heldout_{name}": tested[name]}
+            row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
+        row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
+        rows.append(row)
+    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    outside = outside_poses(steps, case, held_out)
+    by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
+    heldout = {
+        "before": ends[0],
+        "after": ends[1],
+        "noise_floor_rms_m": None if np.isnan(floor) else floor,
+        "reduction_ci95": [reductions[after].low, reductions[after].high],
+        "reduction_std_error": reductions[after].std_error,
+        "poses": errors[0].poses,
+        "share_below_max": share_below_largest(errors[0].poses),
+        "outside_range": by_range,
+    }
+    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
+
+
+def outside_poses(steps, case, held_out):
+    """Which held-out poses lie outside the range of those that the last model was fitted to.
+
+    Parameters
+    ----------
+    steps, case, held_out
+        As in `judge`.
+
+    Returns
+    -------
+    ndarray of bool (P,)
+        By `Observations.cluster`.
+    """
+    fitted = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
+    unseen = held_out.observations
+    variances = predictive_variances(fitted, case.observations, *_placed(fitted, case, held_out), unseen)
+    outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
+    return np.bincount(state_clusters(unseen.states), outside) > 0
+
+
+def split_table(diagnosis, held_out, seed):
+    """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
+
+    Parameters
+    ----------
+    diagnosis, held_out, seed
+        As in `judge`.
+
+    Returns
+    -------
+    list of dict
+        Rows of splits.csv.
+    """
+    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
+    draws = stream(seed, case.campaign.name, "splits", 0)
+    unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    rows = [error_row("held out", "all", *unseen, _REPLICATES, draws)]
+    return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
+
+
+def residual_blocks(diagnosis, held_out):
+    """Blocks of the residuals table: training readings, then held-out ones; every reading before and after."""
+    case, steps, before, after = diagnosis.case, diagnosis.steps, diagnosis.declared, diagnosis.final
+    inside = np.zeros(case.observations.cluster.max() + 1, bool)
+    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
+        observations, order = _in_order(part.campaign.readings)
+        off, position = [], None
+        for fitted in (before, after):
+            model, estimate = _placed(fitted, case, part)
+            off.append(residuals(model, estimate, observations, circumstances(model, estimate, observations.states)))
+            position = measured_in_base(estimate, observations)[0]
+        readings = part.campaign.readings.select(order)
+        yield residual_columns(readings, unseen, outside[state_clusters(readings)], position, *off)
+
+
+def _placed(fitted, case, part):
+    """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
+    if part is case or part.campaign.name == case.campaign.name:
+        return fitted.model, placed_estimate(fitted, part.observations)
+    model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=fitted.model.effects)
+    return model, fit_frames(fitted, model, part.observations, fitted.noise)
+
+
+def _in_order(readings):
+    """Every reading as an observation of its own, and the order of the readings in which they come."""
+    observations, _ = each_approach(readings)
+    approach = () if readings.approach is None else tuple(readings.approach.T[::-1])
+    return observations, np.lexsort(
+        (readings.target, readings.repeat, *approach, readings.load, readings.pose, readings.session)
+    )
+
+
+def _range_warnings(by_range, poses):
+    count = by_range["poses"]
+    if not count:
+        return []
+    return [f"{count} of {poses} validation poses lie outside the range of the fitted poses: errors there are extrapolated"]
+
+
+def _warnings(steps, rows, errors, before, after):
+    if before == after:
+        return []
+    found = []
+    for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
+        low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
+        found.append(f"the held-out {name.removesuffix('_m')} grew from {low:.3f} to {high:.3f} mm")
+    best = min((row["heldout_rms_m"] for row in rows if row["kind"] == "control"), default=np.inf)
+    if best <= rows[after]["heldout_rms_m"]:
+        found.append(f"a control does as well: {1e3 * best:.3f} mm held-out RMS")
+    pairs = [(steps[n], rows[n - 1], rows[n]) for n in range(before + 1, after + 1)]
+    for step, last, row in pairs:
+        if row["heldout_rms_m"] > last["heldout_rms_m"]:
+            found.append(f"the step '{step.name}' raised the held-out RMS")
+    return found

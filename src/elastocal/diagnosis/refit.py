@@ -1,0 +1,130 @@
+"""The exact fit of a selected model: same priors, exact kinematics.
+
+Coefficients keep the normal priors under which they were selected, so that what the readings do not determine stays at zero;
+the noise is that which the selected model leaves.
+
+References
+----------
+.. [1] Hoerl, A. E. and Kennard, R. W. (1970). Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12.
+.. [2] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.fitting import fit
+
+
+@dataclass(frozen=True)
+class Selected:
+    """A model as the exact fit wants it.
+
+    Attributes
+    ----------
+    effects : tuple of (Candidate, ndarray)
+        Found, with normal priors on their parameters, and shape values. Without the competitor, which predicts nothing.
+    declared : dict of str to float
+        Size of each declared effect whose size was averaged over, by its name, in plausible sizes.
+    """
+
+    effects: tuple
+    declared: dict
+
+
+def selected(problem, model):
+    """What a model of the posterior is for the exact fit.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : search.Model
+
+    Returns
+    -------
+    Selected
+    """
+    sizes = dict(zip((*problem.base, *model.units), model.scales, strict=True))
+    effects = []
+    for number in model.units:
+        unit = problem.units[number]
+        if unit.candidate:
+            effects.append((_with_prior(unit.candidate, sizes[number] * unit.sizes), np.array(unit.shapes, float)))
+    return Selected(tuple(effects), {problem.units[number].mechanism: float(sizes[number]) for number in problem.base})
+
+
+def fit_with_sizes(declared, observations, noise, chosen):
+    """Fit the declared model with the effects of a selected one.
+
+    Parameters
+    ----------
+    declared : Fit
+        Where the search starts.
+    observations : Observations
+    noise : Noise
+        Of readings and poses, as the selected model leaves it.
+    chosen : Selected
+
+    Returns
+    -------
+    Fit
+    """
+    model = declared.model
+    known = tuple(
+        _with_prior(effect, chosen.declared[effect.effect] * np.array([p.plausible for p in effect.parameters]))
+        if effect.effect in chosen.declared
+        else effect
+        for effect in model.effects
+    )
+    effects = [candidate for candidate, _ in chosen.effects]
+    start = declared.estimate.with_effects(effects)
+    start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
+    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start)
+
+
+def mean_square_left(problem, model):
+    """Mean square of the whitened residual that a model leaves, by the linearised problem.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : search.Model
+
+    Returns
+    -------
+    float
+        1 where the noise accounts for it.
+    """
+    statistics = problem.statistics
+    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
+    members = (*problem.base, *model.units)
+    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
+    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
+    along = deviations * statistics.along[place, columns]
+    inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
+    return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
+
+
+def remaining_noise(problem, model, noise):
+    """Noise as a model leaves it: at least the noise that repeats or the campaign say.
+
+    Parameters
+    ----------
+    problem : Problem
+    model : search.Model
+    noise : Noise
+
+    Returns
+    -------
+    Noise
+    """
+    factor = float(np.sqrt(max(mean_square_left(problem, model), 1.0)))
+    return replace(noise.scaled(factor), pose_rad=factor * model.pose_error_rad)
+
+
+def _with_prior(candidate, deviations):
+    parameters = tuple(
+        replace(parameter, prior_std=float(deviation))
+        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
+    )
+    return replace(candidate, parameters=parameters)

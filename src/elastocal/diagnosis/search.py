@@ -1,0 +1,276 @@
+"""Posterior over models: extend the best models of each size, drop what is not needed, weigh all that were met.
+
+A model is a set of units. From the declared model on, the best few of each size are extended by every unit (stochastic-free
+shotgun search, [1]_), by all locations of a mechanism at once, and shrunk by each of theirs; what holds nearly all of the
+probability is evaluated in full.
+
+References
+----------
+.. [1] Hans, C., Dobra, A. and West, M. (2007). Shotgun stochastic search for "large p" regression. JASA 102, 507-516.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.diagnosis.evidence import (
+    Grid,
+    added_evidence,
+    blocks_of,
+    condition,
+    evaluate,
+    log_likelihood,
+    log_sum_exp,
+    pose_weights,
+    scale_weights,
+)
+from elastocal.diagnosis.hypotheses import OTHER
+
+# Models below the best by more than this, in log odds, hold nothing.
+_NEGLIGIBLE = 9.0
+# Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
+_UNLIKELY, _TELLING_UNITS = -9.0, 10
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Everything that a search needs.
+
+    Attributes
+    ----------
+    statistics : Statistics
+    units : tuple of Unit
+        Candidates, then those of the declared geometry.
+    base : tuple of int
+        Units that every model has: declared geometry.
+    prior : Prior
+    settings : Settings
+    """
+
+    statistics: object
+    units: tuple
+    base: tuple
+    prior: object
+    settings: object
+
+    @property
+    def candidates(self):
+        """Numbers of the units that a model may have or not."""
+        return [number for number in range(len(self.units)) if number not in set(self.base)]
+
+    def grid(self, number=None):
+        """Sizes of one unit; of a candidate without a number."""
+        scales = self.settings.declared_scales if number in self.base else self.settings.scales
+        return Grid(np.array(scales), scale_weights(scales, self.settings))
+
+    @property
+    def log_pose(self):
+        """Logarithm of the prior weight of each size of the pose error, ndarray (T,)."""
+        return pose_weights(self.statistics.pose_error_rad, self.settings)
+
+
+@dataclass(frozen=True)
+class Model:
+    """One set of units with its posterior weight.
+
+    Attributes
+    ----------
+    units : tuple of int
+        Without those of the base, rising.
+    log_odds : float
+        Posterior log odds against the base alone.
+    scales : ndarray
+        Most probable sizes, of the base's units first.
+    pose_error_rad : float
+        Most probable size of the error common to the readings of a pose.
+    """
+
+    units: tuple
+    log_odds: float
+    scales: np.ndarray
+    pose_error_rad: float
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Models in the order of their probability.
+
+    Attributes
+    ----------
+    models : tuple of Model
+    probabilities : ndarray
+        "Nothing" among them.
+    """
+
+    models: tuple
+    probabilities: np.ndarray
+
+
+def single_log_bayes_factors(problem):
+    """Log Bayes factor of each unit alone against the declared model.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    ndarray (number of units,)
+        -inf for units of the base.
+    """
+    met, prior = _Searcher(problem).met, problem.prior
+    factors = np.full(len(problem.units), -np.inf)
+    for number in problem.candidates:
+        factors[number] = met[(number,)] - prior.log_odds_of([problem.units[number]])
+    return factors
+
+
+def posterior(problem):
+    """Search the models.
+
+    Parameters
+    ----------
+    problem : Problem
+
+    Returns
+    -------
+    posterior : Posterior
+    nothing : Model
+        The declared model alone.
+    """
+    searcher = _Searcher(problem)
+    nothing = searcher.measure(())
+    searcher.start_from_whole_mechanisms()
+    searcher.grow()
+    return searcher.weigh(), nothing
+
+
+class _Searcher:
+    """Models met so far with their approximate log odds, and the sizes at which they were met."""
+
+    def __init__(self, problem):
+        self.problem = problem
+        self.statistics, self.log_pose = problem.statistics, problem.log_pose
+        self.candidates = np.array(problem.candidates, int)
+        self.grids = [problem.grid(number) for number in range(len(problem.units))]
+        self.free_grid = problem.grid()
+        self.empty = self.evaluated((), np.ones(len(problem.base)))
+        self.met, self.sizes, self.extended = {(): 0.0}, {(): self.empty.scales}, set()
+        self.extend(())
+
+    def evaluated(self, model, start):
+        """Evidence of a model in full."""
+        members = (*self.problem.base, *model)
+        units, grids = [self.problem.units[n] for n in members], [self.grids[n] for n in members]
+        return evaluate(self.statistics, units, grids, self.log_pose, start)
+
+    def extend(self, model):
+        """Meet a model with each single unit added."""
+        if model in self.extended or len(model) >= self.problem.settings.largest_model:
+            return
+        self.extended.add(model)
+        units = self.problem.units
+        taken = {(units[number].mechanism, units[number].location) for number in model}
+        open_units = [int(n) for n in self.candidates if (units[n].mechanism, units[n].location) not in taken]
+        if not open_units:
+            return
+        members, sizes = (*self.problem.base, *model), self.sizes[model]
+        columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in members)])
+        deviations = np.repeat(sizes, [len(units[n].columns) for n in members])
+        conditioned = condition(self.statistics, columns, deviations, self.log_pose)
+        blocks = blocks_of(conditioned.gram, units, open_units)
+        by_pose_error = added_evidence(conditioned, blocks, self.free_grid, self.statistics.freedom, len(units))
+        found = log_sum_exp(by_pose_error, axis=0)
+        total = log_sum_exp(found, axis=1)
+        # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
+        alone = log_sum_exp(conditioned.log_occam + log_likelihood(conditioned.squares, self.statistics.freedom))
+        if not model:
+            self.keep_likely_pose_errors(by_pose_error, total)
+        prior, here = self.problem.prior, self.met[model]
+        mechanisms = {units[n].mechanism: sum(units[m].mechanism == units[n].mechanism for m in model) for n in open_units}
+        for number in open_units:
+            odds = here + total[number] - alone + prior.added(units[number], mechanisms[units[number].mechanism])
+            key = tuple(sorted((*model, number)))
+            if odds > self.met.get(key, -np.inf):
+                self.met[key] = float(odds)
+                place = len(self.problem.base) + key.index(number)
+                best = self.free_grid.scales[np.argmax(found[number])]
+                self.sizes[key] = np.concatenate([sizes[:place], [best], sizes[place:]])
+
+    def keep_likely_pose_errors(self, by_pose_error, total):
+        """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
+        good = np.argsort(-total)[:_TELLING_UNITS]
+        weights = log_sum_exp(by_pose_error[:, good], axis=2)
+        weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
+        kept = np.flatnonzero((weights > _UNLIKELY).any(axis=1))
+        self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
+        self.empty = self.evaluated((), self.empty.scales)
+
+    def measure(self, model):
+        """Meet a model as it is, in full."""
+        start = self.sizes.get(model)
+        if start is None:
+            start = np.concatenate([self.empty.scales, np.full(len(model), self.problem.settings.scale_center)])
+        found = self.evaluated(model, start)
+        odds = found.log_evidence - self.empty.log_evidence
+        odds += self.problem.prior.log_odds_of(self.problem.units[n] for n in model)
+        self.met[model], self.sizes[model] = odds, found.scales
+        return Model(model, odds, found.scales, self.pose_error(found))
+
+    def pose_error(self, found):
+        """Most probable size of the pose error, rad."""
+        return float(self.statistics.pose_error_rad[np.argmax(found.log_pose)])
+
+    def start_from_whole_mechanisms(self):
+        """Meet each mechanism at all its locations, with the best variant at each."""
+        units = self.problem.units
+        for mechanism in dict.fromkeys(units[n].mechanism for n in self.candidates if units[n].mechanism != OTHER):
+            best = {}
+            for number in self.candidates:
+                unit = units[number]
+                if unit.mechanism == mechanism and self.met[(int(number),)] > self.met.get(best.get(unit.location), -np.inf):
+                    best[unit.location] = (int(number),)
+            whole = tuple(sorted(number for (number,) in best.values()))
+            if 1 < len(whole) <= self.problem.settings.largest_model:
+                self.measure(whole)
+
+    def grow(self):
+        """Extend and shrink the best models of each size until a size brings nothing more."""
+        settings = self.problem.settings
+        best, size = max(self.met.values()), 1
+        while size < settings.largest_model:
+            same = sorted((m for m in self.met if len(m) == size), key=self.met.get, reverse=True)[: settings.beam]
+            same = [model for model in same if self.met[model] > best - _NEGLIGIBLE]
+            for model in same:
+                self.extend(model)
+            self.shrink(same)
+            best, before = max(self.met.values()), best
+            size += 1
+            larger = [odds for model, odds in self.met.items() if len(model) == size]
+            if not larger or max(larger) < best - _NEGLIGIBLE or (size > 3 and max(larger) < best and best <= before):
+                bigger = [m for m, odds in self.met.items() if len(m) > size and odds > best - _NEGLIGIBLE]
+                if not bigger:
+                    break
+                size = min(len(model) for model in bigger)
+
+    def shrink(self, models):
+        """Meet the better models of some without each of their units."""
+        for model in models[:2]:
+            if len(model) < 3:
+                continue
+            for number in model:
+                smaller = tuple(n for n in model if n != number)
+                if smaller not in self.met:
+                    self.sizes[smaller] = np.delete(self.sizes[model], len(self.problem.base) + model.index(number))
+                    self.measure(smaller)
+
+    def weigh(self):
+        """Evaluate the best models in full."""
+        best = max(self.met.values())
+        order = sorted((m for m in self.met if self.met[m] > best - _NEGLIGIBLE), key=self.met.get, reverse=True)
+        models = [self.measure(model) for model in order[: self.problem.settings.kept_models]]
+        if () not in order:
+            models.append(self.measure(()))
+        models.sort(key=lambda model: -model.log_odds)
+        odds = np.array([model.log_odds for model in models])
+        return Posterior(tuple(models), np.exp(odds - log_sum_exp(odds)))

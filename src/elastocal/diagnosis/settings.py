@@ -1,0 +1,83 @@
+"""Every number that a diagnosis rests on, with its reason and its source; recorded in verdict.json."""
+
+from dataclasses import asdict, dataclass, field, fields
+
+
+def _setting(default, reason):
+    return field(default=default, metadata={"reason": reason})
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Choices of the diagnosing engine.
+
+    Attributes
+    ----------
+    See the metadata of each field: every one carries the reason for its value.
+    """
+
+    alarm_level: float = _setting(
+        0.02,
+        "probability of an alarm where nothing is missing, exact by simulation; leaves half of a 4 % budget to imperfect noise models",
+    )
+    alarm_draws: int = _setting(
+        499,
+        "draws of the null distribution; (1 + exceedances) / (1 + draws) is an exact Monte Carlo p-value (Davison and Hinkley 1997, 4.2)",
+    )
+    mechanism_probability: float = _setting(
+        0.03, "prior probability of each mechanism: on average less than one of some 25 is there"
+    )
+    gravity_probability: float = _setting(
+        0.5,
+        "prior probability of link_weight where no masses are declared: every arm has weight; what is open is whether it shows",
+    )
+    further_location: float = _setting(
+        0.5, "ratio of the geometric prior on the number of locations of a mechanism: one defect at five joints is one finding"
+    )
+    scales: tuple = _setting(
+        (0.01, 0.03, 0.1, 0.3, 1.0),
+        "sizes of an effect in plausible sizes that are averaged over; capped at 1, for larger ones extrapolate badly",
+    )
+    scale_center: float = _setting(0.1, "most likely size of an effect, in plausible sizes")
+    scale_spread: tuple = _setting(
+        (3.0, 0.7), "spread of the logarithm of the size below and above the center: small effects are common"
+    )
+    declared_scales: tuple = _setting(
+        (0.1, 0.3, 1.0, 3.0, 10.0), "sizes of declared geometry: measured robots exceed data-sheet tolerances tenfold"
+    )
+    pose_steps: tuple = _setting(
+        (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
+        "grid of the error common to the readings of a pose, in standard errors with which one pose determines a joint angle",
+    )
+    pose_error_probability: float = _setting(0.5, "prior probability that the readings of a pose have an error in common")
+    harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
+    other_features: int = _setting(
+        40, "random Fourier features at each joint; twice as many change no verdict of the development cases"
+    )
+    named_probability: float = _setting(
+        0.6, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
+    )
+    credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
+    testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
+    linearizations: int = _setting(
+        3, "times that the problem is linearised, each about the model found before; the third moves no verdict"
+    )
+    relinearize_above: float = _setting(
+        100.0,
+        "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
+    )
+    beam: int = _setting(6, "models of each size whose extensions are tried; more change probabilities by less than 1 %")
+    largest_model: int = _setting(40, "most units of one model; UR10 series use some 30 bands of gear harmonics")
+    kept_models: int = _setting(
+        60, "models whose evidence is computed in full; the rest holds less than 1 % of the probability"
+    )
+
+    def document(self):
+        """Name, value and reason of every setting, JSON-serialisable.
+
+        Returns
+        -------
+        dict of str to dict
+        """
+        values = asdict(self)
+        return {entry.name: {"value": values[entry.name], "reason": entry.metadata["reason"]} for entry in fields(self)}

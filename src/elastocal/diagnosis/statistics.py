@@ -1,0 +1,275 @@
+"""All that the readings say of a linearised model, in numbers whose count does not grow with the readings.
+
+Readings y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by the
+noise of the readings. The readings of a pose may have an error in common as well: that of the joints when the pose was taken,
+of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves all readings of a pose), seen through the Jacobian. By the
+matrix inversion lemma
+
+    Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
+
+so that one pass over the readings serves every tau. Columns are first made orthogonal to X by a QR decomposition of the scaled
+rows: no condition number is squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X (X'Sigma^-1 X)^-1
+X'Sigma^-1 and the determinants of restricted maximum likelihood (REML).
+
+References
+----------
+.. [1] Harville, D. A. (1977). Maximum likelihood approaches to variance component estimation. JASA 72, 320-338.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Sufficient statistics at T sizes of the pose error, for K columns.
+
+    Attributes
+    ----------
+    pose_error_rad : ndarray (T,)
+        tau.
+    gram : ndarray (T, K, K)
+        W'MW.
+    along : ndarray (T, K)
+        W'My.
+    squares : ndarray (T,)
+        y'My.
+    log_likelihood : ndarray (T,)
+        What tau contributes alone: -1/2 ln |Sigma| - 1/2 ln |X'Sigma^-1 X|.
+    freedom : int
+        Rows less what the declared model fits.
+    """
+
+    pose_error_rad: np.ndarray
+    gram: np.ndarray
+    along: np.ndarray
+    squares: np.ndarray
+    log_likelihood: np.ndarray
+    freedom: int
+
+    def at(self, chosen):
+        """The same at some of the sizes of the pose error only."""
+        return Statistics(
+            self.pose_error_rad[chosen],
+            self.gram[chosen],
+            self.along[chosen],
+            self.squares[chosen],
+            self.log_likelihood[chosen],
+            self.freedom,
+        )
+
+
+@dataclass(frozen=True)
+class Products:
+    """What one pass over the readings gathers; `statistics_of` makes `Statistics` of it, `null_draws` simulated ones.
+
+    Attributes
+    ----------
+    declared : int
+        P, columns of the declared model; orthonormal.
+    gram : ndarray (P + K + 1, P + K + 1)
+        Z'Z of Z = [X W y].
+    pose_rows : ndarray (G, n, P + K + 1)
+        B_p of each of G poses.
+    pose_gram : ndarray (G, n, n)
+        C_p.
+    joint_rad : ndarray (n,)
+        Repeatability of the joints, where the readings of a pose share one approach; else zero.
+    white_gram : ndarray (P + K, P + K)
+        Z'Z without y and without the rows of the declared parameters' priors: covariance of Z'e for white e.
+    rows : int
+        Readings' components.
+    freedom : int
+        The same less what the declared model fits.
+    """
+
+    declared: int
+    gram: np.ndarray
+    pose_rows: np.ndarray
+    pose_gram: np.ndarray
+    joint_rad: np.ndarray
+    white_gram: np.ndarray
+    rows: int
+    freedom: int
+
+
+def products_of(declared, candidates, residual, jacobian, pose, prior_std, present, joint_rad):
+    """Gather the products of whitened rows.
+
+    Parameters
+    ----------
+    declared : ndarray (R, P)
+        Whitened sensitivities to the declared parameters.
+    candidates : ndarray (R, K)
+        Whitened sensitivities to the candidates, in units of their plausible sizes.
+    residual : ndarray (R,)
+        Whitened.
+    jacobian : ndarray (R, n)
+        Whitened, with respect to the joints.
+    pose : ndarray of int (R,)
+        Pose of each row, 0 .. G-1.
+    prior_std : ndarray (P,)
+        Standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
+    present : ndarray (P,)
+        Present value of each less the mean of its prior.
+    joint_rad : ndarray (n,)
+        As in `Products`.
+
+    Returns
+    -------
+    Products
+    """
+    count = declared.shape[1]
+    prior_rows = np.diag(1.0 / prior_std)
+    scaled = np.concatenate([declared, prior_rows])
+    rest = np.zeros((len(scaled), candidates.shape[1] + 1))
+    rest[: len(declared), :-1], rest[: len(declared), -1] = candidates, residual
+    rest[len(declared) :, -1] = -present / prior_std
+    scaled = scaled / np.linalg.norm(scaled, axis=0)
+    basis = np.linalg.qr(scaled)[0]
+    rest -= basis @ (basis.T @ rest)
+    # Twice is enough: the second pass removes the rounding of the first.
+    rest -= basis @ (basis.T @ rest)
+    every = np.concatenate([basis, rest], axis=1)
+    rows = every[: len(declared)]
+    order = np.argsort(pose, kind="stable")
+    sizes = np.bincount(pose)
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    joints = jacobian.shape[1]
+    pose_rows, pose_gram = np.empty((len(sizes), joints, every.shape[1])), np.empty((len(sizes), joints, joints))
+    for size in np.unique(sizes):
+        mine = sizes == size
+        members = order[starts[mine][:, None] + np.arange(size)]
+        seen = jacobian[members].transpose(0, 2, 1)
+        pose_rows[mine] = seen @ rows[members]
+        pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
+    white = rows[:, :-1]
+    freedom = max(int(round(len(rows) - (rows[:, :count] ** 2).sum())), 1)
+    return Products(count, every.T @ every, pose_rows, pose_gram, joint_rad, white.T @ white, len(rows), freedom)
+
+
+def pose_error_unit(products):
+    """Standard error, rad, with which the readings of one pose determine a joint angle: the unit of the grid of tau."""
+    information = np.median(np.trace(products.pose_gram, axis1=1, axis2=2)) / products.pose_gram.shape[1]
+    return float(1.0 / np.sqrt(information))
+
+
+def statistics_of(products, pose_error_rad):
+    """Sufficient statistics at some sizes of the pose error.
+
+    Parameters
+    ----------
+    products : Products
+    pose_error_rad : ndarray (T,)
+
+    Returns
+    -------
+    Statistics
+    """
+    grams, alongs, squares, logs = [], [], [], []
+    for tau in pose_error_rad:
+        rows, log_det = _pose_factor(products, tau)
+        total = products.gram - rows.T @ rows
+        gram, along, rest, log_declared = _marginal(total, products.declared)
+        grams.append(gram)
+        alongs.append(along)
+        squares.append(rest)
+        logs.append(-0.5 * log_det - 0.5 * log_declared)
+    return Statistics(
+        np.asarray(pose_error_rad), np.array(grams), np.array(alongs), np.array(squares), np.array(logs), products.freedom
+    )
+
+
+def null_draws(products, tau, pose_error_rad, count, stream):
+    """Statistics of simulated readings of the declared model, in which nothing is missing.
+
+    Parameters
+    ----------
+    products : Products
+    tau : float
+        Pose error with which to simulate, rad.
+    pose_error_rad : ndarray (T,)
+        At which the statistics are wanted.
+    count : int
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    along : ndarray (T, K, N)
+    squares : ndarray (T, N)
+        As in `Statistics`, for N draws of unit variance.
+    """
+    poses, joints, width = products.pose_rows.shape
+    # Covariance of [Z' e, J' e] for white e, from which all that is needed of the readings is drawn without drawing them.
+    flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
+    size = width - 1
+    covariance = np.zeros((size + poses * joints,) * 2)
+    covariance[:size, :size] = products.white_gram
+    covariance[size:, :size] = flat
+    covariance[:size, size:] = flat.T
+    for pose in range(poses):
+        mine = slice(size + pose * joints, size + (pose + 1) * joints)
+        covariance[mine, mine] = products.pose_gram[pose]
+    scale = np.sqrt(np.clip(np.diag(covariance), 1e-300, None))
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = values > 1e-9 * values[-1]
+    root = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    white = stream.standard_normal((root.shape[1], count))
+    drawn = root @ white
+    squares = (white**2).sum(axis=0) + stream.chisquare(max(products.rows - root.shape[1], 1), count)
+    along, seen = drawn[:size], drawn[size:].reshape(poses, joints, count)
+    common = _joint_deviations(products, tau)[None, :, None] * stream.standard_normal((poses, joints, count))
+    squares = squares + 2 * (common * seen).sum(axis=(0, 1))
+    moved = products.pose_gram @ common
+    squares = squares + (common * moved).sum(axis=(0, 1))
+    along = along + flat.T @ common.reshape(-1, count)
+    seen = seen + moved
+    found_along, found_squares = [], []
+    for size_rad in pose_error_rad:
+        inverse = _pose_inverse(products, size_rad)
+        solved = inverse @ seen
+        these = along - flat.T @ solved.reshape(-1, count)
+        left = squares - (seen * solved).sum(axis=(0, 1))
+        rows, _ = _pose_factor(products, size_rad)
+        total = products.gram - rows.T @ rows
+        declared = slice(0, products.declared)
+        factor = np.linalg.cholesky(total[declared, declared])
+        fitted = solve_triangular(factor, these[declared], lower=True)
+        cross = solve_triangular(factor, total[declared, products.declared : -1], lower=True)
+        found_along.append(these[products.declared :] - cross.T @ fitted)
+        found_squares.append(left - (fitted**2).sum(axis=0))
+    return np.array(found_along), np.array(found_squares)
+
+
+def _joint_deviations(products, tau):
+    return np.sqrt(tau**2 + products.joint_rad**2)
+
+
+def _pose_inverse(products, tau):
+    """(Lambda^-1 + C_p)^-1 = Lambda^1/2 (I + Lambda^1/2 C_p Lambda^1/2)^-1 Lambda^1/2, ndarray (G, n, n)."""
+    deviation = _joint_deviations(products, tau)
+    inner = np.eye(len(deviation)) + deviation[:, None] * products.pose_gram * deviation
+    return deviation[:, None] * np.linalg.inv(inner) * deviation
+
+
+def _pose_factor(products, tau):
+    """Rows whose squares are what the pose error takes from Z'Z, and ln |Sigma| beyond that of white noise."""
+    deviation = _joint_deviations(products, tau)
+    width = products.pose_rows.shape[2]
+    if not deviation.any():
+        return np.zeros((0, width)), 0.0
+    inner = np.eye(len(deviation)) + deviation[:, None] * products.pose_gram * deviation
+    factor = np.linalg.cholesky(inner)
+    rows = np.linalg.solve(factor, deviation[:, None] * products.pose_rows)
+    log_det = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
+    return rows.reshape(-1, width), float(log_det)
+
+
+def _marginal(total, declared):
+    """Schur complement of the declared columns: W'MW, W'My, y'My and ln |X'Sigma^-1 X|."""
+    factor = np.linalg.cholesky(total[:declared, :declared])
+    cross = solve_triangular(factor, total[:declared, declared:], lower=True)
+    rest = total[declared:, declared:] - cross.T @ cross
+    return rest[:-1, :-1], rest[:-1, -1], rest[-1, -1], float(2.0 * np.log(np.diag(factor)).sum())

@@ -1,0 +1,178 @@
+"""From the posterior alone: which mechanisms, with which probability, and the one word that follows.
+
+A hypothesis is a set of mechanisms, whatever their locations. `OTHER` beside a mechanism means that a related mechanism acts;
+`OTHER` alone, that the catalogue does not have what acts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.diagnosis.hypotheses import OTHER
+
+ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
+UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """A set of mechanisms.
+
+    Attributes
+    ----------
+    mechanisms : tuple of str
+        In the order of their names; empty for "nothing".
+    probability : float
+    model : int
+        Number of its most probable model in the posterior.
+    """
+
+    mechanisms: tuple
+    probability: float
+    model: int
+
+    @property
+    def named(self):
+        """Its mechanisms of the catalogue."""
+        return tuple(name for name in self.mechanisms if name != OTHER)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the posterior says.
+
+    Attributes
+    ----------
+    verdict : str
+    hypotheses : tuple of Hypothesis
+        The most probable first; "nothing" among them.
+    best : Hypothesis
+        The most probable in accordance with the alarm: "nothing" without one.
+    alternatives : dict of str to tuple of str
+        For each mechanism of the best hypothesis what may stand in its place.
+    mechanisms : dict of str to float
+        Probability that each mechanism is there, in falling order.
+    """
+
+    verdict: str
+    hypotheses: tuple
+    best: Hypothesis
+    alternatives: dict
+    mechanisms: dict
+
+
+def concluded(problem, posterior, alarm):
+    """State the verdict.
+
+    Parameters
+    ----------
+    problem : Problem
+    posterior : Posterior
+    alarm : Alarm
+
+    Returns
+    -------
+    Conclusion
+        adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for. class: one
+        mechanism, but which of some, or whether a related one, remains ambiguous. several: more than one mechanism.
+        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism.
+    """
+    settings = problem.settings
+    hypotheses = hypotheses_of(problem, posterior)
+    nothing = next(h for h in hypotheses if not h.mechanisms)
+    present = {}
+    for hypothesis in hypotheses:
+        for mechanism in hypothesis.mechanisms:
+            present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
+    mechanisms = dict(sorted(present.items(), key=lambda entry: -entry[1]))
+    if all(problem.units[number].mechanism == OTHER for number in problem.candidates):
+        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
+    if not alarm.raised:
+        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
+    # The alarm has decided that something is missing; the posterior says what.
+    there = [h for h in hypotheses if h.mechanisms]
+    total = sum(h.probability for h in there)
+    credible = _credible(there, settings.credible * total)
+    best = there[0]
+    single = sum(h.probability for h in there if len(h.named) <= 1)
+    foreign = sum(h.probability for h in there if not h.named)
+    if foreign > 0.5 * total:
+        best = next(h for h in there if not h.named)
+        return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
+    if not best.named:
+        best = next(h for h in there if h.named)
+    alternatives = {name: _instead_of(name, best, credible) for name in best.named}
+    if single > 0.5 * total:
+        if len(best.named) > 1:
+            best = next(h for h in there if len(h.named) == 1)
+            alternatives = {name: _instead_of(name, best, credible) for name in best.named}
+        sure = len(best.mechanisms) == 1 and best.probability >= settings.named_probability * total
+        verdict = NAMED if sure else CLASS
+    else:
+        if len(best.named) < 2:
+            best = next(h for h in there if len(h.named) > 1)
+            alternatives = {name: _instead_of(name, best, credible) for name in best.named}
+        verdict = SEVERAL
+    if verdict == NAMED:
+        alternatives = {name: () for name in best.named}
+    return Conclusion(verdict, hypotheses, best, alternatives, mechanisms)
+
+
+def hypotheses_of(problem, posterior):
+    """Probability of each set of mechanisms.
+
+    Parameters
+    ----------
+    problem : Problem
+    posterior : Posterior
+
+    Returns
+    -------
+    tuple of Hypothesis
+        The most probable first; "nothing" is always among them.
+    """
+    found = {(): [0.0, -1]}
+    for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
+        names = tuple(sorted({problem.units[unit].mechanism for unit in model.units}))
+        entry = found.setdefault(names, [0.0, number])
+        entry[0] += float(probability)
+        entry[1] = number if entry[1] < 0 else entry[1]
+    ranked = sorted(found.items(), key=lambda item: -item[1][0])
+    return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
+
+
+def location_probabilities(problem, posterior, mechanism):
+    """Probability of each location of a mechanism, given that it is there.
+
+    Returns
+    -------
+    dict of tuple to float
+    """
+    total, found = 0.0, {}
+    for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
+        places = {problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism}
+        total += probability if places else 0.0
+        for place in places:
+            found[place] = found.get(place, 0.0) + float(probability)
+    return {place: value / total for place, value in sorted(found.items(), key=lambda entry: -entry[1])}
+
+
+def _credible(hypotheses, probability):
+    """Smallest set of hypotheses, in falling order, that holds a probability."""
+    reached = np.cumsum([h.probability for h in hypotheses])
+    return hypotheses[: int(np.searchsorted(reached, probability)) + 1]
+
+
+def _instead_of(name, best, credible):
+    """What stands in the place of one mechanism in the other credible hypotheses."""
+    rest = set(best.mechanisms) - {name}
+    found = []
+    for hypothesis in credible:
+        others = set(hypothesis.mechanisms) - rest
+        if hypothesis != best and name not in others:
+            found += [other for other in hypothesis.mechanisms if other in others and other not in found]
+        if hypothesis != best and others == {name, OTHER} and OTHER not in found:
+            found.append(OTHER)
+    if OTHER in best.mechanisms and OTHER not in found:
+        found.append(OTHER)
+    return tuple(found)

@@ -1,0 +1,95 @@
+"""Which poses lie outside the range of those that a model was fitted to: there its errors are extrapolated."""
+
+import numpy as np
+
+from elastocal.joint_space import beyond_range
+from elastocal.model import circumstances, linearize
+from elastocal.observations import state_clusters
+
+
+def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=None):
+    """States at which a model has to extrapolate.
+
+    Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
+    predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
+    second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
+    Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1), as all are exchangeable.
+
+    Parameters
+    ----------
+    fitted_states, states : States
+    fitted_variance : ndarray (P,), optional
+        As the two of `predictive_variances`; only the angles are judged without.
+    variance : ndarray (S,), optional
+
+    Returns
+    -------
+    ndarray of bool (S,)
+    """
+    # Loads and repeats of a pose share its angles.
+    _, first = np.unique(state_clusters(fitted_states), return_index=True)
+    outside = beyond_range(fitted_states.joint_angles[first], states.joint_angles)
+    return outside if variance is None else outside | (variance > fitted_variance.max(initial=0.0))
+
+
+def predictive_variances(fitted, observations, model, estimate, unseen):
+    """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
+
+    The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
+    readings do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look sure.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+        Which it was fitted to.
+    model : Model
+    estimate : Estimate
+        Of the fit, for the other observations. Frames and targets count only where they are those of the fit.
+    unseen : Observations
+
+    Returns
+    -------
+    own : ndarray (P,)
+        m², of the least sure reading of each pose.
+    other : ndarray (S,)
+        m², of the least sure reading of each state.
+    """
+    listed = fitted.parameters
+    shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
+    kept = np.array([shared or not owner.startswith(("frame ", "target ")) for owner, _ in listed], bool)
+    plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])
+    line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
+    whitened = fitted.whitened(line.sensitivities) * plausible
+    gram = np.einsum("mrp,mrq->pq", whitened, whitened, optimize=True) + np.eye(len(plausible))
+    root = np.linalg.inv(np.linalg.cholesky(gram))
+    own = line.sensitivities[:, :3] * plausible
+    own = _variances_left_out(own * kept, whitened, root, observations.cluster)
+    there = linearize(model, estimate, unseen, circumstances(model, estimate, unseen.states)).sensitivities[:, :3]
+    # Effects come last in the order of the parameters, whatever frames and targets stand before them.
+    there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
+    other = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+    return _largest(own, observations.cluster), _largest(other, unseen.state)
+
+
+def _variances_left_out(wanted, whitened, root, cluster):
+    """Variance (M,) of each position with the readings of its own pose left out of the fit, by Woodbury's identity."""
+    projected, own = wanted @ root.T, whitened @ root.T
+    variance = (projected**2).sum(axis=(1, 2))
+    order, size = np.argsort(cluster, kind="stable"), np.bincount(cluster)
+    start = np.concatenate([[0], np.cumsum(size)[:-1]])
+    for count in np.unique(size):
+        members = order[start[size == count][:, None] + np.arange(count)]
+        rows = own[members].reshape(len(members), -1, own.shape[-1])
+        asked = projected[members].reshape(len(members), -1, own.shape[-1])
+        left = np.eye(rows.shape[1]) - rows @ rows.transpose(0, 2, 1)
+        across = asked @ rows.transpose(0, 2, 1)
+        gained = (across * np.linalg.solve(left, across.transpose(0, 2, 1)).transpose(0, 2, 1)).sum(axis=-1)
+        variance[members] += gained.reshape(len(members), count, -1).sum(axis=-1)
+    return variance
+
+
+def _largest(values, group):
+    found = np.zeros(group.max() + 1)
+    np.maximum.at(found, group, values)
+    return found

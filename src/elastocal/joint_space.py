@@ -1,0 +1,81 @@
+"""Where poses lie in joint space: blocks of neighbours, and what lies beyond the range of others."""
+
+import numpy as np
+
+# A joint that moves less than readings of one pose may differ tells no poses apart.
+_STILL_RAD = 0.02
+_ROUNDS = 100
+# How often a pose drawn like the others, from a box, is called beyond their range.
+_LEVEL = 0.05
+
+
+def blocks(joint_angles, count):
+    """Poses parted into blocks of neighbours whose sizes differ by one at most.
+
+    Bisecting k-means (Steinbach, Karypis and Kumar 2000) with parts of given size: a block is cut across the direction in
+    which it is widest (Boley 1998), then across the line between the means of its parts until these stay. No draw decides, and
+    no block is too small to be held out. Joints count alike, by the cosine and sine of their angles over their spread.
+
+    Parameters
+    ----------
+    joint_angles : ndarray (P, n)
+        rad.
+    count : int
+        Of blocks, at most P.
+
+    Returns
+    -------
+    ndarray of int (P,)
+        0 .. count-1.
+    """
+    circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
+    circle = circle - circle.mean(axis=0)
+    spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
+    points = (circle / np.maximum(spread, _STILL_RAD)[:, None]).reshape(len(joint_angles), -1)
+    found = np.zeros(len(points), int)
+    waiting = [(np.arange(len(points)), 0, count)]
+    while waiting:
+        members, first, parts = waiting.pop()
+        found[members] = first
+        if parts == 1:
+            continue
+        about = points[members] - points[members].mean(axis=0)
+        direction = np.linalg.svd(about, full_matrices=False)[2][0]
+        # The sign of a singular vector is arbitrary.
+        direction = direction * np.sign(direction[np.argmax(np.abs(direction))])
+        lower = parts // 2
+        cut = round(len(members) * lower / parts)
+        order = np.argsort(about @ direction, kind="stable")
+        for _ in range(_ROUNDS):
+            before, direction = set(order[:cut]), about[order[cut:]].mean(axis=0) - about[order[:cut]].mean(axis=0)
+            order = np.argsort(about @ direction, kind="stable")
+            if set(order[:cut]) == before:
+                break
+        waiting += [(members[order[:cut]], first, lower), (members[order[cut:]], first + lower, parts - lower)]
+    return found
+
+
+def beyond_range(fitted_angles, joint_angles):
+    """Poses at which a joint stands farther beyond those of other poses than chance explains.
+
+    Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
+    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics (David and
+    Nagaraja 2003, section 6.4). The margin is the t that makes this 5 %, or what readings of one pose may differ: without one,
+    half of the random poses beside 20 others would be called outside.
+
+    Parameters
+    ----------
+    fitted_angles : ndarray (P, n)
+        rad.
+    joint_angles : ndarray (S, n)
+        rad.
+
+    Returns
+    -------
+    ndarray of bool (S,)
+    """
+    poses, joints = fitted_angles.shape
+    low, high = fitted_angles.min(axis=0), fitted_angles.max(axis=0)
+    share = max((2.0 * joints / (_LEVEL * (poses + 1))) ** (1.0 / max(poses - 1, 1)) - 1.0, 0.0)
+    margin = np.maximum(share * (high - low), _STILL_RAD)
+    return ((joint_angles < low - margin) | (joint_angles > high + margin)).any(axis=1)

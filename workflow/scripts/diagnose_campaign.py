@@ -1,0 +1,30 @@
+"""What the training poses of a campaign say: faults, noise, declared model, missing mechanisms and the next experiment."""
+
+import sys
+
+from elastocal.diagnosis import tables
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.settings import Settings
+from elastocal.json_files import write_json
+from elastocal.loop.opened import opened_case
+from elastocal.loop.schemas import CORRELATIONS
+from elastocal.provenance import provenance
+from elastocal.storage import write_table
+
+from job import run
+
+
+def diagnose_campaign(job):
+    case = opened_case(job.input.descriptions, job.input.training)
+    campaign = job.wildcards.campaign
+    found = diagnose(case, Settings(), job.params.seed, lambda line: print(f"{campaign}: {line}", file=sys.stderr, flush=True))
+    origin = provenance(job.params, **job.wildcards)
+    write_json(job.output.diagnosis, tables.diagnosis_facts(found))
+    write_table(job.output.steps, tables.STEPS, tables.step_blocks(found), origin)
+    write_table(job.output.correlations, CORRELATIONS, [tables.final_correlations(found)], origin)
+    write_table(job.output.models, tables.MODELS, [tables.model_columns(found)], origin)
+    write_table(job.output.candidates, tables.CANDIDATES, [tables.candidate_columns(found)], origin)
+    write_table(job.output.confounding, tables.CONFOUNDING, [tables.confounding_columns(found)], origin)
+
+
+run(diagnose_campaign, snakemake)

@@ -1,0 +1,30 @@
+"""The verdict on a campaign: every model on poses that no step has seen."""
+
+import pandas as pd
+
+from elastocal.diagnosis import tables
+from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.frames import write_csv
+from elastocal.json_files import read_json, write_json
+from elastocal.loop.opened import opened_case
+from elastocal.loop.schemas import residuals
+from elastocal.provenance import provenance
+from elastocal.storage import read_table, write_table
+
+from job import run
+
+
+def judge_campaign(job):
+    case = opened_case(job.input.descriptions, job.input.training)
+    held_out = opened_case(job.input.descriptions, job.input.held_out, "held_out")
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, tables.STEPS))
+    verdict = judge(found, held_out, job.params.seed)
+    write_json(job.output.verdict, verdict.document, allow_nan=False)
+    write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
+    write_csv(job.output.splits, pd.DataFrame(split_table(found, held_out, job.params.seed)))
+    schema = residuals(case.campaign.robot.joints)
+    origin = provenance(job.params, **job.wildcards)
+    write_table(job.output.residuals, schema, residual_blocks(found, held_out), origin)
+
+
+run(judge_campaign, snakemake)
