@@ -216,11 +216,12 @@ def test_wrong_masses_are_borne_by_their_priors_and_gears_still_seen(fanuc):
     true = made_estimate(model, seed=10, size=1.5)
     states = made_states(6, 40, seed=11, force=300.0)
     seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(12))
-    found = fit(model, seen, NOISE, discrepancy_m=0.0)
+    found = fit(model, seen, NOISE)
     chi_squared = (found.whitened(found.residual) ** 2).sum()
-    assert found.converged and chi_squared < 1.25 * found.degrees_of_freedom
-    rigid = fit(replace(model, effects=()), seen, NOISE, discrepancy_m=0.0)
-    assert (rigid.whitened(rigid.residual) ** 2).sum() > 1.5 * rigid.degrees_of_freedom
+    freedom = found.residual.size - int((~found.held).sum())
+    assert found.converged and chi_squared < 1.25 * freedom
+    rigid = fit(replace(model, effects=()), seen, NOISE)
+    assert (rigid.whitened(rigid.residual) ** 2).sum() > 1.5 * freedom
     # Errors of masses come back within their standard errors, which are smaller than the priors where the data tell.
     deviation = np.sqrt(np.diag(found.covariance))
     free = deviation > 0

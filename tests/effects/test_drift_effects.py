@@ -198,7 +198,7 @@ def test_moved_setup_is_found_without_a_clock(fanuc):
     misfit = []
     for when in candidate.shapes[0].values(3):
         start = replace(true, coefficients=(np.zeros(6),), shapes=(np.array([when]),))
-        found = fit(model, seen, noise, start, discrepancy_m=0.0)
+        found = fit(model, seen, noise, start)
         misfit.append((found.whitened(found.residual) ** 2).sum())
         if abs(when - 0.6) < 0.02:
             deviation = np.sqrt(found.covariance[-7, -7])

@@ -61,7 +61,8 @@ class Shape:
     lowest, highest : float
         Range in which the law keeps its meaning.
     tried : int
-        Evenly spaced values that a search must try lest it step over the law; 0 where a few values of growing size will do.
+        How many evenly spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values
+        of growing size will do.
     """
 
     name: str
@@ -73,6 +74,8 @@ class Shape:
 
     def values(self, few):
         """Values for a search to start from, ndarray: those that must be tried, or a few in geometric series in the range."""
+        if self.tried == 1:
+            return np.array([self.start])
         if self.tried:
             return np.linspace(self.lowest, self.highest, self.tried)
         return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
