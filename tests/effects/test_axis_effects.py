@@ -1,15 +1,26 @@
 """Effects periodic in the angle of a joint: by chains that have the moved axis as transforms of their own."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, chain_of
-from synthetic import candidate_on, circumstances_on, displacements, equipped, made_estimate, made_model, made_states
+from synthetic import (
+    NOISE,
+    candidate_on,
+    circumstances_on,
+    displacements,
+    equipped,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    with_noise,
+)
 
 from elastocal.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting import fit
 from elastocal.kinematics import poses
 from elastocal.model import circumstances, displaced_coordinates, predict
 from elastocal.observations import Observations
@@ -89,21 +100,29 @@ def test_motor_without_a_known_ratio_has_no_candidate(fanuc):
     assert not any(key.startswith("motor_eccentricity") for key in candidates_on(replace(equipped(fanuc), gear_ratio=None)))
 
 
-def test_order_may_lie_between_integers_and_no_order_is_stepped_over(fanuc):
+def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
     known, states = candidates_on(equipped(fanuc)), made_states(6, 5, seed=3)
     bands = [c for c in known.values() if c.effect == "transmission_order" and c.joints == (3,)]
-    lowest, highest = 1.0, 36.0
-    assert bands[0].shapes[0].lowest == lowest and bands[-1].shapes[0].highest == highest
-    for one, other in pairwise(bands):
-        assert one.shapes[0].highest == other.shapes[0].lowest
+    for above, band in enumerate(bands):
+        (shape,) = band.shapes
+        assert above < shape.lowest < shape.start == above + 0.5 < shape.highest < above + 1
+        np.testing.assert_array_equal(shape.values(3), [above + 0.5])
+        assert band.distinct_angles == 4 * (above + 1)
+    assert len(bands) == 18 and len({band.location for band in bands}) == 18
     around = circumstances_on(fanuc, states)
-    made = displacements(bands[0], around, 2.7)
+    made = displacements(bands[2], around, 2.7)
     angle = states.joint_angles[:, 2]
     np.testing.assert_allclose(made[:, :, 2], [np.cos(2.7 * angle), np.sin(2.7 * angle)], rtol=1e-13)
-    # Values to be tried: over two thirds of a turn none is more than a quarter of a wave from any order of the band.
-    for band in bands:
-        tried = band.shapes[0].values(3)
-        assert np.diff(tried).max() / 2 * (2 * np.pi / 3) <= np.pi / 2 / 2 * 1.1
+
+
+def test_order_between_integers_is_fitted_where_it_is(fanuc):
+    candidate = candidate_on(fanuc, "transmission_order@3[order 2-3]")
+    model = made_model(fanuc, (Target("A", "6DoF", (0.1, 0, 0)),), fitted_frames=False, effects=(candidate,))
+    true = replace(made_estimate(model), coefficients=(np.array([2e-4, -3e-4]),), shapes=(np.array([2.68]),))
+    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=5, span=2.5)), np.random.default_rng(6))
+    found = fit(model, seen, NOISE, made_estimate(model, size=0.0))
+    assert found.converged
+    assert abs(found.estimate.shapes[0][0] - 2.68) < 4 * np.sqrt(found.covariance[-1, -1]) < 0.3
 
 
 def test_shape_without_values_of_its_own_is_tried_in_a_geometric_series(fanuc):

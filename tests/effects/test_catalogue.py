@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import OTHER_CHAINS, chain_of, refused
+from support import ODD_CHAINS, OTHER_CHAINS, chain_of, refused
 from synthetic import (
     circumstances_on,
     displacements,
@@ -39,7 +39,7 @@ TABLE = {
 }
 FAMILIES = {name: family for family, names in TABLE.items() for name in names.split(", ")}
 CAUSES = ("temperature", "time")
-CHAINS = ["fanuc", "ur10", "fixed rotations"]
+CHAINS = ["fanuc", "ur10", "fixed rotations", *ODD_CHAINS]
 UNITS = {
     *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),
     *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)", "rad kg m/(N m)", "1/m", "1/(K m)"),
@@ -50,7 +50,7 @@ LEAST_M, LARGEST_M = 1e-7, 2e-2
 
 @pytest.fixture(params=CHAINS)
 def chain(request, fanuc):
-    return fanuc.chain if request.param == "fanuc" else chain_of(OTHER_CHAINS[request.param])
+    return fanuc.chain if request.param == "fanuc" else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
 
 
 def test_names_and_families_are_those_of_the_design():

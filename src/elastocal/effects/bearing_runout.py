@@ -47,9 +47,8 @@ def _candidate(sites, joint, motion):
             for _, wave in _WAVES
         ]
 
-    return Candidate(
-        NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=_SAMPLES_PER_PERIOD * max(_ORDERS)
-    )
+    distinct = _SAMPLES_PER_PERIOD * max(_ORDERS)
+    return Candidate(NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, place=motion)
 
 
 def _seen_behind(sites, joint, axis, angle):

@@ -19,7 +19,8 @@ _DISTINCT_ANGLES = 12
 def candidates(sites):
     """One candidate for each joint whose gear ratio is known."""
     ratios = sites.gear_ratio or (None,) * sites.joints
-    return [_candidate(joint, ratio) for joint, ratio in enumerate(ratios) if ratio is not None]
+    turning = [joint for joint in range(sites.joints) if ratios[joint] is not None and not sites.prismatic[joint]]
+    return [_candidate(joint, ratios[joint]) for joint in turning]
 
 
 def _candidate(joint, ratio):

@@ -61,7 +61,8 @@ class Shape:
     lowest, highest : float
         Range in which the law keeps its meaning.
     tried : int
-        Evenly spaced values that a search must try lest it step over the law; 0 where a few values of growing size will do.
+        How many evenly spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values
+        of growing size will do.
     """
 
     name: str
@@ -73,6 +74,8 @@ class Shape:
 
     def values(self, few):
         """Values for a search to start from, ndarray: those that must be tried, or a few in geometric series in the range."""
+        if self.tried == 1:
+            return np.array([self.start])
         if self.tried:
             return np.linspace(self.lowest, self.highest, self.tried)
         return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
@@ -376,9 +379,21 @@ def offered(sites, states):
     return frozenset(name for name, present in there.items() if present)
 
 
-def per_joint(sites, make):
-    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each joint."""
-    return [make(joint) for joint in range(sites.joints)]
+def per_joint(sites, make, prismatic=False):
+    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
+
+    Parameters
+    ----------
+    sites : Sites
+    make : callable
+    prismatic : bool
+        Whether the effect has a meaning for prismatic joints; most of them are about what turns.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    return [make(joint) for joint in range(sites.joints) if prismatic or not sites.prismatic[joint]]
 
 
 def by_warmth(candidate_of):

@@ -42,7 +42,8 @@ def _across(sites, link):
         parameters = tuple(Parameter(name, unit, plausible) for name in names)
         where = cause if link else f"column {cause}"
         law = lambda circumstances, *values: bent(rise(circumstances, *values))  # noqa: E731
-        return Candidate(NAME, FAMILY, (link,) if link else (), where, parameters, law, needs, shapes)
+        place = "" if link else "column"
+        return Candidate(NAME, FAMILY, (link,) if link else (), where, parameters, law, needs, shapes, place=place)
 
     return by_warmth(candidate_of)
 
@@ -62,6 +63,7 @@ def _along(sites, lengths):
     def candidate_of(cause, rise, needs, shapes):
         unit, plausible = _PLAUSIBLE[cause]
         law = lambda circumstances, *values: [grown(rise(circumstances, *values))]  # noqa: E731
-        return Candidate(NAME, FAMILY, (), f"along {cause}", (Parameter("growth_along", unit, plausible),), law, needs, shapes)
+        growth = (Parameter("growth_along", unit, plausible),)
+        return Candidate(NAME, FAMILY, (), f"along {cause}", growth, law, needs, shapes, place="along")
 
     return by_warmth(candidate_of)
