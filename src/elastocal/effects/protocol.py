@@ -39,6 +39,8 @@ class Parameter:
         That such an effect has by its physics; 0 where it may have either.
     order : int
         Of a harmonic, whose plausible size falls with it; 1 elsewhere.
+    sized : bool
+        Whether the prior's standard deviation was estimated from the readings, not known beforehand.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Parameter:
     prior_std: float | None = None
     sign: int = 0
     order: int = 1
+    sized: bool = False
 
 
 @dataclass(frozen=True)
