@@ -133,7 +133,7 @@ def prior_deviations(fitted, parameters, owners, size):
 
 
 def has_prior(fitted):
-    """Which parameters of a fit have a prior about zero, ndarray of bool: those of declared geometry have one of estimated size."""
+    """Which parameters of a fit have a prior about zero, declared geometry among them, ndarray of bool."""
     sized = declared_geometry(fitted.model)
     effects = {effect.key: effect.effect for effect in fitted.model.effects}
     return np.array([p.prior_std is not None or effects.get(owner) in sized for owner, p in fitted.parameters], bool)

@@ -109,6 +109,8 @@ class Candidate:
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be told from a smooth one.
+    of_setup : bool
+        Whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
     place : str
         Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
         location are variants of its law, of which only one can hold.
@@ -124,6 +126,7 @@ class Candidate:
     shapes: tuple = ()
     distinct_angles: int = 0
     place: str = ""
+    of_setup: bool = False
 
     @property
     def location(self):
