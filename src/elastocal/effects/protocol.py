@@ -445,7 +445,9 @@ def lever_m(sites, joint):
 
 
 def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
-    """Torque of a kilonewton at the end of the outstretched arm, by which laws of gears are scaled.
+    """Torque of the rated payload, or of a kilonewton, at the end of the outstretched arm and of the weight of its links.
+
+    By it laws of gears are scaled.
 
     Parameters
     ----------
@@ -457,4 +459,5 @@ def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
     -------
     float
     """
-    return _PULL_N * lever_m(sites, joint)
+    pull = _PULL_N if sites.payload_kg is None else sites.payload_kg * float(np.linalg.norm(sites.gravity_m_s2))
+    return pull * lever_m(sites, joint) + sites.longest_weight_torque_Nm(joint)
