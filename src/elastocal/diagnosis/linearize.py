@@ -31,11 +31,16 @@ class Linearized:
         Of one pass over the readings.
     untestable : dict of str to str
         Why a candidate is not tested.
+    about : Fit
+    averaged : frozenset of str
+        Owners of the parameters of the fit that are units here, with sizes that are averaged over.
     """
 
     problem: object
     products: object
     untestable: dict
+    about: object
+    averaged: frozenset
 
 
 def linearized(fitted, observations, candidates, declared, settings):
@@ -70,7 +75,8 @@ def linearized(fitted, observations, candidates, declared, settings):
     for unit in units:
         made[..., unit.columns] *= unit.sizes
     owners = np.array([owner for owner, _ in fitted.parameters])
-    averaged = np.isin(owners, [c.key for c in (*candidates, *declared)])
+    keys = frozenset(c.key for c in (*candidates, *declared))
+    averaged = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     residual = line.residual + line.sensitivities[..., averaged] @ values[averaged]
     root = np.sqrt(fitted.weights)
@@ -106,7 +112,9 @@ def linearized(fitted, observations, candidates, declared, settings):
     shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
     everything = (*shown, *base)
     free = tuple(range(len(shown), len(everything)))
-    return Linearized(Problem(statistics, everything, free, prior_of(shown, settings), settings), products, untestable)
+    return Linearized(
+        Problem(statistics, everything, free, prior_of(shown, settings), settings), products, untestable, fitted, keys
+    )
 
 
 def testable(statistics, units, settings):
