@@ -6,10 +6,12 @@ with mean A_j m_j and covariance I + A_j P_j^-1 A_j', A'A = G. If readings come 
 
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
-with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is twice the divergence of Box and Hill [1]_: the
-*separation*. To reach odds of 19:1 with 50, 90 and 95 % it must be 6, 16 and 21. The sum of all divergences never has enough of
-two models that are far apart already; the expected fall of the entropy does, and is bounded from below by the same pairwise
-quantities through exp(-separation / 8) [2]_. That is maximised: greedily, then by exchange [3]_, then by ascent in the angles.
+with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is twice the
+divergence of Box and Hill [1]_, the *separation*. Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 %
+if it is 6, 16 and 21; where they may turn out small, the separation that is stated is the one for which this holds. The sum of
+all divergences never has enough of two models that are far apart already; the expected fall of the entropy does, and is bounded
+from below by the same pairwise quantities through exp(-separation / 8) [2]_. That is maximised: greedily, then by exchange
+[3]_, then by ascent in the angles.
 
 What is promised is simulated: coefficients from the posterior, readings of the whole experiment, posterior of the hypotheses.
 
@@ -24,6 +26,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from scipy.stats import norm
 
 from elastocal.diagnosis import new_states
 from elastocal.diagnosis.evidence import log_sum_exp
@@ -46,6 +49,9 @@ WANTED_PROBABILITY = 0.9
 # States that are looked at, and entries among them that greedy search and exchange choose from: as many by what they tell alone
 # as at random, for some tell only together with others.
 _STATES, _SHORT_LIST = 10_000, 300
+# Multiplications that the search may take: fewer entries are looked at where models have hundreds of unknowns. And numbers in
+# memory at once.
+_WORK, _MEMORY = 1e10, 2e7
 # Models that stand for the hypotheses; the others hold a few per cent.
 _MODELS, _HYPOTHESES = 12, 8
 # Draws of each model's coefficients: for the search, and of each hypothesis for what is promised (standard error 2 %).
@@ -76,8 +82,8 @@ class Proposal:
     points : tuple of str
         Measuring points at which targets are read in every pose.
     separation : ndarray (E,)
-        Twice the log Bayes factor for the truth that readings of this pose and all before it bring on average, against the
-        nearest alternative; 16 resolves at 19:1 with 90 %.
+        From the nearest alternative, by readings of this pose and all before it: at most twice the log Bayes factor that they
+        bring for the truth on average; 16 gives it odds of 19:1 from even ones with 90 %.
     resolved : ndarray (E,)
         Probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
     present : float
@@ -155,10 +161,11 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     apart = promise.separations(far)
     lost = [h for h in range(1, len(members.names)) if apart[h] < HALF_RESOLVED]
     unreachable = tuple(members.names[h] for h in lost)
-    if len(lost) == len(members.names) - 1:
-        return _nothing(joints, best, unreachable, NOT_DISTINGUISHABLE)
     members = members.without(lost)
     promise = _Promise(members, stream)
+    # What can be told from the best holds no more probability than is left open where nothing is ambiguous.
+    if np.exp(promise.log_prior[0]) >= settings.credible:
+        return _nothing(joints, best, unreachable, NOT_DISTINGUISHABLE)
     order = _by_worth(members, information, stream)
     entries, information = entries.at(order), information[order]
     totals = np.cumsum(information, axis=0)
@@ -228,18 +235,17 @@ def sentence_of(proposal):
     -------
     str
     """
-    aside = " and ".join(words(name) for name in proposal.indistinguishable)
+    aside = "".join(f" {sentence}" for sentence in _left_aside(proposal))
     if proposal.reason == NOT_DISTINGUISHABLE:
-        return f"No further measurement is proposed: {words(proposal.best)} and {aside} are {NOT_DISTINGUISHABLE}."
+        return f"No further measurement is proposed.{aside}"
     if proposal.reason:
         return f"No further measurement is proposed: {proposal.reason}."
     needed = f"{proposal.poses_needed} poses" if proposal.poses_needed else f"more than {MOST_POSES} poses"
-    told = (
+    return (
         f"{len(proposal)} further poses separate {words(proposal.best)} from {words(proposal.nearest)} by "
         f"{proposal.separation[-1]:.1f} and resolve the verdict at 19:1 with a probability of {proposal.resolved[-1]:.0%}; "
-        f"{WANTED_PROBABILITY:.0%} needs {needed}."
+        f"{WANTED_PROBABILITY:.0%} needs {needed}.{aside}"
     )
-    return f"{told} {aside[0].upper() + aside[1:]}: {NOT_DISTINGUISHABLE}." if aside else told
 
 
 def words(mechanisms):
@@ -248,6 +254,38 @@ def words(mechanisms):
     if not named:
         return "a mechanism that the catalogue lacks"
     return " and ".join(named) + (" with a related mechanism" if OTHER in mechanisms else "")
+
+
+def _left_aside(proposal):
+    """Sentences on the alternatives that nothing within reach tells from the best: instead of it, or beside it."""
+    best = set(proposal.best)
+    instead = [words(name) for name in proposal.indistinguishable if not set(name) > best or OTHER in set(name) - best]
+    beside = dict.fromkeys(
+        mechanism
+        for name in proposal.indistinguishable
+        if set(name) > best
+        for mechanism in name
+        if mechanism not in best and mechanism != OTHER
+    )
+    if instead:
+        yield f"{words(proposal.best)} and {', '.join(instead)} are {NOT_DISTINGUISHABLE}."
+    if beside:
+        yield f"Whether {' or '.join(beside)} acts beside {words(proposal.best)} is {NOT_DISTINGUISHABLE}."
+
+
+def separation_resolved(probability):
+    """Separation of two fixed hypotheses with which one gets odds of 19:1 so often: ln 19 = lambda / 2 - z sqrt(lambda).
+
+    Parameters
+    ----------
+    probability : float
+
+    Returns
+    -------
+    float
+    """
+    z = norm.ppf(probability)
+    return float((z + np.sqrt(z**2 + 2 * np.log(19.0))) ** 2) if probability > 0 else 0.0
 
 
 def _nothing(joints, best, indistinguishable, reason):
@@ -444,6 +482,11 @@ class _Criterion:
         truths = np.concatenate([members.drawn(model, _DRAWS, stream) for model in range(count)])
         return cls(members, truths, np.repeat(np.arange(count), _DRAWS))
 
+    @property
+    def work(self):
+        """Multiplications for one entry."""
+        return sum(len(columns) ** 3 for columns in self.members.columns) + self.truths.size * self.truths.shape[1]
+
     def left(self, information):
         """Entropy left after experiments of some information (N, U, U), ndarray (N,), nats."""
         misfits = _misfits(self.members, information, self.truths)
@@ -459,8 +502,11 @@ def _searched(members, instrument, poses, stream):
     """The experiment that leaves least entropy: its entries, their information, and the targets that are read."""
     criterion, reach = _Criterion.of(members, stream), instrument.reach
     every = list(range(len(instrument.model.targets)))
-    entries = new_states.drawn(reach, _STATES // len(reach.shares), stream)
-    entries, information = _short_list(criterion, instrument, entries, every, stream)
+    pool, looks = _STATES // len(reach.shares), (1 + _EXCHANGES) * poses
+    share = min(1.0, _WORK / (criterion.work * (pool + looks * _SHORT_LIST)))
+    short = max(int(share * _SHORT_LIST), 2 * poses)
+    entries = new_states.drawn(reach, max(int(share * pool), short), stream)
+    entries, information = _short_list(criterion, instrument, entries, every, short, stream)
     chosen = []
     for _ in range(poses):
         total = information[chosen].sum(axis=0)
@@ -490,15 +536,15 @@ def _searched(members, instrument, poses, stream):
     return _without_idle_targets(criterion, instrument, entries, information, every)
 
 
-def _short_list(criterion, instrument, entries, targets, stream):
+def _short_list(criterion, instrument, entries, targets, count, stream):
     """Half of a short list by what entries tell alone, half at random."""
-    left, size = [], 1000
+    left, size = [], max(int(_MEMORY / instrument.unknowns**2), 1)
     for start in range(0, len(entries), size):
         part = entries.at(np.arange(start, min(start + size, len(entries))))
         left.append(criterion.left(instrument.information(part, targets)))
     order = np.argsort(np.concatenate(left), kind="stable")
-    half = _SHORT_LIST // 2
-    kept = entries.at(np.concatenate([order[:half], stream.permutation(order[half:])[:half]]))
+    half = count // 2
+    kept = entries.at(np.concatenate([order[:half], stream.permutation(order[half:])[: count - half]]))
     return kept, instrument.information(kept, targets)
 
 
@@ -563,13 +609,19 @@ class _Promise:
         return np.column_stack(found) - self.log_prior
 
     def separations(self, information):
-        """Twice the mean log Bayes factor for the truth between the best hypothesis and each, ndarray (H,); 0 for the best."""
+        """Separation of the best hypothesis from each, ndarray (H,); 0 for the best.
+
+        Twice the mean log Bayes factor for the truth, or, where that is carried by a few large draws, the separation of two
+        fixed hypotheses of which one gets odds of 19:1 as often: the smaller of both.
+        """
         logs, weights = self.log_factors(information), np.exp(self.log_prior)
         found = np.zeros(len(weights))
         for h in range(1, len(weights)):
-            for_best = (logs[self.hypothesis == 0, 0] - logs[self.hypothesis == 0, h]).mean()
-            against = (logs[self.hypothesis == h, h] - logs[self.hypothesis == h, 0]).mean()
-            found[h] = 2.0 * (weights[0] * for_best + weights[h] * against) / (weights[0] + weights[h])
+            shares = weights[[0, h]] / (weights[0] + weights[h])
+            factors = [logs[self.hypothesis == true, true] - logs[self.hypothesis == true, h - true] for true in (0, h)]
+            mean = shares @ [factor.mean() for factor in factors]
+            often = shares @ [(factor >= np.log(19.0)).mean() for factor in factors]
+            found[h] = max(min(2.0 * mean, separation_resolved(often)), 0.0)
         return found
 
     def resolved(self, information):
