@@ -87,7 +87,7 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], [], SETTINGS)
     problem = line.problem
     numbers = range(len(problem.units))
-    reach = replace(new_states.reach_of(states, kuka, limits(kuka), None, False), shares=(1.0,), side_chosen=False)
+    reach = replace(new_states.reach_of(states, kuka, limits(kuka), None, False), shares=(1.0,), free=False)
     made = new_states.instrument_of(line, declared, numbers, declared.noise, states, reach, False)
     entries = new_states.Entries(states.joint_angles, states.wrench, states.approach[:, None], np.zeros(len(states), bool))
     total = made.information(entries, [0, 1]).sum(axis=0)
@@ -203,6 +203,7 @@ def test_loads_that_always_hang_stay_vertical(ambiguous, kuka):
     hanging = np.zeros_like(states.wrench)
     hanging[1::2, 2] = -800.0
     reach = new_states.reach_of(replace(states, wrench=hanging), kuka, limits(kuka), None, False)
+    assert reach.shares == (0.0, 1.0)
     found = new_states.drawn(reach, 50, np.random.default_rng(0))
     near = new_states.near(reach, found, 2, 0.3, np.random.default_rng(0))
     for wrench in (found.wrench, near.wrench):
@@ -262,7 +263,7 @@ def test_table_is_in_the_angles_of_the_controller(ambiguous, proposal, kuka):
     np.testing.assert_allclose(angles @ robot.reported_matrix.T + robot.reported_offset, proposal.joint_angles)
     assert (table["load"] == 1).all() and (table["point"] == "3DoF 6DoF").all() and list(table["pose"]) == list(range(10))
     assert " or " in table["effect"][0] and table["separation_without"].nunique() == 1
-    assert "10 further poses separate" in sentence_of(proposal)
+    assert "10 further poses, each read at 0, 1, -1 times its load, separate" in sentence_of(proposal)
 
 
 def test_further_targets_at_unknown_places_tell_only_beyond_their_offsets(kuka):

@@ -1,9 +1,10 @@
 """What could be measured next on a robot, and what it would tell: poses with loads, and the information in each.
 
-An entry is one pose, read at all targets without its load and under it, or under given shares of it. Loads are those of the
-campaign: as large, at the same lever or none, in any direction where the campaign has loads in all of them; up to the weight of
-the rated payload where the robot file has it. A weight hung at the flange is known without a load cell: readings of its force
-have no errors. A repeat is another entry: it costs as much as another pose, and tells no more than a pose close by.
+An entry is one pose, read at all targets without its load, under it and under the opposite one, or under given shares of it.
+Loads are those of the campaign: as large, at the same lever or none, in any direction where the campaign has loads in all of
+them; up to the weight of the rated payload where the robot file has it. A weight hung at the flange is known without a load
+cell: readings of its force have no errors. A repeat is another entry: it costs as much as another pose, and tells no more than
+a pose close by.
 """
 
 from dataclasses import dataclass, replace
@@ -18,8 +19,8 @@ from elastocal.observations import Observations, States
 from elastocal.robot import STANDARD_GRAVITY
 from elastocal.whitening import whitening
 
-# Without a ladder of loads: each pose without its load and under it.
-WITHOUT_AND_WITH = (0.0, 1.0)
+# Without a ladder of loads: each pose without its load and under it, and under the opposite one where the campaign has such.
+WITHOUT_AND_WITH, BOTH_SENSES = (0.0, 1.0), (0.0, 1.0, -1.0)
 # Directions of force whose smallest principal mean square reaches this (a third where they are uniform) are free.
 _FREE_DIRECTIONS = 0.02
 # Share of entries under a reference weight, where there can be one.
@@ -85,8 +86,10 @@ class Reach:
         Whether a reference weight is worth considering.
     shares : tuple of float
         Shares of its load at which each pose is read.
-    side_chosen : bool or None
-        Whether the side of the approach is chosen for each pose; drawn anew for each share if not; None where nobody notes it.
+    free : bool
+        Whether size and lever of the load and the side of the approach are chosen for each pose; with a given ladder loads are
+        as large as they can be, and the side is drawn anew for each share.
+    approach_noted : bool
     """
 
     limits: np.ndarray
@@ -97,7 +100,8 @@ class Reach:
     down: np.ndarray
     weights: bool
     shares: tuple
-    side_chosen: bool | None
+    free: bool
+    approach_noted: bool
 
 
 def reach_of(states, robot, joint_limits, ladder, weights):
@@ -128,16 +132,19 @@ def reach_of(states, robot, joint_limits, ladder, weights):
     free = bool(loaded.any()) and np.linalg.eigvalsh(along.T @ along / len(along))[0] > _FREE_DIRECTIONS
     rated = (robot.payload_kg or 0.0) * STANDARD_GRAVITY
     gravity = np.asarray(robot.gravity_m_s2, float)
+    either = bool(cosines.min(initial=0.0) < -0.5)
+    shares = ladder if ladder is not None else BOTH_SENSES if either else WITHOUT_AND_WITH
     return Reach(
         np.clip(joint_limits, -np.pi, np.pi),
         states.wrench[heavy],
         max(size.max(initial=0.0), rated) if loaded.any() else 0.0,
         free,
-        bool(cosines.min(initial=0.0) < -0.5),
+        either,
         gravity / max(np.linalg.norm(gravity), np.finfo(float).tiny),
         weights and ladder is None and bool(loaded.any()) and bool(gravity.any()),
-        (WITHOUT_AND_WITH if ladder is None else ladder) if loaded.any() else (1.0,),
-        None if states.approach is None else ladder is None,
+        shares if loaded.any() else (1.0,),
+        ladder is None,
+        states.approach is not None,
     )
 
 
@@ -161,13 +168,13 @@ def drawn(reach, count, stream):
         wrench = reach.wrenches[stream.integers(0, len(reach.wrenches), count)]
         share = np.where(stream.random(count) < 0.5, 1.0, stream.uniform(_SMALLEST_LOAD, 1.0, count))
         # A ladder has its own shares of the largest load.
-        share = np.ones(count) if reach.side_chosen is False or len(reach.shares) > 2 else share
+        share = share if reach.free else np.ones(count)
         wrench = wrench * (reach.largest_N * share / np.linalg.norm(wrench[:, :3], axis=1))[:, None]
         if reach.any_direction:
             wrench = _turned(wrench, Rotation.random(count, rng=stream))
         elif reach.either_sense:
             wrench = wrench * stream.choice([-1.0, 1.0], (count, 1))
-        if reach.shares == WITHOUT_AND_WITH:
+        if reach.free:
             wrench[:, 3:] *= stream.choice([0.0, 1.0], (count, 1))
         if reach.weights:
             weighed = stream.random(count) < _WEIGHTS
@@ -201,7 +208,7 @@ def near(reach, entries, count, radius, stream):
         turn = radius * stream.standard_normal((len(found), 3)) * (stream.random((len(found), 1)) < 0.5)
         turn[found.weighed] = 0.0
         wrench = _turned(wrench, Rotation.from_rotvec(turn))
-    if reach.side_chosen:
+    if reach.free and reach.approach_noted:
         approach = approach * np.where(stream.random(angles.shape) < _OTHER_SIDE, -1.0, 1.0)[:, None]
     return Entries(np.clip(angles, *reach.limits.T), wrench, approach, found.weighed)
 
@@ -211,11 +218,11 @@ def _turned(wrench, rotation):
 
 
 def _approaches(reach, count, stream):
-    if reach.side_chosen is None:
+    if not reach.approach_noted:
         return None
     shape = (count, len(reach.shares), len(reach.limits))
     sides = stream.choice([-1.0, 1.0], shape)
-    return np.broadcast_to(sides[:, :1], shape).copy() if reach.side_chosen else sides
+    return np.broadcast_to(sides[:, :1], shape).copy() if reach.free else sides
 
 
 @dataclass(frozen=True)
@@ -314,15 +321,17 @@ class Instrument:
 
     def observations(self, entries, targets):
         """Entries as observations, those of an entry together; what is measured stays zero."""
-        shares = np.array(self.reach.shares)
-        count = len(entries) * len(shares)
+        # A weight only hangs.
+        shares = np.where(entries.weighed[:, None], np.abs(self.reach.shares), self.reach.shares)
+        each = shares.shape[1]
+        count = shares.size
         usual = None if self.states.temperature_c is None else np.full(count, self.states.temperature_c.mean())
         states = States(
             np.full(count, self.estimate.sessions[-1]),
-            np.repeat(np.arange(len(entries)), len(shares)),
-            np.tile(np.arange(len(shares)), len(entries)),
-            np.repeat(entries.joint_angles, len(shares), axis=0),
-            (entries.wrench[:, None] * shares[:, None]).reshape(count, 6),
+            np.repeat(np.arange(len(entries)), each),
+            np.tile(np.arange(each), len(entries)),
+            np.repeat(entries.joint_angles, each, axis=0),
+            (entries.wrench[:, None] * shares[..., None]).reshape(count, 6),
             np.ones(count, int),
             None if entries.approach is None else entries.approach.reshape(count, -1),
             None if self.states.time_s is None else np.full(count, self.states.time_s.max()),

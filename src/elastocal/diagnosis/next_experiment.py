@@ -78,7 +78,7 @@ class Proposal:
     reference_weight : ndarray of bool (E,)
         Whether the load is a weight hung at the last measuring point, known by weighing and not by the load cell.
     shares : tuple of float
-        Shares of its load at which each pose is read.
+        Shares of its load at which each pose is read; a weight hangs at their absolute values.
     points : tuple of str
         Measuring points at which targets are read in every pose.
     separation : ndarray (E,)
@@ -132,8 +132,8 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     poses : int
     ladder : tuple of float, optional
         Shares of its load at which each pose is read, at the targets of the campaign and with any approach. Without, each is
-        read without its load and under it, a reference weight and targets on further points are considered, and the side of
-        the approach is chosen.
+        read without its load, under it and, where the campaign has such, under the opposite one; sizes and levers of the load,
+        a reference weight, targets on further points and the side of the approach are chosen.
 
     Returns
     -------
@@ -175,7 +175,7 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     return Proposal(
         entries.joint_angles,
         entries.wrench,
-        entries.approach[:, 0] if reach.side_chosen else None,
+        entries.approach[:, 0] if reach.free and reach.approach_noted else None,
         entries.weighed,
         reach.shares,
         tuple(dict.fromkeys(instrument.model.targets[target].point for target in targets)),
@@ -241,8 +241,10 @@ def sentence_of(proposal):
     if proposal.reason:
         return f"No further measurement is proposed: {proposal.reason}."
     needed = f"{proposal.poses_needed} poses" if proposal.poses_needed else f"more than {MOST_POSES} poses"
+    shares = ", ".join(f"{share:g}" for share in proposal.shares)
     return (
-        f"{len(proposal)} further poses separate {words(proposal.best)} from {words(proposal.nearest)} by "
+        f"{len(proposal)} further poses, each read at {shares} times its load, separate "
+        f"{words(proposal.best)} from {words(proposal.nearest)} by "
         f"{proposal.separation[-1]:.1f} and resolve the verdict at 19:1 with a probability of {proposal.resolved[-1]:.0%}; "
         f"{WANTED_PROBABILITY:.0%} needs {needed}.{aside}"
     )
