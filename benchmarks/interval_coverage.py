@@ -1,4 +1,4 @@
-"""How often 95 % intervals of held-out errors hold the truth: `python benchmarks/interval_coverage.py`, four minutes.
+"""How often 95 % intervals of held-out errors hold the truth: `python benchmarks/interval_coverage.py`, two minutes.
 
 Prints the table of docs/held_out_intervals.md.
 """

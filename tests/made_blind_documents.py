@@ -7,7 +7,7 @@ from elastocal.blind.case_rows import case_row
 JOINTS = 6
 
 
-def truth(*places, group="single", level=50.0, robot="fanuc", setting="usual", **changes):
+def truth(*places, group="single", level=50.0, robot="gp180", setting="usual", **changes):
     """A sealed document; a place is an effect with its joints, such as ("joint_offset", 3)."""
     defects = [
         {
@@ -39,13 +39,13 @@ def truth(*places, group="single", level=50.0, robot="fanuc", setting="usual", *
 
 def effect(name, *joints, parameters=(), alternatives=()):
     """An effect of a verdict; a parameter is a name with its value and its standard error."""
+    key = "@".join([name, "+".join(map(str, joints))] if joints else [name])
     return {
         "name": name,
         "joints": list(joints),
         "alternatives": list(alternatives),
         "parameters": [
-            {"name": f"{name}@ {key}", "value": value, "std_error": error, "held": error == 0}
-            for key, value, error in parameters
+            {"name": f"{key} {of}", "value": value, "std_error": error, "held": error == 0} for of, value, error in parameters
         ],
     }
 

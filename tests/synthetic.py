@@ -14,6 +14,7 @@ from elastocal.kinematics import poses
 from elastocal.model import Estimate, Model, circumstances, parameters, predict, residuals, stepped
 from elastocal.noise import Noise
 from elastocal.observations import Observations, States
+from elastocal.robot import Compensator
 from elastocal.sites import sites_of
 
 NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
@@ -36,9 +37,17 @@ def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
     )
 
 
+def equipped(holder):
+    """Sites of a robot, or of a chain, with a compensator beside its shoulder so that no effect is out of place there."""
+    sites = sites_of(holder)
+    if sites.compensator is None and sites.shoulder is not None:
+        sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
+    return sites
+
+
 def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
     """A model of a chain or a robot; its targets are unknown offsets from the last measuring point unless told."""
-    sites = sites_of(holder)
+    sites = equipped(holder)
     targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)
     springs = (joint_compliance(sites),) if identified else ()
@@ -125,14 +134,14 @@ def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_
 
 def circumstances_on(holder, states, compliance=None):
     """Circumstances of some states on a chain or a robot."""
-    sites = sites_of(holder)
+    sites = equipped(holder)
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
     return circumstances_of(sites, compliance, states)
 
 
 def candidate_on(holder, key):
     """One candidate of the catalogue, on a chain or a robot."""
-    return candidates_on(sites_of(holder))[key]
+    return candidates_on(equipped(holder))[key]
 
 
 def displacements(candidate, circumstances, *shapes):

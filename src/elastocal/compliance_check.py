@@ -5,6 +5,8 @@ import numpy as np
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's.
 MOST_OFF_NOMINAL = 5.0
+# So many standard errors beyond what robots have are no chance.
+_SURE = 2.0
 
 
 def compliance_warnings(compliance, std_error, nominal):
@@ -23,18 +25,17 @@ def compliance_warnings(compliance, std_error, nominal):
         One sentence with value and standard error of each, or none.
     """
     compliance, std_error, nominal = (1e6 * np.asarray(values, float) for values in (compliance, std_error, nominal))
-    identified = std_error > 0
-    negative = identified & (compliance < 0)
-    off = (compliance > MOST_OFF_NOMINAL * nominal) | (compliance < nominal / MOST_OFF_NOMINAL)
-    named = np.flatnonzero(negative | identified & off & (nominal > 0))
-    if not len(named):
-        return []
-    each = [
-        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint])})"
-        for joint in named
+    low, high = nominal / MOST_OFF_NOMINAL, MOST_OFF_NOMINAL * nominal
+    beyond = np.maximum(low - compliance, compliance - high)
+    named = [
+        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint])}"
+        f"{'' if beyond[joint] > _SURE * std_error[joint] else ', perhaps by chance'})"
+        for joint in np.flatnonzero((std_error > 0) & (beyond > 0))
     ]
+    if not named:
+        return []
     return [
-        f"no such robot has these joint compliances, in µrad/(N·m): {', '.join(each)};"
+        f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(named)};"
         " check the sign and the unit of the loads, and whether something else yields too"
     ]
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
-from scipy.optimize import brentq
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
@@ -28,7 +27,7 @@ from elastocal.model import (
 )
 from elastocal.noise import Noise
 from elastocal.registration import registered
-from elastocal.whitening import Whitening, spectrum, whitening
+from elastocal.whitening import Whitening, whitening
 
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
@@ -43,11 +42,6 @@ _ROUNDING = 1e-9
 _HUBER_QUANTILE = 0.99
 # Correlation beyond which a parameter cannot be told because of a shape.
 _BOUND_TO_SHAPE = 0.5
-# Robust weight below which an observation is wild: less than one in a million is so far off by the noise.
-_TAME = 0.5
-_DISCREPANCY_ROUNDS = 6
-# Residuals this much above the noise, in mean square, are taken as a discrepancy of the model.
-_ABOVE_NOISE = 1.02
 
 
 @dataclass(frozen=True)
@@ -59,8 +53,6 @@ class Fit:
     model : Model
     estimate : Estimate
     noise : Noise
-    discrepancy_m : float
-        See `whitening.whitening`; brings the mean square of the whitened residual to one.
     held : ndarray of bool (P,)
         Parameters that the data cannot tell.
     covariance : ndarray (P, P)
@@ -81,7 +73,6 @@ class Fit:
     model: object
     estimate: object
     noise: Noise
-    discrepancy_m: float
     held: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
@@ -96,21 +87,6 @@ class Fit:
         """As `model.parameters`."""
         return parameters(self.model, self.estimate)
 
-    @property
-    def degrees_of_freedom(self):
-        """Rows less fitted parameters."""
-        return self.residual.size - int((~self.held).sum())
-
-    @property
-    def tame(self):
-        """Observations that are not wild, ndarray of bool (M,): single wild ones say nothing of the model."""
-        return self.weights >= _TAME
-
-    @property
-    def tame_freedom(self):
-        """Rows of the tame observations less fitted parameters."""
-        return self.degrees_of_freedom - int((~self.tame).sum()) * self.model.rows
-
     def values_of(self, key):
         """Linear parameters and shapes of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
@@ -122,7 +98,7 @@ class Fit:
         return self.whitener.apply(values * weights)
 
 
-def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discrepancy_m=0.0):
+def fit(model, observations, noise, start=None):
     """Fit a model.
 
     Parameters
@@ -132,27 +108,13 @@ def fit(model, observations, noise, start=None, discrepancy_m=None, likely_discr
     noise : Noise
     start : Estimate, optional
         Of this model; by `registered` without.
-    discrepancy_m : float, optional
-        As in `Fit`; found from the residual without.
-    likely_discrepancy_m : float
-        Where the search for it begins, which saves time and changes nothing else.
 
     Returns
     -------
     Fit
     """
     start = registered(model, observations) if start is None else start
-    around = circumstances(model, start, observations.states)
-    if discrepancy_m is not None:
-        return _robustly(model, observations, around, noise, start, discrepancy_m)
-    lacking = likely_discrepancy_m
-    found = _robustly(model, observations, around, noise, start, lacking)
-    for _ in range(_DISCREPANCY_ROUNDS):
-        before, lacking = lacking, discrepancy(found, observations, found.tame)
-        if abs(lacking - before) <= 0.01 * max(lacking, before):
-            break
-        found = _robustly(model, observations, found.circumstances, noise, found.estimate, lacking)
-    return found
+    return _robustly(model, observations, circumstances(model, start, observations.states), noise, start)
 
 
 def fit_frames(fitted, model, observations, noise, own_targets=True):
@@ -182,10 +144,10 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
         start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
     around = circumstances(model, start, observations.states)
-    return _robustly(model, observations, around, noise, start, fitted.discrepancy_m, frozen).estimate
+    return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
-def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=False):
+def _robustly(model, observations, around, noise, estimate, frozen=False):
     """Gauss-Newton steps on Huber's objective by iteratively reweighted least squares, each halved until it does not rise.
 
     The step minimises a bound of the objective that touches it at the present estimate (Huber and Ronchetti 2009, 7.8), so that
@@ -212,7 +174,7 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
         around = line.circumstances
         jacobian = line.coordinate_jacobian[..., : model.sites.joints]
-        whitener = whitening(observations, jacobian, noise, discrepancy)
+        whitener = whitening(observations, jacobian, noise)
         if step_number:
             distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
             scale = max(np.median(distance) / typical, 1.0)
@@ -255,7 +217,7 @@ def _robustly(model, observations, around, noise, estimate, discrepancy, frozen=
                 break
     around = with_springs(line.circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
     residual = residuals(model, estimate, observations, around)
-    return Fit(model, estimate, noise, discrepancy, held, covariance, weights, whitener, residual, jacobian, around, converged)
+    return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
@@ -338,33 +300,3 @@ def identifiable(gram, frozen, bending):
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask
-
-
-def discrepancy(fitted, observations, tame):
-    """Standard deviation that brings the mean square of the whitened residual to one.
-
-    Parameters
-    ----------
-    fitted : Fit
-    observations : Observations
-    tame : ndarray of bool (M,)
-        Observations that count.
-
-    Returns
-    -------
-    float
-        m; zero where the noise accounts for the residual.
-    """
-    weighted = fitted.residual * np.sqrt(fitted.weights * tame)[:, None]
-    freedom = fitted.degrees_of_freedom - int((~tame).sum()) * observations.rows
-    variances, squares = spectrum(observations, fitted.joint_jacobian, fitted.noise, weighted)
-
-    def excess(deviation):
-        return (squares / (variances + deviation**2)).sum() / freedom - 1.0
-
-    if freedom <= 0 or excess(0.0) < _ABOVE_NOISE - 1.0:
-        return 0.0
-    highest = fitted.noise.position_m
-    while excess(highest) > 0:
-        highest *= 2
-    return brentq(excess, 0.0, highest, rtol=1e-3)

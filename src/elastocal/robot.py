@@ -406,7 +406,7 @@ def robot_from_document(document, source="robot"):
     Raises
     ------
     InputError
-        Where the chain does not parse, reaches farther than any machine, or a list has another length than the robot has joints.
+        Where the chain does not parse or reaches farther than any machine, or a list has another length than there are joints.
     """
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
     _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)

@@ -128,15 +128,53 @@ class Sites:
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
         return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
 
+    def transverse_axes(self, link):
+        """The two axes of the frame at the far end of a link that are least along it."""
+        return sorted(np.argsort(np.abs(self.link_vectors_m[link]), kind="stable")[:2].tolist())
+
+    def moment_turns(self, link, axis, joint):
+        """Whether a first moment along an axis of the frame at the far end of a link can turn a joint by its weight.
+
+        Parameters
+        ----------
+        link : int
+            0 is the column.
+        axis : int
+        joint : int
+            From 0.
+
+        Returns
+        -------
+        bool
+        """
+        return bool(self._largest_turns[link, axis, joint] > _SHORTEST_M)
+
+    @cached_property
+    def _at_random(self):
+        """Motion of the far ends of all links over some poses."""
+        coordinates = np.zeros((16, self.chain.coordinates))
+        coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
+        return motion(self.chain, coordinates, [self.far_end(link) for link in range(self.joints + 1)])
+
     @cached_property
     def _longest_levers(self):
         """Of the weight of each link on each joint over some poses, ndarray (n + 1, n), m."""
-        coordinates = np.zeros((16, self.chain.coordinates))
-        coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
-        far_ends = [self.far_end(link) for link in range(self.joints + 1)]
-        moved = motion(self.chain, coordinates, far_ends)
-        jacobians = [moved.jacobian(end.after, at, 3) for end, at in zip(far_ends, moved.position, strict=True)]
-        return np.array([np.abs(np.tensordot(self.down, of_end[:, : self.joints], 1)).max(axis=1) for of_end in jacobians])
+        levers = []
+        for link, position in enumerate(self._at_random.position):
+            jacobian = self._at_random.jacobian(self.far_end(link).after, position, rows=3)[:, : self.joints]
+            levers.append(np.abs(np.tensordot(self.down, jacobian, 1)).max(axis=1))
+        return np.array(levers)
+
+    @cached_property
+    def _largest_turns(self):
+        """Torque on each joint by a unit moment along each axis of each link over some poses, ndarray (n + 1, 3, n)."""
+        found = []
+        for link, rotation in enumerate(self._at_random.rotation):
+            nothing, after = np.zeros_like(rotation[:, 0]), self.far_end(link).after
+            turning = [np.cross(rotation[:, axis], self.down[:, None], axis=0) for axis in range(3)]
+            forces = [self._at_random.generalized_forces(after, nothing, moment)[: self.joints] for moment in turning]
+            found.append([np.abs(force).max(axis=1) for force in forces])
+        return np.array(found)
 
 
 def sites_of(holder):

@@ -67,7 +67,7 @@ def cross_validated(fitted, observations, part):
     """Position errors of observations, each predicted by a refit without the part that it belongs to.
 
     A refit starts from the nominal robot, so that a parameter that only the part left out can tell does not keep its value, and
-    keeps the shapes and the discrepancy of the fit. A session that is left out has its frame fitted to itself, see
+    keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see
     `held_out.placed_estimate`.
 
     Parameters
@@ -87,7 +87,7 @@ def cross_validated(fitted, observations, part):
         within = part == number
         rest, tested = select_states(observations, ~within), select_states(observations, within)
         start = replace(registered(model, rest), shapes=fitted.estimate.shapes)
-        refit = fit(model, rest, fitted.noise, start, fitted.discrepancy_m)
+        refit = fit(model, rest, fitted.noise, start)
         errors = position_errors(model, placed_estimate(refit, tested), tested)
         distance[within[observations.state]] = errors.distance
     return Errors(distance, observations.cluster)

@@ -38,7 +38,7 @@ class Whitening:
         return whitened
 
 
-def whitening(observations, jacobian, noise, discrepancy_m=0.0):
+def whitening(observations, jacobian, noise):
     """Whitening of averaged observations.
 
     Parameters
@@ -48,45 +48,13 @@ def whitening(observations, jacobian, noise, discrepancy_m=0.0):
         With respect to the joints.
     noise : Noise
         Of one reading.
-    discrepancy_m : float
-        Standard deviation, in positions, of what the model lacks and repeats do not average out; orientations get the share
-        that they have of the noise.
 
     Returns
     -------
     Whitening
     """
-    blocks = []
-    lacking = _lacking(noise, observations.rows) * discrepancy_m**2
-    for members, covariance in _covariances(observations, jacobian, noise):
-        diagonal = np.arange(covariance.shape[1])
-        covariance[:, diagonal, diagonal] += np.tile(lacking, members.shape[1])
-        blocks.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
+    blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise)]
     return Whitening(tuple(blocks))
-
-
-def spectrum(observations, jacobian, noise, values):
-    """Values in the directions in which a discrepancy of the model only adds to the variance.
-
-    Parameters
-    ----------
-    observations, jacobian, noise
-        As in `whitening`.
-    values : ndarray (M, rows)
-
-    Returns
-    -------
-    variances, squares : ndarray (M * rows,)
-        With a discrepancy d the squared length of the whitened values is the sum of squares / (variances + d^2).
-    """
-    variances, squares = [], []
-    for members, covariance in _covariances(observations, jacobian, noise):
-        scale = np.tile(1.0 / np.sqrt(_lacking(noise, observations.rows)), members.shape[1])
-        found, vectors = np.linalg.eigh(covariance * scale[:, None] * scale)
-        turned = vectors.transpose(0, 2, 1) @ (values[members].reshape(len(members), -1) * scale)[..., None]
-        variances.append(found.ravel())
-        squares.append(turned.ravel() ** 2)
-    return np.concatenate(variances), np.concatenate(squares)
 
 
 def _covariances(observations, jacobian, noise):
@@ -106,11 +74,6 @@ def _covariances(observations, jacobian, noise):
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         yield members, alike * reading_covariances(noise, jacobian[members], rows) + common
-
-
-def _lacking(noise, rows):
-    """Variance of each component for a discrepancy of one in positions."""
-    return np.repeat([1.0, noise.orientation_rad / noise.position_m], 3)[:rows] ** 2
 
 
 def _members(group):

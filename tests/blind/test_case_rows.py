@@ -11,6 +11,9 @@ def test_right_place_is_the_right_effect_at_the_right_joints():
     document = truth(("joint_offset", 3))
     assert case_row(document, verdict("named", effect("joint_offset", 3)), oracle())["right_place"]
     assert not case_row(document, verdict("named", effect("joint_offset", 4)), oracle())["right_place"]
+    several = truth(("joint_offset", 3), ("joint_offset", 5))
+    assert case_row(several, verdict("named", effect("joint_offset", 3, 5)), oracle())["right_place"]
+    assert not case_row(several, verdict("named", effect("joint_offset", 3)), oracle())["right_place"]
 
 
 @pytest.mark.parametrize(
@@ -66,6 +69,17 @@ def test_exact_aliases_are_told_by_the_truth_and_its_joints():
     ]
     assert rows == [True, True, False, False, True, True, False, False]
     assert ("force_scale", ()) in EXACT_ALIASES
+
+
+def test_an_arm_without_a_compensator_has_no_alias_of_one():
+    place = ("transmission_harmonic", 2)
+    on = {robot: case_row(truth(place, robot=robot), silence(), oracle())["exact_alias"] for robot in ("gp180", "iiwa14")}
+    assert on == {"gp180": True, "iiwa14": False}
+
+
+def test_a_fault_of_the_data_that_ended_a_diagnosis_has_no_errors():
+    row = case_row(truth(("payload",)), verdict("named", effect("wrong_unit")) | {"heldout": None}, oracle())
+    assert np.isnan(row["after_rms_m"]) and not row["worse"]
 
 
 def test_size_is_given_against_the_noise():

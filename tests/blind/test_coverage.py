@@ -31,19 +31,35 @@ def test_few_degrees_of_freedom_make_it_wider():
 
 def test_only_the_right_effect_at_the_right_joint_is_compared():
     there = [("offset", 3e-4, 1e-5)]
-    assert not intervals_of(OFFSET, verdict("named", effect("link_geometry", 3)))
+    assert not of_effect(OFFSET, verdict("named", effect("link_geometry", 3)))
     assert not of_effect(OFFSET, verdict("named", effect("joint_offset", 4, parameters=there)))
     assert not of_effect(OFFSET, verdict("named", effect("joint_offset", 3, parameters=[("offset", 0.0, 0.0)])))
-    both = verdict("several", effect("joint_offset", 3, parameters=there), effect("payload"))
-    assert not intervals_of(OFFSET, both)
 
 
-def test_compliances_count_without_an_effect_whatever_was_said_and_with_the_right_one():
+def test_a_right_effect_counts_whatever_was_found_beside_it():
+    there = [("offset", 3e-4, 1e-5)]
+    assert len(of_effect(OFFSET, verdict("several", effect("joint_offset", 3, parameters=there), effect("payload")))) == 1
+
+
+def test_of_one_mechanism_at_several_joints_each_joint_is_compared_with_its_own():
+    document = truth(("joint_offset", 2), ("joint_offset", 3), group="several_joints")
+    for number, defect in enumerate(document["defects"]):
+        defect["parameters"] = {"offset": 1e-4 * (number + 1)}
+    found = effect("joint_offset", 2, 3)
+    found["parameters"] = [
+        {"name": f"joint_offset@{joint} offset", "value": value, "std_error": 1e-6, "held": False}
+        for joint, value in ((2, 1e-4), (3, 2e-4))
+    ]
+    rows = of_effect(document, verdict("named", found))
+    assert [(row["true"], row["holds"]) for row in rows] == [(1e-4, True), (2e-4, True)]
+
+
+def test_compliances_count_whatever_was_found():
     assert len(intervals_of(truth(), silence())) == 6
     assert len(intervals_of(truth(), verdict("named", effect("payload"), compliance=1.3))) == 6
     assert not any(row["holds"] for row in intervals_of(truth(), silence(compliance=1.3)))
     assert len(intervals_of(truth(("payload",)), verdict("named", effect("payload")))) == 6
-    assert not intervals_of(truth(("payload",)), silence())
+    assert len(intervals_of(truth(("payload",)), silence())) == 6
 
 
 def test_all_are_counted_and_those_by_another_law_are_marked():

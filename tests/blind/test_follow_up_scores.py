@@ -5,14 +5,22 @@ import pytest
 from scipy.stats import beta
 from test_scores import said, truth
 
-from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
+from elastocal.blind.follow_up_scores import (
+    followed,
+    poses_needed,
+    promised,
+    promises_kept,
+    rates,
+    with_one_effect,
+    with_prospects,
+)
 
 
 def entry(case, arm, poses, verdict):
     return {"campaign": case, "arm": arm, "poses": poses, "verdict": verdict}
 
 
-def sealed(case, *effects, robot="fanuc", group="single"):
+def sealed(case, *effects, robot="gp180", group="single"):
     document = truth(*effects, group=group)
     return document | {"campaign": case, "case": document["case"] | {"robot": robot}}
 
@@ -85,3 +93,14 @@ def test_nothing_followed_up_makes_empty_tables():
     none = followed(TRUTHS, {}, [], promised(pd.DataFrame({"case": []})))
     assert rates(none[with_one_effect(none)]).empty and poses_needed(none).empty
     assert "right_name" in rates(none) and isinstance(none, pd.DataFrame)
+
+
+def test_promises_are_counted_of_cases_whose_proposal_makes_one_after_all_poses(cases):
+    one = cases[with_one_effect(cases)]
+    table = promises_kept(one).set_index(["robots", "quantity"])
+    proposed = table.loc[("proof", "right name alone after proposed poses")]
+    # Of case b, which alone promises 30; its proposed poses end in a wrong name and its random ones in the right one.
+    assert (proposed.hits, proposed.cases, proposed.holds) == (0, 1, False)
+    assert table.loc[("proof", "right name alone after random poses"), "hits"] == 1
+    assert not table.loc[("proof", "proposed over random"), "holds"]
+    assert "tuned" not in set(promises_kept(one).robots)

@@ -33,8 +33,8 @@ def test_frames_of_a_load_error_are_variants_and_bands_of_orders_are_parts(kuka)
     assert len(bands) == 7
 
 
-def made(folder, *effects, level=200.0, setting="usual"):
-    """A case of a seed of its own: its truth and its folder."""
+def made(folder, *effects, level=200.0, setting="weight_compensated"):
+    """A case of a seed of its own: its truth and its folder; of an arm that weighs nothing, for the engine of the loop."""
     case = Case("/".join((*effects, setting)), "single", "kuka", effects, (level,) * len(effects), setting, 271828)
     make_case(case, folder / "blind", folder / "sealed", ROBOTS)
     truth = json.loads((folder / "sealed" / f"{case.name}.json").read_text(encoding="utf-8"))

@@ -6,7 +6,7 @@ from elastocal.blind.scores import outcome
 
 
 def truth(*effects, group="single", level=50.0):
-    case = {"group": group, "robot": "fanuc", "setting": "usual", "effects": effects, "levels": [level] * len(effects)}
+    case = {"group": group, "robot": "gp180", "setting": "usual", "effects": effects, "levels": [level] * len(effects)}
     return {"campaign": "case_x", "case": case}
 
 

@@ -35,8 +35,8 @@ def test_a_sweep_has_each_effect_of_each_pair_under_each_design_and_moves_no_oth
 def test_designs_differ_in_points_loads_and_reach_of_the_joints():
     by_design = {case.setting: case for case in cases_of(ONE, 1) if case.group == "sweep"}
     narrow, wide = (design_of(by_design[f"flange, one load, {joints}"]) for joints in ("narrow", "wide"))
-    assert narrow.points == ("6DoF",) and narrow.ladder == (0.0, 1.0)
     arm = specimen_of(by_design["flange, one load, wide"], ROBOTS).arm
+    assert narrow.points == ("flange",) and narrow.targets_on(arm) == ("6DoF",) and narrow.ladder == (0.0, 1.0)
     ranges = [np.ptp(schedule_of(arm, design, 1).angle, axis=0) for design in (narrow, wide)]
     np.testing.assert_allclose(ranges[0], narrow.reach * ranges[1])
     low, high = arm.limits.T

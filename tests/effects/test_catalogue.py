@@ -7,7 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, chain_of, refused
-from synthetic import circumstances_on, displacements, made_estimate, made_model, made_states, seen_exactly, slopes, small_steps
+from synthetic import (
+    circumstances_on,
+    displacements,
+    equipped,
+    made_estimate,
+    made_model,
+    made_states,
+    seen_exactly,
+    slopes,
+    small_steps,
+)
 
 import elastocal.effects
 from elastocal.campaign import Target
@@ -15,7 +25,6 @@ from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.kinematics import poses
 from elastocal.model import circumstances, linearize
-from elastocal.sites import sites_of
 
 # The table of the design, without the data family: that is no physics.
 TABLE = {
@@ -32,7 +41,7 @@ FAMILIES = {name: family for family, names in TABLE.items() for name in names.sp
 CHAINS = ["fanuc", "ur10", "fixed rotations"]
 UNITS = {
     *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),
-    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)"),
+    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)", "rad kg m/(N m)"),
 }
 # What one parameter of plausible size may do to a robot of this size under some kilonewton: more is no small deviation.
 LEAST_M, LARGEST_M = 1e-7, 2e-2
@@ -48,7 +57,7 @@ def test_names_and_families_are_those_of_the_design():
 
 
 def test_candidates_bear_the_name_and_family_of_their_module(chain):
-    sites = sites_of(chain)
+    sites = equipped(chain)
     for name, module in catalogue.effects().items():
         for candidate in module.candidates(sites):
             assert (candidate.effect, candidate.family) == (name, FAMILIES[name])
@@ -56,11 +65,11 @@ def test_candidates_bear_the_name_and_family_of_their_module(chain):
 
 
 def test_every_effect_can_act_on_an_industrial_arm(fanuc):
-    assert {candidate.effect for candidate in candidates_on(sites_of(fanuc.chain)).values()} == set(FAMILIES)
+    assert {candidate.effect for candidate in candidates_on(equipped(fanuc.chain)).values()} == set(FAMILIES)
 
 
 def test_keys_are_unique_and_readable(chain):
-    sites = sites_of(chain)
+    sites = equipped(chain)
     listed = [c.key for module in catalogue.effects().values() for c in module.candidates(sites)]
     assert len(listed) == len(set(listed)) and list(candidates_on(sites)) == listed
     for key in listed:
@@ -72,20 +81,21 @@ def test_keys_are_unique_and_readable(chain):
     [
         ("joint_offset", "@1 @2 @3 @4 @5 @6"),
         ("link_geometry", "@1 @2 @3 @4 @5 @6"),
-        ("link_weight", "@2 @3 @4 @5"),
+        ("link_weight", "@2 @3 @4 @5 " + " ".join(f"@{joint}[off_the_line]" for joint in range(2, 6))),
         ("payload", " [mass]"),
         ("compensator_torque", "@2 @2[first_order]"),
         ("compensator_stiffness", "@2"),
         ("link_elasticity", "[column] @1 @2 @3 @6 @1+2+3+6[one_section]"),
         ("joint_tilt", "@1 @2 @3 @4 @5 @6"),
         ("base_compliance", " [rocking]"),
+        ("transmission_ratio", "@1 @2 @3 @4 @5 @6 @5[from_4] @6[from_4]"),
         ("stiffening", "@1 @2 @3 @4 @5 @6 " + " ".join(f"@{joint}[two_slopes]" for joint in range(1, 7))),
         ("lost_motion", "@1 @2 @3 @4 @5 @6"),
         ("hysteresis", "@1 @2 @3 @4 @5 @6"),
     ],
 )
 def test_places_on_the_fanuc(fanuc, effect, places):
-    found = [c.key for c in candidates_on(sites_of(fanuc.chain)).values() if c.effect == effect]
+    found = [c.key for c in candidates_on(equipped(fanuc.chain)).values() if c.effect == effect]
     assert found == [effect + place.replace("_", " ") for place in places.split(" ")]
 
 
@@ -95,10 +105,12 @@ def test_places_on_the_fanuc(fanuc, effect, places):
         ("payload", "payload[mass]", [0]),
         ("compensator_torque@2", "compensator_torque@2[first order]", [0, 1]),
         ("base_compliance", "base_compliance[rocking]", [2]),
+        ("transmission_ratio@5", "transmission_ratio@5[from 4]", [1]),
+        ("link_weight@3[off the line]", "link_weight@3", [0, 1]),
     ],
 )
 def test_small_form_of_a_large_effect_is_some_of_its_parameters(fanuc, whole, part, kept):
-    around, by_key = circumstances_on(fanuc.chain, made_states(6, 8, seed=11)), candidates_on(sites_of(fanuc.chain))
+    around, by_key = circumstances_on(fanuc.chain, made_states(6, 8, seed=11)), candidates_on(equipped(fanuc.chain))
     large, small = by_key[whole], by_key[part]
     assert (small.effect, small.family, small.joints, small.needs) == (large.effect, large.family, large.joints, large.needs)
     assert small.parameters == tuple(large.parameters[number] for number in kept)
@@ -108,7 +120,7 @@ def test_small_form_of_a_large_effect_is_some_of_its_parameters(fanuc, whole, pa
 
 
 def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
-    for candidate in candidates_on(sites_of(chain)).values():
+    for candidate in candidates_on(equipped(chain)).values():
         names = [p.name for p in (*candidate.parameters, *candidate.shapes)]
         assert candidate.parameters and len(names) == len(set(names)), candidate.key
         for parameter in candidate.parameters:
@@ -152,7 +164,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
 
 
 def test_positions_have_the_sensitivities_of_the_first_rows_of_poses(chain):
-    effects = tuple(candidates_on(sites_of(chain)).values())
+    effects = tuple(candidates_on(equipped(chain)).values())
     states = made_states(chain.coordinates, 3, seed=4)
     found = []
     for rows in (3, 6):
@@ -274,12 +286,12 @@ def test_module_that_was_added_is_gone_with_its_file():
 
 
 def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
-    sites = sites_of(fanuc.chain)
-    found = [candidate.key for candidate in declared_candidates(["payload", "link_weight"], sites)]
-    assert found == ["payload", "payload[mass]", *(f"link_weight@{joint}" for joint in (2, 3, 4, 5))]
+    sites = equipped(fanuc.chain)
+    found = [candidate.key for candidate in declared_candidates(["payload", "force_bias"], sites)]
+    assert found == ["payload", "payload[mass]", "force_bias[base axes]", "force_bias[flange axes]"]
     assert declared_candidates([], sites) == []
 
 
 def test_effect_that_the_catalogue_does_not_have_is_refused(fanuc):
     with refused("campaign.yaml", "declared", "link_weight"):
-        declared_candidates(["link_wait"], sites_of(fanuc.chain), "campaign.yaml")
+        declared_candidates(["link_wait"], equipped(fanuc.chain), "campaign.yaml")

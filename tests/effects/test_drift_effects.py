@@ -25,12 +25,8 @@ def predicted(chain, key, values, states, shapes=()):
 
 
 def grown(chain, share):
-    """The chain with all lengths behind the first joint longer by a share; the column stands."""
-    first = next(index for index, t in enumerate(chain.transforms) if t.coordinate is not None)
-    larger = [
-        replace(t, constant=t.constant * (1 + share)) if t.kind == "T" and index > first else t
-        for index, t in enumerate(chain.transforms)
-    ]
+    """The chain with all lengths longer by a share, the column's too."""
+    larger = [replace(t, constant=t.constant * (1 + share)) if t.kind == "T" else t for t in chain.transforms]
     return replace(chain, transforms=tuple(larger))
 
 

@@ -46,8 +46,13 @@ def test_link_weight_is_the_gravity_of_point_masses_by_pinocchio(name, fanuc):
         (joint,) = candidate.joints
         for column, parameter in zip(displacements(candidate, around), candidate.parameters, strict=True):
             link = int(parameter.name.split("_")[-1])
-            expected = np.zeros_like(column)
-            expected[:, joint - 1] = gravity_torques(chain, states.joint_angles, far_ends(chain)[link], 1.0)[:, joint - 1]
+            expected, after = np.zeros_like(column), far_ends(chain)[link]
+            torques = gravity_torques(chain, states.joint_angles, after, 1.0)
+            if "moment" in parameter.name:
+                # What a kilogram does more, one metre off along an axis of the frame at the far end.
+                off = np.eye(3)["xyz".index(parameter.name.split("_")[3])]
+                torques = gravity_torques(chain, states.joint_angles, after, 1.0, off) - torques
+            expected[:, joint - 1] = torques[:, joint - 1]
             np.testing.assert_allclose(column, expected, rtol=0, atol=1e-12)
             assert np.abs(expected).max() > 0.1
 
@@ -56,9 +61,25 @@ def test_link_weight_is_that_of_the_next_two_links_with_a_length(fanuc):
     named = {
         c.key: [int(p.name.split("_")[-1]) for p in c.parameters]
         for c in candidates_on(sites_of(fanuc.chain)).values()
-        if c.effect == "link_weight"
+        if c.effect == "link_weight" and not c.detail
     }
     assert named == {"link_weight@2": [2, 3], "link_weight@3": [3, 6], "link_weight@4": [6], "link_weight@5": [6]}
+
+
+def test_centres_of_mass_off_the_line_count_where_they_can_turn_the_joint(fanuc):
+    """Joints 2 and 3 turn about y: what is off along y hangs on their axes."""
+    named = {
+        c.joints[0]: [p.name.removeprefix("compliance_times_moment_") for p in c.parameters if "moment" in p.name]
+        for c in candidates_on(sites_of(fanuc.chain)).values()
+        if c.effect == "link_weight" and c.detail == "off the line"
+    }
+    # Link 6 has a length along x and turns with joint 6, so that its y and z turn every joint but those about x.
+    assert named == {
+        2: ["z_of_link_2", "z_of_link_3"],
+        3: ["z_of_link_3", "y_of_link_6", "z_of_link_6"],
+        4: ["y_of_link_6", "z_of_link_6"],
+        5: ["y_of_link_6", "z_of_link_6"],
+    }
 
 
 def test_arm_stretched_out_sags_by_its_weight_as_calculated_by_hand():

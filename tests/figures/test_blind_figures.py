@@ -8,6 +8,7 @@ from elastocal.blind.power import powers
 from elastocal.figures.blind_errors import errors_against_oracle
 from elastocal.figures.blind_power import confusion_map, power_map
 from elastocal.figures.blind_rates import coverage_by_effect, rates_and_targets
+from elastocal.figures.blind_reliability import reliability_diagram
 from elastocal.figures.style import save
 
 POWER = ["detected", "held", "named", "oracle_detected"]
@@ -79,12 +80,28 @@ def test_targets_have_a_dot_with_its_interval_and_the_range_of_the_target():
 
 
 def test_coverage_has_a_row_for_each_kind_and_numbers_of_intervals():
-    head = {"robots": "proof", "setting": "usual", "truth": "joint_offset", "level": 50.0}
+    head = {"robots": "proof", "setting": "usual", "truth": "joint_offset", "level": 50.0, "right": True}
     rows = [head | {"effect": "joint_offset", "parameter": "offset", "comparable": "exact", "holds": holds} for holds in (1, 0)]
     rows.append(head | {"effect": "joint_compliance", "parameter": "c1", "comparable": "exact", "holds": 1})
     figure = coverage_by_effect(covered(pd.DataFrame(rows)))
     assert labels(figure.axes[0]) == ["joint compliances, effect found", "parameters of all effects", "joint offset"]
     assert texts(figure) == ["1", "2", "2", "intervals"]
+
+
+def test_the_reliability_diagram_shows_shares_against_what_was_stated_and_numbers_of_cases():
+    rows = [
+        ("proof", "all", 0.9, 1.0, 0.97, 95, 100),
+        ("proof", "all", 0.3, 0.4, 0.35, 1, 4),
+        ("tuned", "all", 0.9, 1.0, 0.95, 9, 9),
+    ]
+    rows.append(("proof", "single", 0.9, 1.0, 0.5, 0, 7))
+    table = pd.DataFrame(rows, columns=["robots", "group", "from", "to", "stated", "hits", "cases"])
+    table = table.assign(rate=table.hits / table.cases, low=0.0, high=1.0)
+    shares, counts = reliability_diagram(table).axes
+    drawn = [container.lines[0].get_xydata().tolist() for container in shares.containers]
+    assert drawn == [[[0.97, 0.95], [0.35, 0.25]], [[0.95, 1.0]]]
+    assert [patch.get_height() for patch in counts.patches] == [100, 4, 9]
+    assert "No verdict" in texts(reliability_diagram(table.iloc[:0]))[0]
 
 
 def test_errors_are_points_of_cases_that_have_an_oracle():

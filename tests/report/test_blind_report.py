@@ -4,6 +4,7 @@ import pandas as pd
 import pytest
 from made_blind_documents import effect, frame, oracle, silence, truth, verdict
 
+from elastocal.blind.calibration import statements
 from elastocal.blind.confusion import confused
 from elastocal.blind.coverage import covered, intervals_of
 from elastocal.blind.power import powers, undetectable
@@ -12,7 +13,7 @@ from elastocal.figures.style import panels, save
 from elastocal.report.blind_facts import blind_facts
 from elastocal.report.blind_pages import write_blind_report
 
-FIGURES = ("targets", "power", "confusion", "errors", "coverage", "sweep")
+FIGURES = ("targets", "power", "reliability", "confusion", "errors", "coverage", "sweep")
 PAYLOAD = verdict("named", effect("payload"))
 SWEEP = ["pair", "angle_up_to_deg", "cases"]
 SWEEP += [f"{name}{end}" for name in ("right", "class", "wrong", "other") for end in ("", "_low", "_high")]
@@ -31,7 +32,7 @@ def tables(folder, *entries, follow_up=(), sweep=()):
     intervals = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
     made = {
         "cases": cases,
-        "summary": summarized(cases, intervals, 1),
+        "summary": summarized(cases, intervals, statements((document, said) for document, said, _ in entries), 1),
         "settings": by_setting(cases),
         "confusion": confused(cases),
         "power": powers(cases),
@@ -64,17 +65,20 @@ def test_targets_are_said_to_be_reached_or_missed_with_their_figures(tmp_path):
     facts = facts_of(tmp_path, *PROOF, follow_up=MEASURED)
     rows = {row[0]: row[1:] for row in facts["targets"]["proof"]}
     assert rows["detected at 50"][:2] == ["1 of 2", "50.0 %"] and rows["detected at 50"][-1] == "missed"
-    assert rows["held-out RMS worse by over two standard errors without a warning"][-1] == "reached"
-    assert any(line.startswith("detected at 50: 50.0 % (1.3–98.7 %), target at least 97 %") for line in facts["missed"])
+    assert rows["effect adopted and held-out RMS worse by over two standard errors"][-1] == "reached"
+    assert any(line.startswith("detected at 50: 50.0 % (1.3–98.7 %), target at least 98 %") for line in facts["missed"])
     ends = [row[-1] for row in rows.values()]
-    assert ends.count("no case") == 1 and rows["95 % intervals of effects' parameters"][-1] == "no case"
-    assert facts["verdict"].startswith(f"{ends.count('reached')} of {len(ends) - 1} figures")
+    # Four hard settings, pairs, stated probabilities and their 95 % sets, and parameters of effects.
+    assert rows["95 % intervals of effects' parameters"][-1] == "no case"
+    assert rows["false alarms, force 3kN"][-1] == "no case"
+    without = ends.count("no case")
+    assert facts["verdict"].startswith(f"{ends.count('reached')} of {len(ends) - without} figures")
     assert len(facts["missed"]) == ends.count("missed")
 
 
 def test_robots_of_the_proof_and_of_tuning_are_told_apart(tmp_path):
     facts = facts_of(tmp_path, *PROOF)
-    assert facts["robots"] == {"proof": "fanuc", "tuned": "kuka"} and facts["proof"]
+    assert facts["robots"] == {"proof": "gp180", "tuned": "kuka"} and facts["proof"]
     assert {row[0]: row[1] for row in facts["targets"]["tuned"]}["detected at 50"] == "1 of 1"
 
 

@@ -55,9 +55,9 @@ def test_a_finished_proof_has_nothing_to_do(scored):
 
 
 def test_every_table_and_figure_is_there(scored):
-    tables = ["cases", "confusion", "coverage", "power", "settings", "summary", "undetectable"]
+    tables = ["cases", "confusion", "coverage", "power", "probabilities", "reliability", "settings", "summary", "undetectable"]
     assert set(scored.files("reports/blind/*.csv")) >= {f"reports/blind/{name}.csv" for name in tables}
-    figures = ["confusion", "coverage", "errors", "power", "sweep", "targets"]
+    figures = ["confusion", "coverage", "errors", "power", "reliability", "sweep", "targets"]
     for kind in ("pdf", "png"):
         assert scored.files(f"reports/blind/figures/*.{kind}") == [f"reports/blind/figures/{name}.{kind}" for name in figures]
     assert scored.path("reports/blind/blind.pdf").read_bytes().startswith(b"%PDF")

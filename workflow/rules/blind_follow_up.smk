@@ -72,6 +72,7 @@ rule score_follow_ups:
         separable="reports/blind/follow_up_separable.csv",
         others="reports/blind/follow_up_other.csv",
         poses="reports/blind/follow_up_poses.csv",
+        promises="reports/blind/follow_up_promises.csv",
         cases="reports/blind/follow_up_cases.csv",
     log:
         "results/logs/score_follow_ups.log",

@@ -4,7 +4,7 @@ Needs data/blind/, data/sealed/, the verdicts of results/blind/ and what blind_f
 and reports/blind/.
 """
 
-BLIND_FIGURES = ["targets", "power", "confusion", "errors", "coverage"]
+BLIND_FIGURES = ["targets", "reliability", "power", "confusion", "errors", "coverage"]
 
 
 rule oracle_cases:
@@ -41,6 +41,8 @@ rule score_cases:
         power="reports/blind/power.csv",
         coverage="reports/blind/coverage.csv",
         undetectable="reports/blind/undetectable.csv",
+        probabilities="reports/blind/probabilities.csv",
+        reliability="reports/blind/reliability.csv",
     log:
         "results/logs/score_cases.log",
     benchmark:
@@ -64,6 +66,21 @@ rule draw_blind_targets:
         "results/timings/draw_blind_targets.tsv"
     script:
         "../scripts/draw_blind_targets.py"
+
+
+rule draw_blind_reliability:
+    input:
+        reliability=rules.score_cases.output.reliability,
+        sources=sources("draw_blind_reliability.py"),
+    output:
+        pdf="reports/blind/figures/reliability.pdf",
+        png="reports/blind/figures/reliability.png",
+    log:
+        "results/logs/draw_blind_reliability.log",
+    benchmark:
+        "results/timings/draw_blind_reliability.tsv"
+    script:
+        "../scripts/draw_blind_reliability.py"
 
 
 rule draw_blind_power:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from elastocal.blind.calibration import reliability, statements
 from elastocal.blind.case_rows import case_row
 from elastocal.blind.confusion import confused
 from elastocal.blind.coverage import covered, intervals_of
@@ -22,8 +23,11 @@ def score_cases(job):
     oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
     cases = pd.DataFrame([case_row(truth, verdicts[name], oracles[name]) for name, truth in truths.items()])
     intervals = pd.DataFrame([row for name, truth in truths.items() for row in intervals_of(truth, verdicts[name])])
+    said = statements((truth, verdicts[name]) for name, truth in truths.items())
     write_csv(job.output.cases, cases)
-    write_csv(job.output.summary, summarized(cases, intervals, job.params.seed))
+    write_csv(job.output.probabilities, said)
+    write_csv(job.output.reliability, reliability(said))
+    write_csv(job.output.summary, summarized(cases, intervals, said, job.params.seed))
     write_csv(job.output.settings, by_setting(cases))
     write_csv(job.output.confusion, confused(cases))
     write_csv(job.output.power, powers(cases))

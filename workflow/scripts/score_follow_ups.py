@@ -4,7 +4,15 @@ from pathlib import Path
 
 import pandas as pd
 
-from elastocal.blind.follow_up_scores import followed, poses_needed, promised, rates, with_one_effect, with_prospects
+from elastocal.blind.follow_up_scores import (
+    followed,
+    poses_needed,
+    promised,
+    promises_kept,
+    rates,
+    with_one_effect,
+    with_prospects,
+)
 from elastocal.blind.truths import opened_truths
 from elastocal.frames import write_csv
 from elastocal.json_files import read_json
@@ -24,6 +32,7 @@ def score_follow_ups(job):
     write_csv(job.output.rates, rates(cases[one]))
     write_csv(job.output.separable, rates(cases[one & with_prospects(cases)]))
     write_csv(job.output.others, rates(cases[~one]))
+    write_csv(job.output.promises, promises_kept(cases[one]))
     write_csv(job.output.poses, poses_needed(cases[one]))
 
 

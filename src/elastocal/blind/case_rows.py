@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from elastocal.blind.cases import impossible_on
 from elastocal.blind.scores import outcome
 from elastocal.plant.defects import KINDS
 
@@ -18,6 +19,8 @@ EXACT_ALIASES = {
     ("joint_dependent_stiffness", (2,)): "compensator_stiffness",
 }
 _STD_ERRORS = 2.0
+_ERRORS = ("before_rms_m", "after_rms_m", "noise_floor_rms_m", "reduction", "reduction_std_error")
+_ERRORS += ("worse", "warned", "worse_unwarned", "adopted", "worse_adopted")
 _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
@@ -43,9 +46,9 @@ def case_row(truth, verdict, oracle):
         outcome(truth, verdict)
         | {
             "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
-            "right_place": _places(truth) == _found_places(verdict),
+            "right_place": _places(defects, "effect") == _places(verdict["effects"], "name"),
             # By the truth alone.
-            "exact_alias": any((defect["effect"], tuple(defect["joints"])) in EXACT_ALIASES for defect in defects),
+            "exact_alias": any(_is_alias(defect, truth["case"]["robot"]) for defect in defects),
             "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
         }
         | _size(truth)
@@ -70,17 +73,26 @@ def _size(truth):
     }
 
 
-def _places(truth):
-    return sorted((defect["effect"], tuple(defect["joints"])) for defect in truth["defects"])
+def _is_alias(defect, robot):
+    """Whether an effect lies wholly within another one that the robot can have."""
+    alias = EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"])))
+    return alias is not None and alias not in impossible_on(robot)
 
 
-def _found_places(verdict):
-    return sorted((effect["name"], tuple(effect["joints"])) for effect in verdict["effects"])
+def _places(effects, name):
+    """Joints of each effect; those of one mechanism at several joints together."""
+    found = {}
+    for effect in effects:
+        found.setdefault(effect[name], set()).update(effect["joints"])
+    return found
 
 
 def _errors(verdict):
     """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
     held = verdict["heldout"]
+    if held is None:
+        # A fault of the data ends a diagnosis before any model is fitted.
+        return dict.fromkeys(_ERRORS[:5], np.nan) | dict.fromkeys(_ERRORS[5:], False)
     before, after = held["before"]["rms_m"], held["after"]["rms_m"]
     reduction, std_error = 1.0 - after / before, held["reduction_std_error"]
     warned = any("held-out" in warning for warning in verdict["warnings"])

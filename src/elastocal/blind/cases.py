@@ -291,7 +291,7 @@ def cases_of(counts, seed):
     found = []
 
     def add(group, effects, levels, setting, number, rival=""):
-        if set((*effects, rival)) & set(_WITHOUT_COMPENSATOR.get(robot, ())):
+        if set((*effects, rival)) & set(impossible_on(robot)):
             return
         words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number), *([rival] if rival else [])]
         key = "/".join(words)
@@ -330,6 +330,11 @@ def cases_of(counts, seed):
                 for number in range(share.sweep):
                     add("sweep", (effect,), (SWEEP_LEVEL,), design, number, rival)
     return sorted(found, key=lambda case: case.name)
+
+
+def impossible_on(robot):
+    """Effects that a robot of `ROBOTS` cannot have, tuple of str."""
+    return _WITHOUT_COMPENSATOR.get(robot, ())
 
 
 def block_of(cases, number, of):
@@ -556,6 +561,6 @@ def write_manifest(path, digests):
 
 def _drawn_pair(seed, robot, level, number):
     """Two effects of different names, neither of which is an alias of the compliances, and which the robot can have."""
-    absent = ("force_scale", *_WITHOUT_COMPENSATOR.get(robot, ()))
+    absent = ("force_scale", *impossible_on(robot))
     pairs = list(combinations([name for name in NAMED if name not in absent], 2))
     return pairs[stream(seed, f"pair {robot} {level} {number}").integers(len(pairs))]

@@ -2,10 +2,13 @@
 
 import pandas as pd
 
+from elastocal.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED
+from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 from elastocal.effects.catalogue import effects
-from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 
-PAIR, SWEEP = "pair", "sweep"
+PAIR = "pair"
+# Groups of which the settings are a column of their own: their cases are of another kind than a single effect's.
+APART = ("sweep", SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED)
 CLASS_WITH, CLASS_WITHOUT = "class with the truth", "class without the truth"
 FAULT = "named: fault of the data"
 WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE)
@@ -22,12 +25,13 @@ def confused(cases):
     Returns
     -------
     pandas.DataFrame
-        One row for each kind of robots, settings (usual, hard, or the designs of a sweep), truth and level; one column for each
-        name of the catalogue said alone and for each other word, all of them always there: every row adds up to its cases.
+        One row for each kind of robots, settings (usual, hard, or a group of its own such as a sweep), truth and level; one
+        column for each name of the catalogue said alone and for each other word, all of them always there: every row adds up to
+        its cases.
     """
     names = [*effects()]
     said = [_said(row, names) for row in cases.itertuples()]
-    setting = cases.setting.where(cases.setting == "usual", "hard").where(cases.group != SWEEP, SWEEP)
+    setting = cases.setting.where(cases.setting == "usual", "hard").where(~cases.group.isin(APART), cases.group)
     truth = cases.truth.where(cases.group != PAIR, PAIR)
     table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(said, cases.index, name="said"))
     return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})

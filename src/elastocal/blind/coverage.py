@@ -29,19 +29,18 @@ def intervals_of(truth, verdict):
     Returns
     -------
     list of dict
-        Joint compliances where there is no effect, whatever was said, or where the right one was found; parameters of an
-        effect where the right one was found at the right joints. A parameter that the data could not tell has no interval.
+        Joint compliances, whatever was found; parameters of an effect that was found at the right joints, whatever was found
+        beside it. A parameter that the data could not tell has no interval.
     """
     case, found = truth["case"], verdict["effects"]
     right = sorted(effect["name"] for effect in found) == sorted(case["effects"])
-    if case["effects"] and not right:
-        return []
     freedom = verdict["noise"]["degrees_of_freedom"]
     width = t_distribution.ppf(0.975, freedom) if freedom else norm.ppf(0.975)
     head = {
         "robots": kind_of(case["robot"]),
         "setting": case["setting"],
         "truth": " + ".join(case["effects"]) or NONE,
+        "right": right,
         "level": max(case["levels"], default=0.0),
     }
     values = [
@@ -51,7 +50,7 @@ def intervals_of(truth, verdict):
     ]
     for defect in truth["defects"]:
         for effect in found:
-            if (effect["name"], effect["joints"]) == (defect["effect"], defect["joints"]):
+            if effect["name"] == defect["effect"]:
                 values += _comparable(defect, effect)
     return [
         head
@@ -73,15 +72,15 @@ def covered(intervals):
     -------
     pandas.DataFrame
         One row for each kind of robots, effect, parameter and level, with ``all`` for parameters and levels together. Joint
-        compliances are apart: of cases without an effect in the usual setting, and of those in which the right one was found.
+        compliances are apart: of cases without an effect in the usual setting, of those in which the right one was found, and
+        of those in which it was not.
     """
     columns = ["robots", *_KEYS, *rate([])]
     if not len(intervals):
         return pd.DataFrame(columns=columns)
     of_springs = intervals.effect == COMPLIANCE
-    kind = np.where(
-        ~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", "compliance, effect found")
-    )
+    found = np.where(intervals.right, "compliance, effect found", "compliance, effect not found")
+    kind = np.where(~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", found))
     rows = intervals.assign(kind=kind)[intervals.setting == "usual"]
     whole = rows.assign(parameter="all")
     everything = whole[whole.kind == "effect"].assign(level="all", effect="all", comparable="all")
@@ -98,11 +97,18 @@ def _compliances(truth, verdict):
     return zip(truth["compliance_urad_per_Nm"], stated["after"], stated["std_error"], strict=True)
 
 
+def _joints_of(key):
+    """Joints in the key of a candidate such as ``cross_compliance@2+5[variant]``, list of int."""
+    where = key.partition("[")[0].partition("@")[2]
+    return [int(joint) for joint in where.split("+")] if where else []
+
+
 def _comparable(defect, effect):
     how = OTHER_LAW if defect["effect"] in _OTHER_LAW else FIRST_ORDER if defect["effect"] in _FIRST_ORDER else EXACT
     found = []
     for parameter in effect["parameters"]:
-        name = parameter["name"].rpartition(" ")[2]
-        if name in defect["parameters"] and not parameter["held"]:
+        key, _, name = parameter["name"].rpartition(" ")
+        mine = _joints_of(key) == defect["joints"]
+        if mine and name in defect["parameters"] and not parameter["held"]:
             found.append((defect["effect"], name, how, defect["parameters"][name], parameter["value"], parameter["std_error"]))
     return found

@@ -5,7 +5,7 @@ The analyst's side, which knows neither truths nor the plant; `carrying_out` is 
 
 from pathlib import Path
 
-from elastocal.verdict import CLASS, NAMED
+from elastocal.diagnosis.verdict import CLASS, NAMED
 
 # Poses after which a verdict is stated anew.
 POSES = (5, 10, 20)

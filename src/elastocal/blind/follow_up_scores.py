@@ -1,16 +1,21 @@
 """Scores of the loop once more: how often the name is right after so many further poses, proposed or random."""
 
+import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
-from elastocal.attribution import CONFOUNDED_BIC
+from elastocal.blind.cases import GEAR_GRAVITY, SEVERAL_JOINTS, UNDECLARED
 from elastocal.blind.follow_up import ARMS, POSES
+from elastocal.blind.rates import rate
 from elastocal.blind.scores import outcome
-from elastocal.verdict import CLASS
+from elastocal.diagnosis.verdict import CLASS
 
 _CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "foreseen", "arm", "poses_added"]
 _CASE_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
 _COLUMNS = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high", "still_class", "wrong_name", "other_verdict"]
+_PROMISE_COLUMNS = ["robots", "quantity", "hits", "cases", "rate", "low", "high", "target", "holds"]
+# Non-centrality at which nine of ten experiments resolve two alternatives at odds of 19 to 1.
+PROMISE = 16.0
 _POSES_COLUMNS = ["robots", "arm", "cases", "reached", "median_poses"]
 
 
@@ -53,7 +58,8 @@ def promised(proposals):
 
 def with_one_effect(cases):
     """Which rows are of cases that a single name can be right for: one effect of the catalogue that readings can show."""
-    return cases["group"].isin(("single", "setting", "sweep")) & ~cases["truth"].isin(("none", "force_scale"))
+    groups = ("single", "setting", "sweep", SEVERAL_JOINTS, GEAR_GRAVITY, UNDECLARED)
+    return cases["group"].isin(groups) & ~cases["truth"].isin(("none", "force_scale"))
 
 
 def with_prospects(cases):
@@ -61,7 +67,38 @@ def with_prospects(cases):
 
     The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
     """
-    return cases["foreseen"] >= CONFOUNDED_BIC
+    return cases["foreseen"] >= PROMISE
+
+
+def promises_kept(cases):
+    """How often an experiment that promises enough resolves the case, and how often as many random poses do.
+
+    Parameters
+    ----------
+    cases : pandas.DataFrame
+        Of `followed`, with one effect each.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each kind of robots and quantity, with its target: the right name alone after all poses, of the cases whose
+        proposal promises a separation of at least `PROMISE`; and the ratio of proposed to random poses in that.
+    """
+    last = cases[(cases["poses_added"] == max(POSES)) & (cases["foreseen"] >= PROMISE)]
+    rows = []
+    for robots, part in last.groupby("robots"):
+        kept = {arm: rate(part.loc[part["arm"] == arm, "named_right"]) for arm in ARMS}
+        for arm in ARMS:
+            words, least = ("at least 90 %", 0.9) if arm == ARMS[0] else ("", 0.0)
+            holds = kept[arm]["rate"] >= least if words else None
+            rows.append(
+                {"robots": robots, "quantity": f"right name alone after {arm} poses", "target": words, "holds": holds}
+                | kept[arm]
+            )
+        ratio = kept["proposed"]["rate"] / kept["random"]["rate"] if kept["random"]["hits"] else np.inf
+        row = {"hits": None, "cases": len(part) // len(ARMS), "rate": ratio, "low": np.nan, "high": np.nan}
+        rows.append({"robots": robots, "quantity": "proposed over random", "target": "at least 2", "holds": ratio >= 2.0} | row)
+    return pd.DataFrame(rows, columns=_PROMISE_COLUMNS)
 
 
 def rates(cases):

@@ -10,14 +10,15 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
+from elastocal.diagnosis.diagnose import Step, declared_sizes
+from elastocal.diagnosis.judge import heldout_errors
+from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.settings import Settings
 from elastocal.fitting import fit
-from elastocal.loop.case import case_from, noise_from
-from elastocal.loop.intake import taken_in
-from elastocal.loop.judge import Step, judged
-from elastocal.loop.reading_columns import reading_columns
+from elastocal.loop.case import noise_from
+from elastocal.loop.whole import cases_in
 from elastocal.plant.defects import OUTSIDE
-from elastocal.screening import directions
-from elastocal.selection import parameter_slice
 
 LEVEL = 0.05
 
@@ -50,14 +51,12 @@ def oracle(truth, verdict, folder, robots_folder, seed):
     if not effects:
         # Without an effect the declared model is the right one, and has been judged already.
         return _told((), 1.0, verdict["heldout"]["before"])
-    descriptions, training, held_out = taken_in(folder, robots_folder)
-    case = case_from(descriptions, reading_columns(training))
-    unseen = case_from(descriptions["held_out"] or descriptions, reading_columns(held_out))
-    declared = fit(case.model, case.observations, noise_from(verdict))
+    case, unseen = cases_in(folder, robots_folder)
+    declared = fit(case.model, case.observations, noise_from(verdict).of_readings)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
-    found = judged([Step("oracle", "declared", fitted)], case, unseen, seed)
-    return _told(members, p_value, found.heldout["before"])
+    _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)
+    return _told(members, p_value, heldout["before"])
 
 
 def members_of(effect, joints, candidates):
@@ -84,15 +83,17 @@ def members_of(effect, joints, candidates):
 def _with_effects(declared, case, effects):
     """Fit with the effects, their candidates, and among how many variants these were chosen."""
     chosen, variants = [], 1
+    settings = Settings()
     for effect, joints in effects:
         listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
-        seen = directions(declared, case.observations, listed, 0.0, 0.0)
+        problem = linearized(declared, case.observations, listed, declared_sizes(declared.model), settings).problem
+        factors = single_log_bayes_factors(problem)
         # Each at the shape that fits best.
         best = {}
-        for (candidate, shapes), columns in zip(seen.candidates, seen.columns, strict=True):
-            told = float(((columns.T @ seen.residual) ** 2).sum())
-            if told > best.get(candidate.key, (-1.0,))[0]:
-                best[candidate.key] = told, candidate, shapes
+        for number in problem.candidates:
+            unit = problem.units[number]
+            if unit.candidate and factors[number] > best.get(unit.candidate.key, (-np.inf,))[0]:
+                best[unit.candidate.key] = factors[number], unit.candidate, unit.shapes
         alternatives = [[best[m.key] for m in members if m.key in best] for members in members_of(effect, joints, listed)]
         alternatives = [members for members in alternatives if members]
         if alternatives:
@@ -101,13 +102,12 @@ def _with_effects(declared, case, effects):
     members = tuple(candidate for _, candidate, _ in chosen)
     start = declared.estimate.with_effects(members)
     start = replace(start, shapes=(*declared.estimate.shapes, *(np.array(shapes, float) for _, _, shapes in chosen)))
-    model = declared.model.with_effects(members)
-    return fit(model, case.observations, declared.noise, start, None, declared.discrepancy_m), members, variants
+    return fit(declared.model.with_effects(members), case.observations, declared.noise, start), members, variants
 
 
 def _wald(fitted, members):
     """Of all coefficients at once, given the shapes."""
-    places = [np.split(parameter_slice(fitted, member.key), [len(member.parameters)]) for member in members]
+    places = [np.split(_parameters_of(fitted, member.key), [len(member.parameters)]) for member in members]
     linear, shapes = (np.concatenate([place[part] for place in places] or [[]]) for part in (0, 1))
     free = np.flatnonzero(~fitted.held)
     tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
@@ -117,6 +117,10 @@ def _wald(fitted, members):
     information = np.linalg.inv(fitted.covariance[np.ix_(free, free)])
     covariance = np.linalg.inv(information[np.ix_(kept, kept)])[np.ix_(tested[kept], tested[kept])]
     return float(chi2.sf(values @ np.linalg.solve(covariance, values), tested.sum() + (~kept).sum()))
+
+
+def _parameters_of(fitted, key):
+    return np.flatnonzero([owner == key for owner, _ in fitted.parameters])
 
 
 def _told(members, p_value, heldout):

@@ -5,8 +5,8 @@ from scipy.optimize import linear_sum_assignment
 
 from elastocal.blind.cases import TUNED as TUNED_ON
 from elastocal.blind.robots import PROOF, TUNED
+from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
-from elastocal.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 
 NONE = "none"
 SILENT = (ADEQUATE, NOT_TESTABLE)

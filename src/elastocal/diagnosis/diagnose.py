@@ -106,9 +106,9 @@ def diagnose(case, settings, seed, progress=None):
     known = faults(case.campaign, case.campaign.readings)
     decisive = [fault for fault in known if fault.decisive]
     noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise, None, 0.0)
+    declared = fit(case.model, case.observations, noise)
     tell(f"declared model fitted to {len(case.observations)} measurements")
-    bare = fit(replace(case.model, effects=()), case.observations, noise, None, 0.0)
+    bare = fit(replace(case.model, effects=()), case.observations, noise)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     if decisive:
         found, final = None, declared

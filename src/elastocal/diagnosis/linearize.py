@@ -1,6 +1,6 @@
 """From a fit of the declared model to the problem that is searched: columns of every unit, whitened, and their products."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -9,6 +9,7 @@ from elastocal.diagnosis import other
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
+from elastocal.effects.protocol import offered
 from elastocal.model import bends as shape_parameters
 from elastocal.model import effect_columns, linearize, parameter_values
 from elastocal.whitening import whitening
@@ -64,8 +65,8 @@ def linearized(fitted, observations, candidates, declared, settings):
     Linearized
     """
     line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
-    around, sites = fitted.circumstances, fitted.model.sites
-    untestable = {c.key: reason for c in candidates if (reason := lacking(c, observations.states))}
+    around, sites = line.circumstances, fitted.model.sites
+    untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
     tested = [(c, shapes) for c in candidates if c.key not in untestable for shapes in shapes_tried(c, fitted)]
     places = other.locations(sites)
     waves = [other.displacements(around, place, settings.other_features) for place in places]
@@ -112,9 +113,8 @@ def linearized(fitted, observations, candidates, declared, settings):
     shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
     everything = (*shown, *base)
     free = tuple(range(len(shown), len(everything)))
-    return Linearized(
-        Problem(statistics, everything, free, prior_of(shown, settings), settings), products, untestable, fitted, keys
-    )
+    problem = Problem(statistics, everything, free, prior_of(shown, settings), settings)
+    return Linearized(problem, products, untestable, replace(fitted, circumstances=around), keys)
 
 
 def testable(statistics, units, settings):
@@ -161,15 +161,9 @@ def shapes_tried(candidate, fitted):
     return [(float(value),) for value in np.geomspace(shape.lowest, shape.highest, _SHAPES_TRIED + 2)[1:-1]]
 
 
-def lacking(candidate, states):
+def lacking(candidate, sites, states):
     """Why the readings cannot test a candidate at all; empty where they might."""
-    there = {
-        "load": bool(states.wrench.any()),
-        "approach": states.approach is not None and bool(states.approach.any()),
-        "time": states.time_s is not None and np.ptp(states.time_s) > 0,
-        "temperature": states.temperature_c is not None and np.ptp(states.temperature_c) > 0,
-    }
-    missing = sorted(need for need in candidate.needs if not there[need])
+    missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
     for joint in candidate.joints if candidate.distinct_angles else ():

@@ -92,7 +92,7 @@ def _inputs(around, campaign):
 def _relative_load(around, location, campaign):
     """Torque on the joint, or force on the base, relative to the largest of the campaign, ndarray (S,)."""
     load, known = (
-        of.load[:, location[0] - 1] if location else np.linalg.norm(of.wrench[:, :3], axis=1) for of in (around, campaign)
+        of.total[:, location[0] - 1] if location else np.linalg.norm(of.wrench[:, :3], axis=1) for of in (around, campaign)
     )
     largest = np.abs(known).max(initial=0.0)
     return load / largest if largest else np.zeros(len(load))

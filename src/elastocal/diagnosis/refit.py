@@ -79,7 +79,7 @@ def fit_with_sizes(declared, observations, noise, chosen):
     effects = [candidate for candidate, _ in chosen.effects]
     start = declared.estimate.with_effects(effects)
     start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
-    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start, 0.0)
+    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start)
 
 
 def mean_square_left(problem, model):

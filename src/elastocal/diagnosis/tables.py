@@ -113,7 +113,7 @@ def diagnosis_from(case, facts, columns):
         effects = tuple(_with_priors(known[key], mine) for key in step["effects"])
         model = replace(case.model, effects=effects)
         estimate = estimate_from(mine, model, sessions)
-        fitted = fit(model, case.observations, noise_from({"noise": step["noise"]}), estimate, 0.0)
+        fitted = fit(model, case.observations, noise_from({"noise": step["noise"]}), estimate)
         steps.append(Step(step["name"], step["kind"], fitted))
     return Diagnosis(case, tuple(steps), None, facts["document"])
 

@@ -11,7 +11,8 @@ NAME, FAMILY = "compensator_stiffness", "elastic"
 
 
 def candidates(sites):
-    """One candidate, on the first joint that carries weight."""
-    if sites.shoulder is None:
+    """One candidate, where the robot file has a compensator."""
+    if sites.compensator is None:
         return []
-    return [replace(joint_dependent_stiffness.candidates(sites)[sites.shoulder], effect=NAME, family=FAMILY)]
+    at_joint = joint_dependent_stiffness.candidates(sites)[sites.compensator.joint - 1]
+    return [replace(at_joint, effect=NAME, family=FAMILY)]

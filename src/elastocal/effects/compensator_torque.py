@@ -13,10 +13,10 @@ _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order
 
 
 def candidates(sites):
-    """Two candidates on the first joint that carries weight: with the crank's part, and as for a crank that is very short."""
-    joint = sites.shoulder
-    if joint is None:
+    """Two candidates where the robot file has a compensator: with the crank's part, and as for a crank that is very short."""
+    if sites.compensator is None:
         return []
+    joint = sites.compensator.joint - 1
 
     def displacement(circumstances):
         angle = circumstances.joint_angles[:, joint]

@@ -1,4 +1,4 @@
-"""Links that grow as they warm up: alpha dT along each link.
+"""Column and links that grow as they warm up: alpha dT along each.
 
 Catalogue row 18. With a measured temperature dT is counted from 20 °C, at which dimensions are stated (ISO 1); with the time
 alone it is the rise of a first order lag since the campaign began, 1 - exp(-t / t_0).
@@ -17,10 +17,9 @@ def candidates(sites):
     """One candidate by temperature and one by time."""
 
     def grown(rise):
-        links = range(1, sites.joints + 1)
         return {
             coordinate: rise * along
-            for link in links
+            for link in range(sites.joints + 1)
             for coordinate, along in zip(sites.link_end[link][:3], sites.link_vectors_m[link], strict=True)
             if along
         }

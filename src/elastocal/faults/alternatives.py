@@ -1,8 +1,9 @@
 """Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the readings then fit.
 
-One scan over a short list of hypotheses, nearly all of them discrete. They are only looked at where the readings as written are
-absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or targets
-that stand elsewhere, then two changes together. Signs, axes and units are facts, not parameters: each is tried, none is fitted.
+One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the readings as written are
+absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
+targets that stand elsewhere, then two changes together. Senses, axes and units are facts, not parameters: each is tried, none
+is fitted.
 """
 
 from collections.abc import Callable
@@ -49,12 +50,17 @@ _LENGTHS = {
     "decimetres": 0.1,
     "inches": 0.0254,
     "feet": 0.3048,
-    "a tenth of metres": 10.0,
-    "hundredths of metres": 100.0,
-    "thousandths of metres": 1e3,
+    "tenths of what they should be": 10.0,
+    "hundredths of what they should be": 100.0,
+    "thousandths of what they should be": 1e3,
 }
 # What rotation vectors were multiplied by before they were written.
-_TURNS = {0.5: "half of them", 2.0: "twice of them", 180 / np.pi: "degrees", np.pi / 180: "radians converted twice"}
+_TURNS = {
+    0.5: "halves of what they should be",
+    2.0: "doubles of what they should be",
+    180 / np.pi: "degrees",
+    np.pi / 180: "radians converted twice",
+}
 # Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
 _EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
 
@@ -174,7 +180,9 @@ def placements(campaign):
     if any(target.offset_m is not None for target in campaign.targets):
 
         def unknown(campaign, readings):
-            return replace(campaign, targets=tuple(replace(t, offset_m=None) for t in campaign.targets)), readings
+            seen = set(readings.target.tolist())
+            targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
+            return replace(campaign, targets=tuple(targets)), readings
 
         found.append(Change("wrong_target", "", unknown, placement="targets"))
     return found
@@ -387,7 +395,7 @@ def _rotations():
 def _axes(mirrored_only, oriented):
     """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
     if mirrored_only:
-        detail = "the readings are mirrored: two axes are exchanged, or one is turned round, or joints are counted the other way round"
+        detail = "the readings are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
         return [Change("swapped_axes", detail, _with_positions(np.diag([1.0, 1.0, -1.0])))]
     ways = [
         np.array(signs)[:, None] * np.eye(3)[list(order)]

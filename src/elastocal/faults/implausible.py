@@ -1,4 +1,4 @@
-"""Readings that this robot cannot have made, however the file is read: nothing can be traced in them, and somebody must look."""
+"""Readings that this robot cannot have made, however the file is read: nothing can be traced in them, somebody must look."""
 
 from elastocal.faults.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, rms, robustly_placed, spread, trimmed_rms
 from elastocal.faults.protocol import Fault, Value
@@ -29,8 +29,8 @@ def find(campaign, readings):
         return []
     what = f"positions lie {away:.2g} m" if away >= _FARTHEST_M else f"orientations lie {turned:.2g} rad"
     detail = (
-        f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was tried"
-        " mends it: chain, zeros of the joints, measuring points and columns need a look"
+        f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was"
+        " tried mends it: chain, zeros of the joints, measuring points and columns need a look"
     )
     parameters = (Value("RMS distance of positions", away, "m"), Value("RMS turn of orientations", turned, "rad"))
     return [Fault(NAMES[0], (), detail, parameters, (rms(placement.distance),) * 2, (), True)]

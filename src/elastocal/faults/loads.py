@@ -1,7 +1,7 @@
 """Loads turned round, or in another unit than newtons and newton metres.
 
-A load has no size that is absurd in itself. Only the compliances tell: all joints give way by the same factor more, or less, than
-nominally. One between a half and two is nobody's unit.
+A load has no size that is absurd in itself. Only the compliances tell: all joints give way by the same factor more, or less,
+than nominally. One between a half and two is nobody's unit.
 """
 
 from elastocal.faults.deflections import deflections, unit_of_loads

@@ -23,8 +23,8 @@ _BULK, _BEYOND_BULK = 0.9, 3.0
 _FEWEST = 20
 # No sensor reads closer: smaller deviations are rounding.
 _FINEST = 1e-5
-# All readings count alike, whatever the noise: a discrepancy of the model this far above it says so.
-_NOISE, _DISCREPANCY_M = 1e-4, 1e-3
+# All readings count alike, whatever their noise.
+_ALIKE = 1e-3
 
 
 def find(campaign, readings):
@@ -45,8 +45,8 @@ def find(campaign, readings):
         return []
     sites = declared_model(campaign).sites
     model = declared_model(campaign, declared_candidates(campaign.declared, sites))
-    noise = Noise("declared", _NOISE, _NOISE, np.zeros(campaign.robot.joints))
-    estimate = fit(model, averaged(readings), noise, discrepancy_m=_DISCREPANCY_M).estimate
+    noise = Noise("declared", _ALIKE, _ALIKE, np.zeros(campaign.robot.joints))
+    estimate = fit(model, averaged(readings), noise).estimate
     single = single_observations(readings)
     residual = residuals(model, estimate, single, circumstances(model, estimate, single.states))
     far = np.zeros(len(readings), bool)

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.figures.style import PALETTE, note, panels, styled
 
-LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robot on which it was tuned")}
+LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
 _COMPARABLE = {
     "exact": ("o", "the catalogue's own parameter"),
     "to first order": ("s", "the same to first order"),

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
-from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.figures.style import PALETTE, note, panels, styled
 
 MICRO, MILLI = 1e6, 1e3
 STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
@@ -41,6 +41,8 @@ def residuals(table):
         One panel for each quantity that the campaign varies; each shows the component that this quantity explains best.
     """
     drawn_against, stages = quantities(table), _stages(table)
+    if not drawn_against:
+        return note("All readings were taken at the same joint angles and load: there is nothing to draw them against.")
     # Three in a row, or four where that saves a row.
     columns = min((3, 4), key=lambda count: -(-len(drawn_against) // count))
     rows = -(-len(drawn_against) // columns)
@@ -65,9 +67,9 @@ def residuals(table):
         axis.remove()
     for axis in axes[:, 0]:
         axis.set_ylabel(f"residual ({unit})")
-    note = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
+    above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
     handles = _legend(stages, held_out.any())
-    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
+    figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
 
@@ -111,13 +113,13 @@ def arrows(table):
         axis.set_anchor("N")
         axis.set_axisbelow(True)
     _scale_arrow(axes[0, 1], largest, length)
-    note = (
+    which = (
         f"one state of each cell of {1e3 * cell_m:g} mm, that of the middle residual"
         if cell_m
         else "each arrow: mean of the repeats"
     )
     handles = [Line2D([], [], color=STAGES[stage][1], linewidth=2, label=STAGES[stage][0]) for stage in stages]
-    figure.legend(handles=handles, title=note, loc="outside lower center", ncols=2, title_fontsize=7.5)
+    figure.legend(handles=handles, title=which, loc="outside lower center", ncols=2, title_fontsize=7.5)
     return figure
 
 

@@ -12,6 +12,7 @@ import yaml
 
 from elastocal.campaign import write_campaign
 from elastocal.plant.campaigns import measured_table
+from elastocal.plant.dynamic import DYNAMIC, dynamic_table
 from elastocal.whole_files import appearing_whole
 
 ROBOT_FILE = "robot.yaml"
@@ -87,10 +88,7 @@ def write_blind_campaign(folder, name, robot_file, robot, design, schedule, decl
     """
     table, outliers = measured_table(robot, design, schedule)
     write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
-    described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
-    told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
-    with appearing_whole(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
-        yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
+    _write_robot(folder, robot_file, robot, declared)
     return {
         "campaign": name,
         "robot": Path(robot_file).stem,
@@ -104,6 +102,34 @@ def write_blind_campaign(folder, name, robot_file, robot, design, schedule, decl
         "readings": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
     }
+
+
+def write_dynamic_campaign(folder, name, robot_file, robot, readings, seed, declared=()):
+    """Measure a moving arm, and write what the analyst gets: for benchmarks of many readings.
+
+    Parameters
+    ----------
+    folder, name, robot_file, robot, declared
+        As in `write_blind_campaign`.
+    readings : int
+        At 1,000 a second, without a load.
+    seed : int
+    """
+    document = campaign_document(name, robot.arm, DYNAMIC) | {
+        "compliance": "nominal",
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": robot.tracker.sigma_m},
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+    write_campaign(folder, document, dynamic_table(robot, readings, seed), robot.arm.joints, "parquet")
+    _write_robot(folder, robot_file, robot, declared)
+
+
+def _write_robot(folder, robot_file, robot, declared):
+    described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
+    with appearing_whole(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
+        yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
 
 
 def write_truth(path, truth, campaign_folder):

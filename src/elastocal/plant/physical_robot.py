@@ -183,10 +183,7 @@ def at_rest(robot, schedule, start=None):
     rest : Equilibrium
     """
     machine = machine_of(robot.arm, robot.structure)
-    visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
-    drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))
-    warm = robot.warmth.of_castings(schedule.time_s)
-    growth = robot.expansion_per_K * (warm - _REFERENCE_C)
+    drive, growth, warm = driven(robot, schedule)
     facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
     if robot.cell.in_flange:
         coordinates = np.zeros((len(drive), machine.model.nq))
@@ -201,6 +198,29 @@ def at_rest(robot, schedule, start=None):
 
     begin = None if start is None else start.coordinates[:, start.gear]
     return machine, equilibrium(machine, loading, gear_deflection, robot.structure_laws, begin)
+
+
+def driven(robot, schedule):
+    """Where the drives really stand, and how warm everything is.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    schedule : Schedule
+
+    Returns
+    -------
+    drive : ndarray (S, n)
+        rad.
+    growth : ndarray (S,)
+        Relative growth of all lengths.
+    warm : ndarray (S,)
+        Temperature of the castings, °C.
+    """
+    visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
+    drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))
+    warm = robot.warmth.of_castings(schedule.time_s)
+    return drive, robot.expansion_per_K * (warm - _REFERENCE_C), warm
 
 
 def seen_at_rest(robot, schedule, rest):

@@ -5,7 +5,7 @@ import hashlib
 import pandas as pd
 
 from elastocal.blind.case_rows import EXACT_ALIASES
-from elastocal.blind.cases import USUAL_DESIGN
+from elastocal.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED, USUAL_DESIGN
 from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.blind.scores import NONE
@@ -19,6 +19,10 @@ _GROUPS = {
     "outside": "one effect outside of the catalogue",
     "setting": "hard settings, with an effect and without",
     "sweep": "near relatives under other designs",
+    SEVERAL_JOINTS: "one mechanism at several joints",
+    GEAR_GRAVITY: "gear defects at joints that carry weight",
+    MOVED: "set-ups that move between rows",
+    UNDECLARED: "weight of all links, undeclared",
 }
 _SAID_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
 _SAID_OF_RELATIVES = ("right", "class", "wrong", "other")
@@ -83,7 +87,7 @@ def _design(design):
     return {
         "poses": f"{design.poses}",
         "held_out": f"{design.held_out}",
-        "force": f"{design.force_N:g} N",
+        "force": "1000 N (less in proportion on arms made for less than 140 kg)",
         "ladder": listed(f"{share:+g}".replace("-", "−") if share else "0" for share in design.ladder),
         "repeats": f"{design.repeats}",
         "repeated": f"{design.repeated_poses}",
@@ -98,7 +102,7 @@ def _robots(cases, key):
 def _verdict(aimed, robots):
     judged = aimed[aimed.holds.notna()]
     held = int((judged.holds.astype(str) == "True").sum())
-    where = "the robots of the proof" if robots == PROOF else "the robot on which the method was tuned, which proves nothing"
+    where = "the robots of the proof" if robots == PROOF else "robots on which the method was developed, which proves nothing"
     return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
 
 

@@ -13,6 +13,6 @@ def write_blind_report(path, facts, figures):
     facts : dict
         From `blind_facts.blind_facts`.
     figures : sequence of str
-        PDF files, named targets, power, confusion, errors, coverage and sweep.
+        PDF files, named targets, reliability, power, confusion, errors, coverage and sweep.
     """
     compile_document(path, "blind.typ", {"facts": facts}, figures)

@@ -1,4 +1,4 @@
-"""A unit is named where all joints give way by its factor, and nowhere else."""
+"""A unit of loads is named where all joints give way by its factor, a sign where they give way against it, and nowhere else."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_campaigns import Plan, made, with_geometric_errors, with_other_compliances
 
-from elastocal.faults.wrong_unit import find
+from elastocal.faults.loads import find
 
 GRAVITY, POUND = 9.80665, 4.4482216
 
@@ -43,8 +43,8 @@ def test_forces_and_moments_in_units_that_do_not_match_are_named(campaign, force
 
 
 def test_a_unit_is_named_of_loads_that_are_turned_round_too(campaign):
-    (fault,) = find(campaign, scaled(campaign.readings, -1 / GRAVITY, -1 / GRAVITY))
-    assert fault.parameters[0].value == GRAVITY
+    sign, unit = find(campaign, scaled(campaign.readings, -1 / GRAVITY, -1 / GRAVITY))
+    assert (sign.name, unit.name, unit.parameters[0].value) == ("wrong_sign", "wrong_unit", GRAVITY)
 
 
 def test_a_unit_is_named_beside_heavy_geometric_errors(fanuc):
@@ -73,3 +73,18 @@ def test_joints_that_give_way_by_different_factors_are_no_unit(fanuc):
 
 def test_no_unit_is_named_without_loads(campaign):
     assert find(campaign, campaign.readings.select(campaign.readings.load == 0)) == []
+
+
+def test_loads_turned_round_are_named(campaign):
+    (fault,) = find(campaign, replace(campaign.readings, wrench=-campaign.readings.wrench))
+    assert fault.joints == ()
+    assert "loads" in fault.detail
+    assert -2.0 < fault.parameters[0].value < -0.5
+
+
+def test_loads_turned_round_are_named_without_unloaded_readings(fanuc):
+    campaign = made(fanuc, 5, Plan(poses=40, loads=1, tracker=True, oriented=False))
+    readings = campaign.readings.select(campaign.readings.load > 0)
+    assert find(campaign, readings) == []
+    (fault,) = find(campaign, replace(readings, wrench=-readings.wrench))
+    assert "loads" in fault.detail

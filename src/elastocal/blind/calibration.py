@@ -1,0 +1,209 @@
+"""Whether stated probabilities are worth what they say: reliability, expected calibration error, coverage of 95 % sets.
+
+A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". What is true of a case is the set of
+its mechanisms. Of a mechanism that the catalogue does not have every set that holds "other" is true; one that the joint
+compliances absorb at any size is as good as nothing, and no reading could tell the two apart.
+"""
+
+import numpy as np
+import pandas as pd
+
+from elastocal.blind.rates import rate
+from elastocal.blind.robots import PROOF, TUNED
+from elastocal.blind.scores import NONE, kind_of
+from elastocal.plant.defects import OUTSIDE
+from elastocal.random_streams import stream
+
+OTHER = "other"
+CREDIBLE = 0.95
+_BINS = 10
+_RESAMPLES = 2000
+_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "stated", "top", "correct"]
+_COLUMNS += ["held", "set_size", "set_probability", "nothing", "alarm_p_value"]
+_RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
+
+
+def stated(truth, verdict):
+    """What was stated of a case, and whether it is so.
+
+    Parameters
+    ----------
+    truth : dict
+        A sealed document.
+    verdict : dict
+        As verdict.json.
+
+    Returns
+    -------
+    dict or None
+        ``stated``, probability of the most probable set of mechanisms; ``top``, that set; ``correct``, whether it is the true
+        one; ``held``, whether the smallest set of hypotheses that reaches 95 % holds the true one; ``set_size``, of how many
+        these are, and ``set_probability``, what they reach; ``nothing``; ``alarm_p_value``. None where nothing was stated, as
+        with a fault of the data.
+    """
+    said = verdict.get("probabilities")
+    if not said or not said["sets"]:
+        return None
+    ranked = sorted(((frozenset(entry["mechanisms"]), entry["probability"]) for entry in said["sets"]), key=lambda e: -e[1])
+    case, believed = truth["case"], credible(ranked)
+    top, probability = ranked[0]
+    return {
+        "case": truth["campaign"],
+        "robots": kind_of(case["robot"]),
+        "robot": case["robot"],
+        "group": case["group"],
+        "setting": case["setting"],
+        "truth": " + ".join(case["effects"]) or NONE,
+        "level": max(case["levels"], default=0.0),
+        "stated": probability,
+        "top": " + ".join(sorted(top)) or NONE,
+        "correct": is_true(top, truth),
+        "held": any(is_true(mechanisms, truth) for mechanisms, _ in believed),
+        "set_size": len(believed),
+        "set_probability": sum(share for _, share in believed),
+        "nothing": said["nothing"],
+        "alarm_p_value": said["alarm_p_value"],
+    }
+
+
+def is_true(mechanisms, truth):
+    """Whether a set of mechanisms is what is true of a case.
+
+    Parameters
+    ----------
+    mechanisms : collection of str
+    truth : dict
+        A sealed document.
+
+    Returns
+    -------
+    bool
+    """
+    effects = truth["case"]["effects"]
+    if any(effect.startswith(OUTSIDE) for effect in effects):
+        return OTHER in mechanisms
+    absorbed = {defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"}
+    return set(mechanisms) == set(effects) - absorbed
+
+
+def credible(ranked):
+    """The smallest set of hypotheses that reaches 95 %; all of them where they do not.
+
+    Parameters
+    ----------
+    ranked : sequence of (frozenset, float)
+        The most probable first.
+
+    Returns
+    -------
+    list of (frozenset, float)
+    """
+    reached = np.cumsum([probability for _, probability in ranked])
+    return list(ranked[: int(np.searchsorted(reached, CREDIBLE)) + 1])
+
+
+def statements(entries):
+    """One row for each case of which something was stated.
+
+    Parameters
+    ----------
+    entries : iterable of (dict, dict)
+        Truth and verdict.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns as of `stated`.
+    """
+    return pd.DataFrame([row for row in (stated(*entry) for entry in entries) if row], columns=_COLUMNS)
+
+
+def expected_calibration_error(probability, correct, bins=_BINS):
+    """Mean distance between what is stated and how often it is so: sum over bins of n_b / n |mean stated - share correct|.
+
+    Parameters
+    ----------
+    probability : ndarray (..., n)
+        Stated, 0 to 1.
+    correct : ndarray of bool (..., n)
+    bins : int
+        Of equal width.
+
+    Returns
+    -------
+    ndarray (...,)
+
+    Notes
+    -----
+    Naeini, Cooper and Hauskrecht, "Obtaining well calibrated probabilities using Bayesian binning", AAAI 2015. Even of verdicts
+    that are calibrated it is not 0 but what `by_chance` tells, for the share of few cases scatters.
+    """
+    probability, correct = np.broadcast_arrays(np.asarray(probability, float), np.asarray(correct, float))
+    if probability.shape[-1] == 0:
+        return np.full(probability.shape[:-1], np.nan)
+    which = _bin_of(probability, bins)
+    return sum(np.abs(((probability - correct) * (which == b)).sum(axis=-1)) for b in range(bins)) / probability.shape[-1]
+
+
+def by_chance(probability, draws, bins=_BINS):
+    """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities, float."""
+    probability = np.asarray(probability, float)
+    so = draws.random((_RESAMPLES, len(probability))) < probability
+    return float(expected_calibration_error(probability, so, bins).mean()) if len(probability) else float("nan")
+
+
+def calibration_error(rows, seed):
+    """Expected calibration error with a bootstrap interval of 95 % over cases.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of `statements`.
+    seed : int
+
+    Returns
+    -------
+    dict
+        ``hits`` (None), ``cases``, ``rate``, ``low``, ``high`` as `rates.rate` has them, and ``by_chance``.
+    """
+    probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
+    found = {"hits": None, "cases": len(rows), "rate": float(expected_calibration_error(probability, correct))}
+    if len(rows) < 2:
+        return found | {"low": np.nan, "high": np.nan, "by_chance": np.nan}
+    draws = stream(seed, "blind", "calibration error", 0)
+    picked = draws.integers(len(rows), size=(_RESAMPLES, len(rows)))
+    again = expected_calibration_error(probability[picked], correct[picked])
+    # The basic interval: a resample of a calibrated sample is less calibrated than the sample, by what the sample is already.
+    low, high = 2.0 * found["rate"] - np.quantile(again, [0.975, 0.025])
+    return found | {"low": max(float(low), 0.0), "high": max(float(high), 0.0), "by_chance": by_chance(probability, draws)}
+
+
+def reliability(rows, bins=_BINS):
+    """Data of the reliability diagram.
+
+    Parameters
+    ----------
+    rows : pandas.DataFrame
+        Of `statements`.
+    bins : int
+        Of equal width.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each kind of robots, group of cases (``all`` for all of them) and bin that has a case: its ends, the mean of
+        what was stated and the share that was so, with a Clopper-Pearson interval.
+    """
+    found = []
+    for robots in (PROOF, TUNED):
+        mine = rows[rows.robots == robots]
+        for group in ("all", *sorted(set(mine.group))):
+            part = mine if group == "all" else mine[mine.group == group]
+            for number, inside in part.groupby(_bin_of(part.stated.to_numpy(float), bins)):
+                ends = {"from": number / bins, "to": (number + 1) / bins, "stated": inside.stated.mean()}
+                found.append({"robots": robots, "group": group} | ends | rate(inside.correct))
+    return pd.DataFrame(found, columns=_RELIABILITY)
+
+
+def _bin_of(probability, bins):
+    return np.clip((np.asarray(probability) * bins).astype(int), 0, bins - 1)

@@ -1,0 +1,173 @@
+"""Whatever is wrong with the readings, the loop ends with a verdict that says so and with a report."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from loop_scripts import run_loop
+from made_folders import made_folder, made_table
+from scipy.spatial.transform import Rotation
+
+from elastocal.errors import InputError
+from elastocal.loop.whole import diagnosed
+
+PLACE, TURN = np.array([2.0, 0.6, -0.2]), np.array([0.3, -0.5, 1.2])
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+POSE = {"measured": "pose", "noise": {"position_m": 6e-5, "orientation_rad": 6e-5}}
+OFFSET = [0.0, 0.0, 0.12]
+
+
+def scaled(table, names, factor):
+    return table | {name: factor * table[name] for name in names}
+
+
+def in_tracker_frame(table):
+    position = Rotation.from_rotvec(TURN).apply(np.column_stack([table[axis] for axis in "xyz"])) + PLACE
+    vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
+    turned = (Rotation.from_rotvec(TURN) * Rotation.from_rotvec(vectors)).as_rotvec()
+    columns = np.column_stack([position, turned]).T
+    return table | dict(zip(("x", "y", "z", "rx", "ry", "rz"), columns, strict=True))
+
+
+def shuffled(table):
+    order = np.random.default_rng(3).permutation(len(table["x"]))
+    return table | {name: table[name][order] for name in ("x", "y", "z", "rx", "ry", "rz")}
+
+
+FAULTS = {
+    "joint 3 turned": (lambda t: scaled(t, ["q3"], -1), {}, "wrong_sign", "joint 3 has the wrong sense"),
+    "loads turned": (lambda t: scaled(t, WRENCH, -1), {}, "wrong_sign", "the loads fit turned round"),
+    "kilonewtons": (lambda t: scaled(t, WRENCH, 1e-3), {}, "wrong_unit", "kilonewtons"),
+    "kilogram-force": (lambda t: scaled(t, WRENCH, 1 / 9.80665), {}, "wrong_unit", "kilogram-force"),
+    "tracker's frame": (
+        in_tracker_frame,
+        {},
+        "wrong_frame",
+        "readings do not lie in the base frame: the robot would stand 2.1 m away",
+    ),
+    "tracker's frame, poses": (in_tracker_frame, POSE, "wrong_frame", "the robot would stand 2.1 m away"),
+    "x and y exchanged": (lambda t: t | {"x": t["y"], "y": t["x"]}, {}, "swapped_axes", "x = y, y = x"),
+    "z turned": (lambda t: scaled(t, "z", -1), {}, "swapped_axes", "z = -z"),
+    "positions ten times": (lambda t: scaled(t, "xyz", 10), {}, "wrong_unit", "0.1 times the written positions"),
+    "half of the rotation": (lambda t: scaled(t, ["rx", "ry", "rz"], 0.5), POSE, "wrong_unit", "halves"),
+    "rows shuffled": (shuffled, {}, "shuffled_rows", "measured columns of another"),
+    "positions constant": (lambda t: t | {axis: 0 * t[axis] + 1.5 for axis in "xyz"}, {}, "constant_columns", "the same"),
+    "positions zero": (lambda t: scaled(t, "xyz", 0), {}, "constant_columns", "zero"),
+    "poses zero": (lambda t: scaled(t, ["x", "y", "z", "rx", "ry", "rz"], 0), POSE, "constant_columns", "zero"),
+    "poses all equal": (lambda t: t | {f"q{j}": 0 * t["x"] - 0.5 for j in range(1, 7)}, {}, "constant_columns", "joint angles"),
+    "nonsense": (
+        lambda t: t | {axis: np.random.default_rng(5).normal(size=len(t["x"])) for axis in "xyz"},
+        {},
+        "implausible_readings",
+        "from where the robot file puts them",
+    ),
+}
+
+
+def folder_of(path, robot, change, settings):
+    table = change(made_table(robot, "made"))
+    if settings.get("measured") != "pose":
+        table = {name: values for name, values in table.items() if name not in ("rx", "ry", "rz")}
+    return made_folder(path, robot, table=table, **settings)
+
+
+# Those whose tables, figures and pages have the least in common.
+REPORTED = ("joint 3 turned", "tracker's frame, poses", "positions zero", "poses zero", "poses all equal", "nonsense")
+
+
+def check(verdict, name, words):
+    (effect,) = verdict["effects"]
+    assert (effect["name"], effect["family"], verdict["verdict"]) == (name, "data", "named")
+    assert words in effect["detail"] and verdict["candidates_tested"] == 0
+    # What is left of readings that are wrong in themselves is no statement on the model.
+    assert not [warning for warning in verdict["warnings"] if "times the noise" in warning]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_decisive_fault_ends_in_a_verdict_that_names_it(fault, kuka, config_folder, tmp_path):
+    change, settings, name, words = FAULTS[fault]
+    folder = folder_of(tmp_path / "made", kuka, change, settings)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    json.dumps(verdict, allow_nan=False)
+    check(verdict, name, words)
+
+
+@pytest.mark.parametrize("fault", REPORTED)
+def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, config_folder, tmp_path):
+    change, settings, name, words = FAULTS[fault]
+    folder = folder_of(tmp_path / "made", kuka, change, settings)
+    out = run_loop(folder, config_folder / "robots", tmp_path / "out")
+    check(json.loads((out / "verdict.json").read_text(encoding="utf-8")), name, words)
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder, tmp_path):
+    """Translation to the 60 µm of the readings over their root, and deflections; rotation likewise."""
+    folder = folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
+    for axis, place, turn in zip("xyz", PLACE, TURN, strict=True):
+        value, unit = told[f"base {axis}"]
+        assert unit == "m" and abs(value - place) < 5e-4
+        value, unit = told[f"base rotation vector {axis}"]
+        assert unit == "rad" and abs(value - turn) < 5e-4
+
+
+def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
+    """Offsets of 0.12 m along z in the file of the readings, 120 where metres are asked for."""
+    table = made_table(kuka, "made")
+    vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
+    moved = Rotation.from_rotvec(vectors).apply(OFFSET)
+    table |= {axis: table[axis] + moved[:, number] for number, axis in enumerate("xyz")}
+    for factor, name, words in ((1000.0, "wrong_unit", "look like millimetres"), (1.0, None, "")):
+        offset = [factor * value for value in OFFSET]
+        targets = {point: {"point": point, "offset_m": offset} for point in ("3DoF", "6DoF")}
+        folder = made_folder(tmp_path / f"made{factor:g}", kuka, table=table, targets=targets, **POSE)
+        verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+        faults = [effect for effect in verdict["effects"] if effect["family"] == "data"]
+        assert [effect["name"] for effect in faults] == ([name] if name else [])
+        assert all(words in effect["detail"] for effect in faults)
+
+
+def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tmp_path):
+    """All poses are one, and the readings are of that one: there is no fault and nothing to be told."""
+    table = made_table(kuka, "made")
+    first = (table["pose"] == table["pose"][0]) & (table["load"] == 0) & (table["repeat"] == 0)
+    rng = np.random.default_rng(1)
+    for point in np.unique(table["target"]):
+        mine, source = table["target"] == point, np.flatnonzero(first & (table["target"] == point))[0]
+        for name in ("x", "y", "z", *(f"q{joint}" for joint in range(1, 7))):
+            table[name][mine] = table[name][source] + (6e-5 * rng.normal(size=mine.sum()) if name in "xyz" else 0.0)
+    kept = {name: values for name, values in table.items() if name not in ("rx", "ry", "rz", *WRENCH)}
+    kept["load"] = 0 * kept["load"]
+    kept["repeat"] = np.arange(len(kept["load"]))
+    targets = {point: {"point": point, "offset_m": "unknown"} for point in ("3DoF", "6DoF")}
+    folder = made_folder(tmp_path / "made", kuka, table=kept, targets=targets, frame="tracker", compliance="nominal")
+    out = run_loop(folder, config_folder / "robots", tmp_path / "out")
+    verdict = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(("factor", "words"), [(-1.0, "negative"), (1 / 9.80665, "times nominal")])
+def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, config_folder, tmp_path):
+    """Of a robot whose links bend too, which the declared one lacks: no single unit explains its deflections."""
+    folder = folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    (warning,) = (text for text in verdict["warnings"] if "joint compliances" in text)
+    assert words in warning and "±" in warning
+
+
+def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, config_folder, tmp_path):
+    text = (config_folder / "robots" / "kuka.yaml").read_text(encoding="utf-8")
+    lengths = "{l1: 675, l2: 350, l3: 1150, l4: -41, l5: 1200, l6: 240}"
+    lines = [f"lengths_m: {lengths}" if line.startswith("lengths_m") else line for line in text.splitlines()]
+    folder = made_folder(tmp_path / "made", kuka)
+    document = (folder / "campaign.yaml").read_text(encoding="utf-8")
+    (folder / "campaign.yaml").write_text(document.replace("robot: kuka", "robot: mine.yaml"), encoding="utf-8")
+    (folder / "mine.yaml").write_text("\n".join(lines), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        diagnosed(folder.as_posix(), Path(config_folder / "robots").as_posix(), 100, 1)
+    (line,) = str(caught.value).splitlines()
+    assert "mine.yaml: lengths_m: " in line and "3656 m" in line and "metres (not millimetres)" in line

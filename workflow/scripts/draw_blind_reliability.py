@@ -1,0 +1,15 @@
+"""What stated probabilities are worth."""
+
+import pandas as pd
+
+from elastocal.figures.blind_reliability import reliability_diagram
+from elastocal.figures.style import save
+
+from job import run
+
+
+def draw_blind_reliability(job):
+    save(reliability_diagram(pd.read_csv(job.input.reliability)), job.output.pdf, job.output.png)
+
+
+run(draw_blind_reliability, snakemake)
