@@ -151,7 +151,7 @@ def test_resolved_as_often_as_promised_by_the_whole_engine(ambiguous, proposal, 
     models = rng.choice(len(members.means), count, p=np.exp(members.log_weights))
     for model in models:
         seen = carried_out(diagnosis, campaign, proposal, members, instrument, model, rng)
-        declared = fit(campaign.declared.model, seen, campaign.declared.noise, campaign.declared.estimate, 0.0)
+        declared = fit(campaign.declared.model, seen, campaign.declared.noise, campaign.declared.estimate)
         anew = diagnosed(replace(campaign, declared=declared, observations=seen), kuka, keys_like(campaign, *ELASTIC))
         found = {h.mechanisms: h.probability for h in anew.evidence.conclusion.hypotheses}
         right = members.names[members.hypothesis[model]]

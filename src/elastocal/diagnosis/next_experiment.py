@@ -202,8 +202,9 @@ def table_of(proposal, robot):
     -------
     pandas.DataFrame
         One row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
-        ``separation`` after it and all before, ``separation_without`` from the present readings; ``approach1..n`` where the
-        campaign has them and ``reference_weight_kg`` where a weight is asked for.
+        ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present readings, and what the
+        promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
+        where a weight is asked for.
     """
     joints, count = robot.joints, len(proposal)
     columns = {
@@ -216,6 +217,10 @@ def table_of(proposal, robot):
     columns |= {f"q{joint + 1}": reported[:, joint] for joint in range(joints)}
     columns |= dict(zip(WRENCH_NAMES, proposal.wrench.T, strict=True))
     columns |= {"separation": proposal.separation, "separation_without": np.full(count, proposal.present)}
+    columns |= {
+        "resolved": proposal.resolved,
+        "indistinguishable": ["; ".join(words(name) for name in proposal.indistinguishable)] * count,
+    }
     if proposal.approach is not None:
         columns |= {f"approach{joint + 1}": proposal.approach[:, joint] for joint in range(joints)}
     if proposal.reference_weight.any():
