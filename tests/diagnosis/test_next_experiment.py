@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from planted import planted, two_loads_a_pose
-from scipy.stats import multivariate_normal
+from scipy.stats import ks_2samp, multivariate_normal
 from synthetic import seen_exactly, with_noise
 
 from elastocal.campaign import Target
@@ -103,10 +103,11 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
     members, instrument, reach = pieces(ambiguous[0], kuka)
     rng = np.random.default_rng(0)
     targets = list(range(len(instrument.model.targets)))
-    entries = new_states.drawn(reach, 12, rng)
+    entries = new_states.drawn(reach, 30, rng)
     rows = instrument.rows(entries, targets).reshape(-1, instrument.unknowns)
     promise = next_experiment._Promise(members, rng)
-    promised = promise.separations(instrument.information(entries, targets).sum(axis=0))
+    information = instrument.information(entries, targets).sum(axis=0)
+    promised, simulated = promise.separations(information), promise.log_factors(information)
     densities = []
     for columns, mean, precision in zip(members.columns, members.means, members.precisions, strict=True):
         mine = rows[:, columns]
@@ -127,6 +128,8 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
     weights = np.array([np.exp(members.log_weights[members.hypothesis == h]).sum() for h in range(hypotheses)])
     for h in range(1, hypotheses):
         for_best, against = logs[0, :, 0] - logs[0, :, h], logs[h, :, h] - logs[h, :, 0]
+        mine = simulated[promise.hypothesis == 0]
+        assert ks_2samp(for_best, mine[:, 0] - mine[:, h]).pvalue > 1e-3
         mean = 2 * (weights[0] * for_best.mean() + weights[h] * against.mean()) / (weights[0] + weights[h])
         spread = 2 * max(for_best.std(), against.std())
         often = (weights[0] * (for_best > np.log(19)).mean() + weights[h] * (against > np.log(19)).mean()) / weights[
