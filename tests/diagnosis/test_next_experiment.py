@@ -1,5 +1,6 @@
 """The next experiment: what it promises is what readings bring on average, and an exact alias is told apart where it can be."""
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,7 +15,7 @@ from elastocal.diagnosis import new_states, next_experiment
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.next_experiment import propose, sentence_of, table_of
+from elastocal.diagnosis.next_experiment import facts_of, propose, sentence_of, table_of
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded
@@ -235,6 +236,7 @@ def test_an_exact_alias_is_said_to_be_none_that_measuring_helps(kuka):
     assert found.reason == "not distinguishable with this robot and tracker" and not len(found)
     assert {found.best, *found.indistinguishable} >= {("compensator_stiffness",), ("joint_dependent_stiffness",)}
     assert "compensator_stiffness" in sentence_of(found) and sentence_of(found).endswith("tracker.")
+    assert json.loads(json.dumps(facts_of(found), allow_nan=False))["reason"] == found.reason
     table = table_of(found, kuka)
     assert table.empty and list(table.columns[:5]) == ["effect", "pose", "load", "point", "q1"]
 
@@ -313,7 +315,8 @@ def carried_out(diagnosis, campaign, proposal, members, instrument, model, rng):
 
 def together(first, more):
     """Two sets of observations as one; the poses of the second are others."""
-    moved = replace(more.states, pose=more.states.pose + first.states.pose.max() + 1)
+    rows = first.states.row.max() + 1 + np.arange(len(more.states))
+    moved = replace(more.states, pose=more.states.pose + first.states.pose.max() + 1, row=rows)
     pairs = zip(vars(first.states).items(), vars(moved).values(), strict=True)
     states = States(**{name: None if mine is None else np.concatenate([mine, new]) for (name, mine), new in pairs})
     return Observations(

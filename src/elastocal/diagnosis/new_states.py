@@ -180,7 +180,7 @@ def drawn(reach, count, stream):
             weighed = stream.random(count) < _WEIGHTS
             wrench[weighed] = 0.0
             wrench[weighed, :3] = reach.largest_N * share[weighed, None] * reach.down
-    return Entries(angles, wrench, _approaches(reach, count, stream), weighed)
+    return Entries(angles, wrench, approaches(reach, count, stream), weighed)
 
 
 def near(reach, entries, count, radius, stream):
@@ -217,7 +217,14 @@ def _turned(wrench, rotation):
     return np.concatenate([rotation.apply(wrench[:, :3]), rotation.apply(wrench[:, 3:])], axis=1)
 
 
-def _approaches(reach, count, stream):
+def approaches(reach, count, stream):
+    """Random senses of approach: one for each entry where it is chosen, else one for each share of its load.
+
+    Returns
+    -------
+    ndarray (count, L, n) or None
+        None where the campaign does not note them.
+    """
     if not reach.approach_noted:
         return None
     shape = (count, len(reach.shares), len(reach.limits))
@@ -299,6 +306,8 @@ class Instrument:
         """Whitened sensitivities of the readings of each entry, ndarray (E, rows, U)."""
         observations = self.observations(entries, targets)
         around = circumstances(self.model, self.estimate, observations.states)
+        # Nothing comes after the last row of the campaign but these.
+        around = replace(around, progress=np.ones(len(observations.states)))
         line = linearize(self.model, self.estimate, observations, around)
         jacobian, state, around = line.coordinate_jacobian, observations.state, line.circumstances
         campaign = self.linearized.about.circumstances

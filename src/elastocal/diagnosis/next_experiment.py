@@ -156,6 +156,10 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     instrument = new_states.instrument_of(evidence.linearized, diagnosis.final, numbers, noise, states, reach, ladder is None)
     members = _members(evidence, kept, instrument, lead, factor)
     entries, information, targets = _searched(members, instrument, poses, stream)
+    if not reach.free:
+        # Nobody is asked to approach from the sides with which the search was lucky.
+        entries = replace(entries, approach=new_states.approaches(reach, poses, stream))
+        information = instrument.information(entries, targets)
     promise = _Promise(members, stream)
     far = information.sum(axis=0) * (MOST_POSES / poses)
     apart = promise.separations(far)
@@ -227,6 +231,30 @@ def table_of(proposal, robot):
         mass = np.linalg.norm(proposal.wrench[:, :3], axis=1) / STANDARD_GRAVITY
         columns["reference_weight_kg"] = np.where(proposal.reference_weight, mass, 0.0)
     return pd.DataFrame(columns)
+
+
+def facts_of(proposal):
+    """What verdict.json says of the next experiment.
+
+    Parameters
+    ----------
+    proposal : Proposal
+
+    Returns
+    -------
+    dict
+    """
+    return {
+        "poses": len(proposal),
+        "reason": proposal.reason,
+        "best": list(proposal.best),
+        "nearest": list(proposal.nearest),
+        "separation": float(proposal.separation[-1]) if len(proposal) else None,
+        "resolved": float(proposal.resolved[-1]) if len(proposal) else None,
+        "poses_needed": proposal.poses_needed,
+        "indistinguishable": [list(name) for name in proposal.indistinguishable],
+        "sentence": sentence_of(proposal),
+    }
 
 
 def sentence_of(proposal):

@@ -53,7 +53,7 @@ def displacements(around, location, features, campaign=None):
     """
     campaign = around if campaign is None else campaign
     inputs, load = _inputs(around, campaign), _relative_load(around, location, campaign)
-    loaded = bool(campaign.wrench.any())
+    loaded = bool(_load(campaign, location).any())
     draws = stream(_SEED, OTHER, "random Fourier features", location[0] if location else 0)
     if location:
         return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws, loaded)]
@@ -90,9 +90,11 @@ def _inputs(around, campaign):
 
 
 def _relative_load(around, location, campaign):
-    """Torque on the joint, or force on the base, relative to the largest of the campaign, ndarray (S,)."""
-    load, known = (
-        of.total[:, location[0] - 1] if location else np.linalg.norm(of.wrench[:, :3], axis=1) for of in (around, campaign)
-    )
-    largest = np.abs(known).max(initial=0.0)
+    """The load relative to the largest of the campaign, ndarray (S,)."""
+    load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
     return load / largest if largest else np.zeros(len(load))
+
+
+def _load(around, location):
+    """Torque on the joint, or force on the base, ndarray (S,)."""
+    return around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)
