@@ -108,7 +108,8 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
     rows = instrument.rows(entries, targets).reshape(-1, instrument.unknowns)
     promise = next_experiment._Promise(members, rng)
     information = instrument.information(entries, targets).sum(axis=0)
-    promised, simulated = promise.separations(information), promise.log_factors(information)
+    simulated = promise.log_factors(information)
+    promised = promise.separations(simulated)
     densities = []
     for columns, mean, precision in zip(members.columns, members.means, members.precisions, strict=True):
         mine = rows[:, columns]
@@ -180,7 +181,8 @@ def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more
     for _ in range(8):
         entries = new_states.drawn(reach, 10, rng)
         total = instrument.information(entries, range(instrument.own)).sum(axis=0)
-        found.append((promise.separations(total)[1:].min(), promise.resolved(total)))
+        logs = promise.log_factors(total)
+        found.append((promise.separations(logs)[1:].min(), promise.resolved(logs)))
     separation, resolved = np.mean(found, axis=0)
     assert proposal.separation[-1] > 1.5 * separation and proposal.resolved[-1] > resolved + 0.1, (separation, resolved)
     assert (np.diff(proposal.separation) > -0.3).all() and proposal.separation[-1] > proposal.separation[0]

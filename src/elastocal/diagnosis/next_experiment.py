@@ -162,7 +162,7 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
         information = instrument.information(entries, targets)
     promise = _Promise(members, stream)
     far = information.sum(axis=0) * (MOST_POSES / poses)
-    apart = promise.separations(far)
+    apart = promise.separations(promise.log_factors(far))
     lost = [h for h in range(1, len(members.names)) if apart[h] < HALF_RESOLVED]
     unreachable = tuple(members.names[h] for h in lost)
     members = members.without(lost)
@@ -173,8 +173,9 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     order = _by_worth(members, information, stream)
     entries, information = entries.at(order), information[order]
     totals = np.cumsum(information, axis=0)
-    apart = np.array([promise.separations(total) for total in totals])[:, 1:]
-    resolved = np.array([promise.resolved(total) for total in totals])
+    factors = [promise.log_factors(total) for total in totals]
+    apart = np.array([promise.separations(logs)[1:] for logs in factors])
+    resolved = np.array([promise.resolved(logs) for logs in factors])
     nearest = int(np.argmin(apart[-1]))
     return Proposal(
         entries.joint_angles,
@@ -629,12 +630,12 @@ class _Promise:
         members = self.members
         values, vectors = np.linalg.eigh(information)
         noise = self.white @ (vectors * np.sqrt(np.clip(values, 0.0, None))).T
-        logs = np.empty((len(self.truths), len(members.means)))
+        logs, of_truths = np.empty((len(self.truths), len(members.means))), self.truths @ information
         for number, (columns, mean, precision) in enumerate(
             zip(members.columns, members.means, members.precisions, strict=True)
         ):
             off = self.truths - mean
-            seen = off @ information
+            seen = of_truths - mean @ information
             inner = precision + information[np.ix_(columns, columns)]
             along = (seen + noise)[:, columns]
             quadratic = ((seen + 2.0 * noise) * off).sum(axis=1) - (along * np.linalg.solve(inner, along.T).T).sum(axis=1)
@@ -643,13 +644,13 @@ class _Promise:
         found = [log_sum_exp(logs[:, members.hypothesis == h], axis=1) for h in range(len(members.names))]
         return np.column_stack(found) - self.log_prior
 
-    def separations(self, information):
-        """Separation of the best hypothesis from each, ndarray (H,); 0 for the best.
+    def separations(self, logs):
+        """Separation of the best hypothesis from each by `log_factors` of an experiment, ndarray (H,); 0 for the best.
 
         Twice the mean log Bayes factor for the truth, or, where that is carried by a few large draws, the separation of two
         fixed hypotheses of which one gets odds of 19:1 as often: the smaller of both.
         """
-        logs, weights = self.log_factors(information), np.exp(self.log_prior)
+        weights = np.exp(self.log_prior)
         found = np.zeros(len(weights))
         for h in range(1, len(weights)):
             shares = weights[[0, h]] / (weights[0] + weights[h])
@@ -659,9 +660,9 @@ class _Promise:
             found[h] = max(min(2.0 * mean, separation_resolved(often)), 0.0)
         return found
 
-    def resolved(self, information):
-        """Probability that the right hypothesis ends up with odds of 19:1."""
-        logs = self.log_factors(information) + self.log_prior
+    def resolved(self, logs):
+        """Probability that the right hypothesis ends up with odds of 19:1, by `log_factors` of an experiment."""
+        logs = logs + self.log_prior
         right = logs[np.arange(len(logs)), self.hypothesis] - log_sum_exp(logs, axis=1) >= np.log(0.95)
         weights = np.exp(self.log_prior[self.hypothesis]) / _PROMISE_DRAWS
         return float(right @ weights / weights.sum())
@@ -674,11 +675,11 @@ def _poses_needed(promise, total, resolved):
         return int(enough[0]) + 1
     poses = len(resolved)
     low, high = poses, MOST_POSES
-    if high <= poses or promise.resolved(total * (high / poses)) < WANTED_PROBABILITY:
+    if high <= poses or promise.resolved(promise.log_factors(total * (high / poses))) < WANTED_PROBABILITY:
         return None
     while high - low > 1:
         middle = (low + high) // 2
-        if promise.resolved(total * (middle / poses)) >= WANTED_PROBABILITY:
+        if promise.resolved(promise.log_factors(total * (middle / poses))) >= WANTED_PROBABILITY:
             high = middle
         else:
             low = middle
