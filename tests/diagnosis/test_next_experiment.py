@@ -30,7 +30,7 @@ RAISED = Alarm(0.002, 10.0, True)
 def diagnosed(campaign, robot, keys, declared=None):
     """A diagnosis in which only some candidates compete."""
     declared = declared or campaign.declared
-    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], [], SETTINGS)
+    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
     found, nothing = posterior(line.problem)
     conclusion = concluded(line.problem, found, RAISED)
     evidence = SimpleNamespace(linearized=line, posterior=found, nothing=nothing, alarm=RAISED, conclusion=conclusion)
@@ -47,8 +47,7 @@ def pieces(diagnosis, robot, ladder=None):
     evidence = diagnosis.evidence
     kept, reason = next_experiment._ambiguous(evidence, SETTINGS)
     assert not reason, reason
-    problem = evidence.linearized.problem
-    numbers = sorted({n for models in kept.values() for model in models for n in (*problem.base, *model.units)})
+    numbers = sorted({n for models in kept.values() for model in models for n in model.units})
     states = diagnosis.case.observations.states
     reach = new_states.reach_of(states, robot, limits(robot), ladder, False)
     lead = kept[evidence.conclusion.best.mechanisms][0]
@@ -85,7 +84,7 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     campaign = planted(kuka, {}, states=states, targets=unknown, fitted_frames=True)
     declared = replace(campaign.declared, weights=np.ones(len(campaign.observations)))
     keys = keys_like(campaign, "lost_motion@2", "joint_tilt@3", "hysteresis@4", "payload")
-    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], [], SETTINGS)
+    line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
     problem = line.problem
     numbers = range(len(problem.units))
     reach = replace(new_states.reach_of(states, kuka, limits(kuka), None, False), shares=(1.0,), free=False)
@@ -219,7 +218,7 @@ def test_loads_that_always_hang_stay_vertical(ambiguous, kuka):
 def test_a_reference_weight_shows_what_the_load_cell_cannot(kuka):
     """Force scale and compliances of all joints do the same under loads that only the cell knows."""
     campaign = planted(kuka, {"force_scale": (0.02,)}, poses=15, identified=False)
-    line = linearized(campaign.declared, campaign.observations, [campaign.candidates["force_scale"]], [], SETTINGS)
+    line = linearized(campaign.declared, campaign.observations, [campaign.candidates["force_scale"]], SETTINGS)
     reach = new_states.reach_of(campaign.observations.states, kuka, limits(kuka), None, True)
     made = line, campaign.declared, [0], campaign.declared.noise, campaign.observations.states, reach, False
     instrument = new_states.instrument_of(*made)

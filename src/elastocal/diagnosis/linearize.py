@@ -36,8 +36,8 @@ class Linearized:
     untestable : dict of str to str
         Why a candidate is not tested.
     about : Fit
-    averaged : frozenset of str
-        Owners of the parameters of the fit that are units here, with sizes that are averaged over.
+    candidates : frozenset of str
+        Keys of all candidates: parameters of the fit that they own are coefficients of units here.
     """
 
     problem: object
@@ -45,7 +45,7 @@ class Linearized:
     declared_size: float
     untestable: dict
     about: object
-    averaged: frozenset
+    candidates: frozenset
 
 
 def linearized(fitted, observations, candidates, settings):
@@ -77,12 +77,8 @@ def linearized(fitted, observations, candidates, settings):
     units = units_of(tested, [(place, len(laws)) for place, laws in zip(places, waves, strict=True)], settings)
     made *= np.concatenate([unit.sizes for unit in units])
     owners = np.array([owner for owner, _ in fitted.parameters])
-<<<<<<< HEAD
-    keys = frozenset(c.key for c in (*candidates, *declared))
-    averaged = np.isin(owners, list(keys))
-=======
-    found = np.isin(owners, [candidate.key for candidate in candidates])
->>>>>>> main
+    keys = frozenset(candidate.key for candidate in candidates)
+    found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     residual = line.residual + line.sensitivities[..., found] @ values[found]
     root = np.sqrt(fitted.weights)
@@ -105,16 +101,11 @@ def linearized(fitted, observations, candidates, settings):
     statistics = statistics_of(products, grid)
     kept = testable(statistics, units, settings)
     shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
-<<<<<<< HEAD
-    everything = (*shown, *base)
-    free = tuple(range(len(shown), len(everything)))
-    problem = Problem(statistics, everything, free, prior_of(shown, settings), settings)
-    return Linearized(problem, products, untestable, replace(fitted, circumstances=around), keys)
-=======
     small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
-    return Linearized(Problem(statistics, shown, prior_of(shown, settings), settings), products, size, untestable)
+    problem = Problem(statistics, shown, prior_of(shown, settings), settings)
+    return Linearized(problem, products, size, untestable, replace(fitted, circumstances=around), keys)
 
 
 def declared_geometry(model):
@@ -175,7 +166,6 @@ def declared_size(fitted, parameters, owners, sensitivities, residual, present, 
         evidence = log_likelihood(squares, len(residual)) - np.log(np.abs(np.diag(factor))).sum()
         best = max(best, (float(evidence), size))
     return best[1]
->>>>>>> main
 
 
 def testable(statistics, units, settings):

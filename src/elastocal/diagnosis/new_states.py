@@ -371,7 +371,7 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     fitted : Fit
         About which new states are linear: the model found.
     numbers : sequence of int
-        Units of the problem whose columns matter, those of the base among them.
+        Units of the problem whose columns matter.
     noise : Noise
         Of one reading, with the error common to the readings of a pose.
     states : States
@@ -390,15 +390,13 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     owners = [owner for owner, _ in parameters(model, estimate)]
     new = {f"target {target.name}" for target in model.targets[own:]}
     added = np.array([owner in new for owner in owners], bool)
-    declared = np.array([owner not in linearized.averaged for owner in owners], bool) & ~added
+    declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
     laws, features, columns, sizes, cell = [], [], [], [], []
     problem = linearized.problem
     for number in sorted(numbers, key=lambda number: problem.units[number].candidate is None):
         unit = problem.units[number]
         if unit.candidate is None:
             features.append((unit.location, unit.columns))
-        elif number in problem.base:
-            laws += [(effect, ()) for effect in linearized.about.model.effects if effect.effect == unit.mechanism]
         else:
             laws.append((unit.candidate, unit.shapes))
         columns.append(unit.columns)

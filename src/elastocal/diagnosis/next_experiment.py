@@ -145,7 +145,7 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     if reason:
         return _nothing(joints, best, (), reason)
     problem = evidence.linearized.problem
-    numbers = sorted({n for models in kept.values() for model in models for n in (*problem.base, *model.units)})
+    numbers = sorted({n for models in kept.values() for model in models for n in model.units})
     units = [problem.units[n] for n in numbers]
     states = case.observations.states
     of_load_cell = any(unit.candidate is not None and unit.candidate.family == "load" for unit in units)
@@ -434,9 +434,8 @@ def _members(evidence, kept, instrument, lead, factor):
     hypothesis, odds, columns, means, precisions, roots = [], [], [], [], [], []
     for number, (_, models) in enumerate(kept.items()):
         for model in models:
-            members = (*problem.base, *model.units)
-            mine = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
-            deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
+            mine = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
+            deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
             chosen = np.concatenate([np.arange(declared), declared + mine])
             precision = total[np.ix_(chosen, chosen)] + np.diag(np.append(np.zeros(declared), (factor * deviations) ** -2))
             mean = np.zeros(instrument.unknowns)
@@ -694,9 +693,8 @@ def _present_separation(linearized, found, alternative, factor):
     gram, along = statistics.gram[at] / factor**2, statistics.along[at] / factor**2
 
     def of(model):
-        members = (*problem.base, *model.units)
-        columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
-        deviations = factor * np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
+        columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
+        deviations = factor * np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
         return columns, gram[np.ix_(columns, columns)] + np.diag(deviations**-2)
 
     mine, inner = of(found)
