@@ -89,6 +89,7 @@ rule diagnose_campaign:
         models="results/loop/{campaign}/models.parquet",
         confounding="results/loop/{campaign}/confounding.parquet",
         candidates="reports/loop/{campaign}/candidates.parquet",
+        experiment="reports/loop/{campaign}/next_experiment.csv",
     log:
         "results/logs/diagnose_campaign/{campaign}.log",
     benchmark:

@@ -2,14 +2,18 @@
 
 import sys
 
+import pandas as pd
+
 from elastocal.diagnosis import tables
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
+from elastocal.frames import write_csv
 from elastocal.json_files import write_json
 from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.provenance import provenance
 from elastocal.storage import write_table
+from elastocal.study.columns import WRENCH_NAMES
 
 from job import run
 
@@ -25,6 +29,10 @@ def diagnose_campaign(job):
     write_table(job.output.models, tables.MODELS, [tables.model_columns(found)], origin)
     write_table(job.output.candidates, tables.CANDIDATES, [tables.candidate_columns(found)], origin)
     write_table(job.output.confounding, tables.CONFOUNDING, [tables.confounding_columns(found)], origin)
+    # Until diagnosis/next_experiment.py fills it.
+    angles = [f"q{joint + 1}" for joint in range(case.campaign.robot.joints)]
+    names = ["effect", "pose", "load", "point", *angles, *WRENCH_NAMES, "separation", "separation_without"]
+    write_csv(job.output.experiment, pd.DataFrame(columns=names))
 
 
 run(diagnose_campaign, snakemake)

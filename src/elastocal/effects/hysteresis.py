@@ -6,6 +6,7 @@ Catalogue row 14. Where the approach is not recorded this is part of the repeata
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "hysteresis", "gearbox"
+WORDS = "hysteresis"
 _PARAMETERS = (Parameter("half_width", "rad", 1e-4),)
 
 

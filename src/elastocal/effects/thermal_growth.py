@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 
 NAME, FAMILY = "thermal_growth", "drift"
+WORDS = "thermal growth of the links"
 _REFERENCE_C = 20.0
 _LAG = Shape("lag", "s", 3600.0, 300.0, 36000.0)
 

@@ -8,6 +8,7 @@ Hutchinson and Vidyasagar 2006, 3.3): the last one from two joints before it.
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "transmission_ratio", "transmission"
+WORDS = "gear ratio or coupling error"
 _WRIST = 3
 
 

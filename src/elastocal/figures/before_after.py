@@ -7,6 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
+from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
 
@@ -80,7 +81,7 @@ def _interval(axis, value, low, high, row):
 
 def step_name(name, most=3):
     """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
-    parts = name.replace("_", " ").replace("@", " ").split(", ")
+    parts = in_words(name).split(", ")
     rest = f" and {len(parts) - most} more" if len(parts) > most else ""
     return textwrap.fill(", ".join(parts[:most]) + rest, _LINE)
 

@@ -284,9 +284,9 @@ def _stages(table):
 def _legend(stages, with_held_out):
     drawn = [STAGES[stage] for stage in stages]
     handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
-    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="training reading"))
+    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
     if with_held_out:
-        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out reading"))
+        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out measurement"))
     return handles
 
 
