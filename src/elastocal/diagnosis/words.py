@@ -36,6 +36,11 @@ def physical_name(effect):
     return getattr(effects().get(effect), "WORDS", effect.replace("_", " "))
 
 
+def detail_words(effect, detail):
+    """Which variant of an effect, in words where its module has some."""
+    return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
+
+
 def listed(items, most=None, rest="more"):
     """Items in a sentence, at most so many of them."""
     items = list(items)
@@ -190,6 +195,7 @@ def _where(effect, places):
 
 
 def _located(effect, numbers, detail):
+    detail = detail_words(effect, detail)
     # Details without a joint stand alone, but for parts of the robot.
     if not numbers:
         return f" of the {detail}" if detail in _PARTS else f" ({detail})" if detail else ""

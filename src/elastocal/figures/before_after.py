@@ -45,7 +45,7 @@ def before_after(steps, noise_floor_m=None):
     heights = np.array([0.55 + 0.45 * count for count in lines])
     rows = np.cumsum(heights) - heights / 2
     values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
-    scale, unit = (MILLI, "mm") if values.max() > 3e-3 else (MICRO, "µm")
+    scale, unit = (MILLI, "mm") if values.max() >= 1e-3 else (MICRO, "µm")
     trained = np.array([[step[f"train_{metric}_m"] for metric in METRICS] for step in steps])
     known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
     logarithmic = max(known) > _LARGEST_RATIO * min(known)
@@ -95,7 +95,7 @@ def _legend(kinds, noise_floor_m):
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
     handles.append(
         Line2D(
-            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on training poses"
+            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on fitted poses"
         )
     )
     if noise_floor_m:

@@ -50,7 +50,7 @@ def probabilities(stated, table):
     figure, axes = panels(2, 1, sum(height_mm), height_ratios=height_mm)
     _bars(axes[0, 0], np.cumsum(heights) - heights / 2, heights.sum(), labels, values)
     _factors(axes[1, 0], table, named)
-    _families_legend(figure, table, order)
+    _families_legend(figure, table, order, named)
     return figure
 
 
@@ -82,6 +82,7 @@ def _factors(axis, table, named):
     axis.set_xlabel("Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)")
     axis.axvline(0, color="black", linewidth=0.8, zorder=4)
     axis.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7)
+    _two_lines(axis)
     axis.set_title("Each candidate cause alone", loc="left")
     axis.grid(visible=False, axis="y")
 
@@ -124,6 +125,7 @@ def confounding(table, pairs):
     axis.set(xticks=range(count), yticks=range(count))
     axis.set_xticklabels(range(1, count + 1), fontsize=7)
     axis.set_yticklabels(numbered, fontsize=7)
+    _two_lines(axis)
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
@@ -174,10 +176,18 @@ def angle_matrix(names, pairs):
     return angles
 
 
-def short_name(key, longest=42):
-    """A candidate's key as words, cut in the middle where it is very long."""
+def short_name(key, longest=80):
+    """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
     words = _capital(candidate_words(key))
-    return words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
+    words = words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
+    return textwrap.fill(words, 48)
+
+
+def _two_lines(axis):
+    """Names of two lines in smaller letters, so that they do not touch their neighbours."""
+    for label in axis.get_yticklabels():
+        if "\n" in label.get_text():
+            label.set(fontsize=5.6, linespacing=0.95)
 
 
 def _capital(text):
@@ -214,8 +224,8 @@ def _ticks(low, high):
     return sorted(kept)
 
 
-def _families_legend(figure, table, order):
-    present = [family for family in FAMILIES if family in set(table["family"][order])]
+def _families_legend(figure, table, order, named):
+    present = [family for family in FAMILIES if family in set(table["family"][named])]
     handles = [Patch(color=FAMILIES[family], label=family) for family in present]
     if table["chosen"].any():
         handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))

@@ -318,5 +318,5 @@ def _scale_arrow(axis, largest, length):
     scale, unit = (MILLI, "mm") if shown > 0.9995e-3 else (MICRO, "µm")
     key = axis.quiver([0], [0], [0], [0], angles="xy", scale_units="xy", scale=1, color="black", width=0.006, minlength=0)
     place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
-    axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:.3g} {unit}", **place)
+    axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:g} {unit}", **place)
     key.set_visible(False)

@@ -18,11 +18,9 @@ from elastocal.report.wording import (
     counted,
     length,
     minus,
-    p_words,
     percent,
     plain,
     probability_words,
-    scaled,
     words,
 )
 
@@ -60,7 +58,7 @@ def sentences(verdict):
     if faults:
         return [
             *(as_sentence(fault["detail"]) for fault in faults),
-            "No mechanism was looked for: the errors below are those of the data as they are.",
+            "No mechanism was looked for, and the residuals below are those of the data as they are.",
         ]
     tested = counted(verdict["candidates_tested"], "candidate cause")
     if said == "not_testable":
@@ -69,15 +67,14 @@ def sentences(verdict):
             "model absorbs it.",
             "So these measurements show neither that something is missing nor that nothing is.",
         ]
-    p_value = verdict["probabilities"]["alarm_p_value"]
-    level = percent(verdict["settings"]["alarm_level"]["value"])
-    chance = f"{p_words(p_value)}; an alarm is raised below {level}"
+    chance = f"{100 * verdict['probabilities']['alarm_p_value']:.2g} %"
+    level = f"the alarm is set to {percent(verdict['settings']['alarm_level']['value'])}"
     if said == "adequate":
         return [
-            f"The declared model explains these measurements: none of {tested} is needed. If nothing at all is missing, "
-            f"measurements that speak as much for some cause come up by chance with {chance}."
+            f"The declared model explains these measurements: none of {tested} is needed. Where nothing is missing, {chance} "
+            f"of such campaigns speak as much for a missing mechanism as this one; {level}."
         ]
-    alarm = f"If nothing were missing, measurements like these would come up with {chance}."
+    alarm = f"If nothing were missing, {chance} of such campaigns would speak as much for a missing mechanism; {level}."
     if said == "unexplained":
         return [
             "The residual of the declared model is more than noise, and a smooth error of unknown cause explains it better "
@@ -139,7 +136,8 @@ def what_to_do(verdict, experiment):
         low, high = heldout["reduction_ci95"]
         if low > 0:
             advice.append(
-                "Use the corrected model: on poses that it was not fitted to it is more accurate. Its parameters stand below."
+                "Use the corrected model: on poses that it was not fitted to it is more accurate. Its parameters stand in the "
+                "section on what is missing."
             )
         elif high < 0:
             advice.append("Do not use the corrected model: on poses that it was not fitted to it is less accurate.")
@@ -213,7 +211,7 @@ def _transforms(faults):
     """What turns the data into data that fit, where a fault says so."""
     return [
         f"{capital(words(fault['name']))}: the data fit with "
-        + listed(f"{entry['name']} = {' '.join(filter(None, scaled(entry['value'], None, entry['unit'])))}" for entry in known)
+        + listed(f"{entry['name']} = {minus(plain(entry['value'], 4))} {entry['unit']}" for entry in known)
         + "."
         for fault in faults
         if (known := [entry for entry in fault["parameters"] if entry["unit"] not in ("–", "1")])

@@ -49,6 +49,11 @@ NOISE_SOURCES = {
     "declared": "The noise is taken as the campaign declares it; there are too few repeats to check it.",
     "residual": "The noise is not known: with neither repeats nor a declared noise the residual itself was taken for it.",
 }
+NONE_FOUND = {
+    "adequate": "No mechanism of the catalogue is needed to explain these measurements.",
+    "unexplained": "No mechanism of the catalogue explains these measurements.",
+    "not_testable": "No mechanism of the catalogue could be tested.",
+}
 SPLITS = {"held out": "validation poses (held out)", "joint space": "block of joint space", "session": "session"}
 # A standard error above this share of the prior's says what the prior says.
 _OF_THE_PRIOR = 0.7
@@ -86,7 +91,7 @@ def loop_facts(verdict, steps, splits, experiment, table, descriptions, paramete
         "sentences": sentences(verdict),
         "probabilities": "" if faulty else probability_sentence(verdict["probabilities"]),
         "now": what_to_do(verdict, experiment),
-        "warnings": [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
+        "warnings": [] if faulty else [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
@@ -95,9 +100,10 @@ def loop_facts(verdict, steps, splits, experiment, table, descriptions, paramete
         "floor": length(floor),
         "steps": step_rows(steps, floor),
         "controls": _controls(steps),
-        "splits": split_rows(splits),
+        "splits": split_rows(_as_judged(splits, steps, verdict["heldout"])),
         "range": range_sentence(verdict["heldout"]),
         "effects": [effect_facts(effect) for effect in verdict["effects"]],
+        "none_found": NONE_FOUND.get(verdict["verdict"], NONE_FOUND["adequate"]),
         "experiment": experiment_facts(experiment, verdict.get("next_experiment")),
         "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
         "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
@@ -173,9 +179,10 @@ def step_rows(steps, floor_m):
 def split_rows(splits):
     """Rows of the splits table: what was left out, poses, RMS error before and after, reduction; errors with intervals."""
     if not splits:
-        return {"unit": "mm", "rows": [], "left_out": 0}
+        return {"unit": "mm", "rows": [], "left_out": 0, "changed": False}
     factor, unit = _error_unit([row["before_rms_m"] for row in splits] + [row["after_rms_m"] for row in splits])
     rows, left_out = [], 0
+    changed = any(row["before_rms_m"] != row["after_rms_m"] for row in splits)
     counts = Counter(row["split"] for row in splits)
     for row in splits:
         together = row["block"] == "all"
@@ -189,8 +196,27 @@ def split_rows(splits):
             for stage in ("before", "after")
         ]
         fall = [f"{_number(100 * row['reduction'], '%')} %", _interval(row, "reduction", 100, "%")]
-        rows.append({"name": what, "together": together, "poses": str(int(row["poses"])), "cells": [*errors, fall]})
-    return {"unit": unit, "rows": rows, "left_out": left_out}
+        rows.append(
+            {
+                "name": what,
+                "together": together,
+                "poses": str(int(row["poses"])),
+                "cells": [*errors, fall] if changed else errors[:1],
+            }
+        )
+    return {"unit": unit, "rows": rows, "left_out": left_out, "changed": changed}
+
+
+def _as_judged(splits, steps, heldout):
+    """Rows of the splits, that of the held-out poses with the intervals that stand in the table of the steps."""
+    ends = [step for step in steps if step["kind"] in ("declared", "effect")]
+    judged = {
+        f"{stage}_rms_m_{end}": step[f"heldout_rms_m_{end}"]
+        for stage, step in (("before", ends[0]), ("after", ends[-1]))
+        for end in ("low", "high")
+    }
+    judged |= dict(zip(("reduction_low", "reduction_high"), heldout["reduction_ci95"], strict=True))
+    return [row | judged if row["split"] == "held out" else row for row in splits]
 
 
 def range_sentence(heldout):
@@ -204,13 +230,18 @@ def range_sentence(heldout):
     if not count:
         return f"All {poses} lie within the range of the fitted poses. {share}"
     ends = [(where, by_range[key]) for where, key in (("within", "inside"), ("outside", "outside")) if by_range[key]]
-    each = [
-        f"{length(ends['before']['rms_m'])} before and {length(ends['after']['rms_m'])} after {where}" for where, ends in ends
-    ]
+    each = []
+    for where, errors in ends:
+        stages = (length(errors[stage]["rms_m"]) for stage in ("before", "after"))
+        each.append(f"{_before_and_after(*stages)} {where}")
     return (
         f"{count} of {poses} {'lies' if count == 1 else 'lie'} outside the range of the fitted poses: errors there are "
         f"extrapolated. The RMS error is {listed(each)} that range. {share}"
     )
+
+
+def _before_and_after(before, after):
+    return after if before == after else f"{before} before and {after} after"
 
 
 def effect_facts(effect):
@@ -341,9 +372,10 @@ def untestable_rows(untestable):
     found = {}
     for key, reason in untestable.items():
         # Reasons that differ from joint to joint are one reason.
-        alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different angles for waves so short", reason)
+        alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
+        alike = alike.replace("no approach", "no direction of approach")
         found.setdefault((re.split(r"[@\[]", key)[0], alike), []).append(key)
-    rows = [[capital(physical_name(effect)), members_words(keys, 6), reason] for (effect, reason), keys in found.items()]
+    rows = [[capital(physical_name(effect)), members_words(keys), reason] for (effect, reason), keys in found.items()]
     return sorted(rows, key=lambda row: (row[2], row[0]))
 
 
@@ -359,7 +391,7 @@ def setting_rows(settings):
 def _part(part, campaign):
     """What was measured in one part of the readings."""
     if not len(part["pose"]):
-        return dict.fromkeys(("campaign", "readings"), "none")
+        return dict.fromkeys(("campaign", "measurements"), "none")
     states = _distinct(part, "session", "pose", "load")
     repeats = Counter(map(tuple, np.column_stack([part[name] for name in ("session", "pose", "load", "target")])))
     each = np.array(list(repeats.values()))
@@ -377,10 +409,10 @@ def _part(part, campaign):
             else map(plain, (loaded.min(), loaded.max()))
         )
         numbers = counted(len(np.unique(part["load"][force > 0])), "load")
-        loads = f"{numbers} of {' to '.join(ends)} N on {percent(len(loaded) / len(force))} of the readings"
+        loads = f"{numbers} of {' to '.join(ends)} N on {percent(len(loaded) / len(force))} of the measurements"
     return {
         "campaign": campaign["campaign"],
-        "readings": f"{grouped(len(part['pose']))}, each a {kind}",
+        "measurements": f"{grouped(len(part['pose']))}, each a {kind}",
         "poses": counted(_distinct(part, "session", "pose"), "pose") + f" in {counted(_distinct(part, 'session'), 'session')}",
         "states (pose and load)": grouped(states),
         "loads": loads,
@@ -394,7 +426,7 @@ def _part(part, campaign):
         "repeats of a state": str(each.min())
         if each.min() == each.max()
         else f"{each.min()} to {each.max()}, median {np.median(each):g}",
-        "frame of the readings": frame,
+        "coordinate frame": frame,
         "time": "recorded" if np.isfinite(part["time_s"]).any() else "not recorded",
     }
 
@@ -455,6 +487,8 @@ def _parameter_row(entry, members):
     name = words(entry["name"].removeprefix(f"{member} "))
     where = f"{members_words([member])}: " if len(members) > 1 else ""
     row = [where + name, *scaled(entry["value"], entry["std_error"], entry["unit"])]
+    if entry["unit"] == "–" and float(entry["value"]).is_integer():
+        row[1] = grouped(int(entry["value"]))
     prior = entry.get("prior_std")
     if prior and entry["std_error"] > _OF_THE_PRIOR * prior:
         return [*row, "mostly the prior"]

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from elastocal.diagnosis.words import at_joints, candidate_words, in_words, listed
+from elastocal.diagnosis.words import at_joints, candidate_words, detail_words, in_words, listed
 
 MICRO, MILLI = 1e6, 1e3
 # A blank at which no line ends.
@@ -57,12 +57,20 @@ def members_words(keys, most=12):
     -------
     str
     """
-    grouped_keys = {}
+    details = {}
     for key in sorted(keys, key=_natural):
         found = _KEY.match(key)
-        where = at_joints(found["effect"], (found["joints"] or "").split("+")) if found["joints"] else ""
-        grouped_keys.setdefault(where.removeprefix(" of "), []).append(found["detail"] or "")
-    parts = [": ".join(filter(None, (where, ", ".join(filter(None, details))))) for where, details in grouped_keys.items()]
+        joints = tuple((found["joints"] or "").split("+")) if found["joints"] else ()
+        details.setdefault((found["effect"], joints), []).append(detail_words(found["effect"], found["detail"] or ""))
+    # Single joints of which the same is to be told stand together.
+    alike = {}
+    for (effect, joints), which in details.items():
+        group = (effect, joints if len(joints) != 1 else None, ", ".join(filter(None, which)))
+        alike.setdefault(group, []).extend(joints)
+    parts = [
+        ": ".join(filter(None, (at_joints(effect, joints).removeprefix(" of "), which)))
+        for (effect, _, which), joints in alike.items()
+    ]
     shown = [part for part in parts if part]
     return "; ".join(shown[:most]) + (f"; {len(shown) - most} more" if len(shown) > most else "")
 
