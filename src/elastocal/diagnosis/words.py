@@ -149,10 +149,13 @@ def hypotheses_words(sets):
     """
     first, found = set(sets[0]["mechanisms"]) if sets else set(), []
     for entry in sets:
-        more = set(entry["mechanisms"]) - first
-        adds = first and more - {OTHER} and first < set(entry["mechanisms"])
-        added = hypothesis_words(sorted(more) if adds else entry["mechanisms"], entry["locations"])
-        found.append(f"the same with {added}" if adds else added)
+        names = set(entry["mechanisms"])
+        if not first or not first < names:
+            found.append(hypothesis_words(entry["mechanisms"], entry["locations"]))
+        elif names - first == {OTHER}:
+            found.append(f"the same or {RELATED}")
+        else:
+            found.append("the same with " + hypothesis_words(sorted(names - first), entry["locations"]))
     return found
 
 

@@ -107,7 +107,7 @@ def loop_facts(verdict, steps, splits, experiment, table, descriptions, paramete
         "experiment": experiment_facts(experiment, verdict.get("next_experiment")),
         "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
         "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
-        "held": held_rows(verdict["held"]),
+        "held": held_rows([*verdict["held"], *left_to_priors(parameters)]),
         "untestable": untestable_rows(verdict["untestable"]),
         "others": _other_parameters(verdict, parameters),
         "method": _method(verdict, descriptions),
@@ -348,8 +348,29 @@ def compliance_rows(compliance):
     return rows
 
 
+def left_to_priors(parameters):
+    """Parameters about which the measurements say hardly more than their priors.
+
+    Parameters
+    ----------
+    parameters : dict of str to ndarray
+        Of the final model.
+
+    Returns
+    -------
+    list of str
+        Owner and name, as in ``held`` of verdict.json.
+    """
+    mine = _mostly_prior(parameters["std_error"], parameters["prior_std"]) & ~parameters["held"].astype(bool)
+    return [f"{owner} {name}" for owner, name in zip(parameters["owner"][mine], parameters["parameter"][mine], strict=True)]
+
+
+def _mostly_prior(std_error, prior_std):
+    return std_error > _OF_THE_PRIOR * prior_std
+
+
 def held_rows(held):
-    """Parameters that kept their values, one row for each owner."""
+    """Parameters that the measurements do not determine, one row for each owner."""
     owners = {}
     for name in held:
         owner, parameter = name.rsplit(" ", 1)
@@ -375,7 +396,7 @@ def untestable_rows(untestable):
         alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
         alike = alike.replace("no approach", "no direction of approach")
         found.setdefault((re.split(r"[@\[]", key)[0], alike), []).append(key)
-    rows = [[capital(physical_name(effect)), members_words(keys), reason] for (effect, reason), keys in found.items()]
+    rows = [[capital(physical_name(effect)), members_words(keys, 4) or "–", reason] for (effect, reason), keys in found.items()]
     return sorted(rows, key=lambda row: (row[2], row[0]))
 
 
@@ -490,7 +511,7 @@ def _parameter_row(entry, members):
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))
     prior = entry.get("prior_std")
-    if prior and entry["std_error"] > _OF_THE_PRIOR * prior:
+    if prior and _mostly_prior(entry["std_error"], prior):
         return [*row, "mostly the prior"]
     return [*row, "measurements" if entry["std_error"] else ""]
 
@@ -518,14 +539,14 @@ def _other_parameters(verdict, parameters):
     """Estimates of the declared model beside the compliances, and how many there are of them, of frames and of targets."""
     mine = {member for effect in verdict["effects"] for member in effect.get("members", [])}
     rows, counts = [], Counter()
-    columns = (parameters[name] for name in ("owner", "parameter", "value", "std_error", "unit", "held"))
-    for owner, name, value, error, unit, held in zip(*columns, strict=True):
-        if held or owner in mine or owner in ("fit", "joint_compliance"):
+    columns = (parameters[name] for name in ("owner", "parameter", "value", "std_error", "unit", "held", "prior_std"))
+    for owner, name, value, error, unit, held, prior in zip(*columns, strict=True):
+        if held or owner in mine or owner in ("fit", "joint_compliance") or _mostly_prior(error, prior):
             continue
         kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
         counts[kind] += 1
         if kind == "declared":
-            rows.append([candidate_words(owner), words(name), *scaled(value, error, unit)])
+            rows.append([capital(candidate_words(owner)), words(name), *scaled(value, error, unit)])
     placed = counts["frame"] + counts["target"]
     return {
         "rows": rows[:_MOST_OTHERS],

@@ -149,7 +149,8 @@ def scaled(value, error, unit):
     number, error = number / 10.0**power, error / 10.0**power
     if error:
         decimals = max(0, 1 - int(np.floor(np.log10(error))))
-        text = f"{number:.{decimals}f} ± {error:.{decimals}f}"
+        # What is rounded to zero has no sign.
+        text = f"{round(number, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}"
     else:
         text = plain(number, 4)
     if power:
