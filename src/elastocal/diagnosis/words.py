@@ -41,12 +41,12 @@ def detail_words(effect, detail):
     return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
 
 
-def listed(items, most=None, rest="more"):
+def listed(items, most=None, rest="more", last="and"):
     """Items in a sentence, at most so many of them."""
     items = list(items)
     if most is not None and len(items) > most:
         items = [*items[:most], f"{len(items) - most} {rest}"]
-    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + " and " + items[-1] if items else "none"
+    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + f" {last} " + items[-1] if items else "none"
 
 
 def at_joints(effect, joints):

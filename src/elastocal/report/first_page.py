@@ -192,7 +192,7 @@ def _found(effect):
 def _ambiguity(effect):
     if not effect["alternatives"]:
         return f"Its probability is {probability_words(effect['probability'])}."
-    others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES).replace(" and ", " or ")
+    others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES, last="or")
     return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them."
 
 
