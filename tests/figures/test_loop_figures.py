@@ -309,3 +309,9 @@ def test_where_the_data_are_at_fault_the_figures_say_so(kuka):
 def test_a_single_candidate():
     table = candidate_table(count=1)
     assert_nothing_cut_off(probabilities(stated(), table))
+
+
+def test_residuals_of_one_pose_are_a_note():
+    table = residual_table(loaded=False, timed=False)
+    table |= {f"q{joint}": np.full(len(table["pose"]), 0.3) for joint in range(1, 7)}
+    assert any("nothing to draw them against" in text for text in texts(residuals(table)))

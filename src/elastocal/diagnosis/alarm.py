@@ -76,10 +76,10 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
     along : ndarray (T, K, N)
     squares : ndarray (T, N)
     """
-    grid, prior = problem.grid(), problem.prior
+    grid, prior = problem.grid, problem.prior
     start = (statistics.log_likelihood + log_pose)[:, None]
     nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
-    blocks = blocks_of(statistics.gram, problem.units, problem.candidates)
+    blocks = blocks_of(statistics.gram, problem.units, range(len(problem.units)))
     total = np.full(len(nothing), -np.inf)
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         for place, number in enumerate(members):

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.linearize import linearized
@@ -122,10 +123,9 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that is far from it."""
     candidates = list(case.candidates.values())
-    averaged = declared_sizes(declared.model)
     about = declared
     for round_number in range(settings.linearizations):
-        problem = linearized(about, case.observations, candidates, averaged, settings)
+        problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
@@ -136,29 +136,20 @@ def _explained(case, declared, settings, seed, tell):
             return evidence, declared
         model = found.models[conclusion.best.model]
         noise = remaining_noise(problem.problem, model, declared.noise)
-        final = fit_with_sizes(declared, case.observations, noise, selected(problem.problem, model))
+        final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         if alarm.statistic < settings.relinearize_above:
             break
         about = replace(final, noise=noise)
     return evidence, final
 
 
-def declared_sizes(model):
-    """Declared effects whose sizes are averaged over: those without a prior of their own, but for the springs of the joints."""
-    return [
-        effect
-        for effect in model.effects
-        if effect.family != "declared" and all(p.prior_std is None for p in effect.parameters)
-    ]
-
-
 def _effect_steps(case, declared, final, found):
     """One step for each mechanism, the most probable first, each with those before it."""
-    conclusion, problem = found.conclusion, found.linearized.problem
+    conclusion = found.conclusion
     names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
     if not names:
         return []
-    chosen = selected(problem, found.posterior.models[conclusion.best.model])
+    chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
     steps = []
     for number, name in enumerate(names, 1):
         if number == len(names):
@@ -182,6 +173,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
+    said += fitted_compliance_warnings(final)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")

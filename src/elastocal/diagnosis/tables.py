@@ -168,7 +168,7 @@ def candidate_columns(diagnosis):
         angles = nearest_angles(problem, [number for number in chosen if problem.units[number].candidate])
         for number in np.argsort(-factors):
             unit = problem.units[number]
-            if unit.candidate and number not in problem.base:
+            if unit.candidate:
                 gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
                 shape = unit.shapes[0] if unit.shapes else np.nan
                 told = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
@@ -199,7 +199,7 @@ def confounding_columns(diagnosis):
     if not diagnosis.evidence:
         return {"one": [], "other": [], "angle_deg": np.zeros(0)}
     problem = diagnosis.evidence.linearized.problem
-    numbers = [n for n in problem.candidates if problem.units[n].candidate]
+    numbers = [number for number, unit in enumerate(problem.units) if unit.candidate]
     rows, columns = np.tril_indices(len(numbers), -1)
     angles = angles_between(problem, numbers)
     names = [problem.units[n].key for n in numbers]

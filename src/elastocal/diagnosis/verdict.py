@@ -85,7 +85,7 @@ def concluded(problem, posterior, alarm):
         for mechanism in hypothesis.mechanisms:
             present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
     mechanisms = dict(sorted(present.items(), key=lambda entry: -entry[1]))
-    if all(problem.units[number].mechanism == OTHER for number in problem.candidates):
+    if all(unit.mechanism == OTHER for unit in problem.units):
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
     if not alarm.raised:
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)

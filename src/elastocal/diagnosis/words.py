@@ -16,8 +16,6 @@ _ANY_KEY = _KEY.format(names=r"[^@\[]+") + "$"
 _LOCATION = re.compile(r"^(?:(?P<kind>joint|link)s? (?P<numbers>\d+(?: and \d+)*))? ?(?P<detail>.*)$")
 # Locations that have no joint: what stands there in the place of one.
 _PARTS = ("column", "base")
-# Effects whose numbers count links, which begin at the joint of the same number.
-OF_LINKS = ("link_elasticity", "link_geometry")
 # Bands of orders, variants and the like are told of as many locations; of more only their joints.
 _MOST_DETAILED = 2
 
@@ -41,6 +39,11 @@ def detail_words(effect, detail):
     return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
 
 
+def part_of(effect):
+    """What the numbers of an effect count: joints, or links, which begin at the joint of the same number."""
+    return getattr(effects().get(effect), "PART", "joint")
+
+
 def listed(items, most=None, rest="more", last="and"):
     """Items in a sentence, at most so many of them."""
     items = list(items)
@@ -53,8 +56,7 @@ def at_joints(effect, joints):
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
     if not joints:
         return ""
-    kind = "link" if effect in OF_LINKS else "joint"
-    return f" of {kind}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
+    return f" of {part_of(effect)}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
 
 
 def effect_words(effect, locations=()):

@@ -10,6 +10,7 @@ from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "link_geometry", "geometry"
 WORDS = "geometric error"
+PART = "link"
 _PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(
     Parameter(f"r{axis}", "rad", 1e-3) for axis in "xyz"
 )
@@ -25,4 +26,4 @@ def candidates(sites):
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)
 
-    return per_joint(sites, at)
+    return per_joint(sites, at, prismatic=True)

@@ -35,7 +35,7 @@ def probabilities(stated, table):
     matplotlib.figure.Figure
     """
     order = leading(table)
-    if stated is None or not len(order):
+    if not len(order):
         return _nothing_tested(table)
     sets = stated["sets"][:_HYPOTHESES]
     labels = [textwrap.fill(_capital(words), _LINE) for words in hypotheses_words(sets)]
