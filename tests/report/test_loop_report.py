@@ -384,6 +384,14 @@ def test_the_next_experiment_is_in_degrees_and_says_what_it_separates():
     assert facts_of(CAMPAIGNS["class"], experiment=unloaded)["experiment"]["heads"][-2:] == ["q6 °", "separation"]
 
 
+def test_the_side_of_the_approach_and_reference_weights_are_asked_for():
+    sides = {f"approach{joint}": side for joint, side in enumerate((1.0, -1.0, 0.0, 1.0, 1.0, -1.0), 1)}
+    rows = [row | sides | {"reference_weight_kg": 25.0} for row in experiment_rows(count=2)]
+    told = facts_of(CAMPAIGNS["class"], experiment=rows)["experiment"]
+    assert told["heads"][-3:] == ["approach", "weight kg", "separation"] and told["approach"]
+    assert told["rows"][0][-3:] == ["+−0++−", "25.0", "10.0"]
+
+
 def test_controls_are_held_against_what_was_found():
     assert "zero offset of joint 4 (2 more parameters) leaves" in facts_of(CAMPAIGNS["named"])["controls"].replace(
         "\u00a0", " "
