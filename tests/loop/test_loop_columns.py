@@ -4,24 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from elastocal.attribution import Attribution
+from elastocal.loop.conclude import attributions_from, candidate_columns
+from elastocal.loop.search_columns import found_columns, look_blocks, rival_blocks
+from elastocal.selection import Search, search
 from made_folders import made_folder, made_table
 from support import chain_of
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.attribution import Attribution
 from elastocal.campaign import Target, read_campaign
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting import Fit, fit
 from elastocal.loop.case import case_from, noise_facts, noise_from
-from elastocal.loop.conclude import attributions_from, candidate_columns
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
 from elastocal.loop.intake import taken_in
 from elastocal.loop.reading_columns import reading_columns, readings_from
 from elastocal.loop.schemas import CORRELATIONS, FOUND, LOOKS, PARAMETERS, RIVALS, readings
-from elastocal.loop.search_columns import found_columns, look_blocks, rival_blocks
 from elastocal.model import parameters
 from elastocal.noise import Noise
-from elastocal.selection import Search, search
 from elastocal.storage import read_table, write_table
 
 COVARIATES = {

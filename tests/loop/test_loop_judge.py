@@ -4,17 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from elastocal.attribution import by_effect
+from elastocal.loop.judge import Step, controls, judged, model_steps, residual_blocks, split_table
 from made_folders import made_folder, made_table
 from scipy.spatial.transform import Rotation
 
-from elastocal.attribution import by_effect
 from elastocal.elastostatics import generalized_forces
 from elastocal.fitting import fit
 from elastocal.held_out import METRICS
 from elastocal.kinematics import poses, poses_and_jacobians
 from elastocal.loop.case import case_from
 from elastocal.loop.intake import taken_in
-from elastocal.loop.judge import Step, controls, judged, model_steps, residual_blocks, split_table
 from elastocal.loop.reading_columns import reading_columns
 from elastocal.model import joint_compliances
 from elastocal.noise import Noise

@@ -3,8 +3,6 @@
 import sys
 from dataclasses import replace
 
-import pandas as pd
-
 from elastocal.diagnosis import tables
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
@@ -16,7 +14,6 @@ from elastocal.loop.schemas import CORRELATIONS
 from elastocal.provenance import provenance
 from elastocal.random_streams import stream
 from elastocal.storage import write_table
-from elastocal.study.columns import WRENCH_NAMES
 
 from job import run
 
@@ -36,10 +33,6 @@ def diagnose_campaign(job):
     write_table(job.output.models, tables.MODELS, [tables.model_columns(found)], origin)
     write_table(job.output.candidates, tables.CANDIDATES, [tables.candidate_columns(found)], origin)
     write_table(job.output.confounding, tables.CONFOUNDING, [tables.confounding_columns(found)], origin)
-    # Until diagnosis/next_experiment.py fills it.
-    angles = [f"q{joint + 1}" for joint in range(case.campaign.robot.joints)]
-    names = ["effect", "pose", "load", "point", *angles, *WRENCH_NAMES, "separation", "separation_without"]
-    write_csv(job.output.experiment, pd.DataFrame(columns=names))
 
 
 run(diagnose_campaign, snakemake)

@@ -21,7 +21,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-
 # Of a variance of one: what is less is rounding, what is added is not seen.
 _ROUNDING = 1e-9
 
