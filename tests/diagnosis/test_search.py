@@ -138,7 +138,7 @@ def test_sizes_of_a_model_come_in_the_order_of_its_units_after_those_of_the_base
     problem = problem_of("what the declared model has")
     assert posterior(problem)[1].scales.tolist() == [3.0]
     rows = made_rows(0, poses=14, candidates=12)
-    rows = replace(rows, residual=rows.residual + 2.0 * rows.candidates[:, 0] + rows.candidates[:, 3:5] @ [0.5, 0.5])
+    rows = replace(rows, residual=rows.residual + 2.0 * rows.candidates[:, 0] + rows.candidates[:, 3:5] @ [0.4, -0.6])
     found, _ = posterior(made_problem(rows, UNITS, BASE, tau=TAU)[0])
     assert found.models[0].units == (0, 3)
     base, large, small = found.models[0].scales
