@@ -246,18 +246,23 @@ class Evaluated:
         Most probable size of each unit.
     log_pose : ndarray (T,)
         Log posterior weight of each tau at these sizes.
+    without : ndarray (m,)
+        Log evidence of the model without each of its units, the sizes of the others as they are.
     """
 
     log_evidence: float
     scales: np.ndarray
     log_pose: np.ndarray
+    without: np.ndarray
 
 
 def evaluate(statistics, units, grids, log_pose, start):
     """Evidence of one model, averaged over the sizes of its units.
 
-    The sum over all combinations of sizes is taken as the product of the sums over each size about the mode, found by
-    coordinate ascent; exact for one unit, and where sizes are independent given the readings.
+    The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
+    unit, and where sizes are independent given the readings. The mode is found by coordinate ascent, all units at once where
+    that raises the density and else the one that gains most. One inverse gives what every unit sees given all others: with C
+    the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
     Parameters
     ----------
@@ -268,7 +273,7 @@ def evaluate(statistics, units, grids, log_pose, start):
     log_pose : ndarray (T,)
         Logarithm of the prior weight of each size of the pose error.
     start : sequence of float
-        Sizes from which the search for the mode starts.
+        Sizes from which the search for the mode starts; each in its grid.
 
     Returns
     -------
@@ -277,55 +282,99 @@ def evaluate(statistics, units, grids, log_pose, start):
     base = statistics.log_likelihood + log_pose
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
-        return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values))
-    columns = np.concatenate([unit.columns for unit in units])
-    owner = np.repeat(np.arange(len(units)), [len(unit.columns) for unit in units])
-    signs = np.concatenate([unit.signs for unit in units])
-    size = len(columns)
-    joint = np.empty((len(base), size + 1, size + 1))
-    joint[:, :size, :size] = statistics.gram[:, columns[:, None], columns]
-    joint[:, size, :size] = joint[:, :size, size] = statistics.along[:, columns]
-    joint[:, size, size] = statistics.squares
-    unit_diagonal = np.append(np.ones(size), 0.0)
-
-    def log_densities(scales):
-        """ndarray (N, T): log joint density of the readings at N combinations of sizes (N, m), without their weights."""
-        deviations = np.append(scales[:, owner], np.ones((len(scales), 1)), axis=1)
-        inner = deviations[:, None, :, None] * joint * deviations[:, None, None, :]
-        inner[..., np.arange(size + 1), np.arange(size + 1)] += unit_diagonal
-        # The factor's last row solves for the coefficients, and its last element is what they leave of the squares.
-        factor = np.linalg.cholesky(inner)
-        diagonal = np.diagonal(factor, axis1=-2, axis2=-1)
-        squares = diagonal[..., -1] ** 2
-        occam = -np.log(diagonal[..., :-1]).sum(axis=-1)
-        values = base + occam + log_likelihood(squares, statistics.freedom)
-        if not signs.any():
-            return values
-        return values + _log_sign_factor(factor, signs, squares, statistics.freedom)
-
-    scales = np.array(start, float)
-    while True:
-        before, sums = scales.copy(), []
-        for number, grid in enumerate(grids):
-            tried = np.repeat(scales[None], len(grid.scales), axis=0)
-            tried[:, number] = grid.scales
-            values = log_sum_exp(log_densities(tried), axis=1) + grid.log_weights
-            best = int(np.argmax(values))
-            scales[number] = grid.scales[best]
-            sums.append(log_sum_exp(values) - values[best])
-        if np.array_equal(scales, before):
+        return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
+    places = [int(np.argmin(np.abs(grid.scales - size))) for grid, size in zip(grids, start, strict=True)]
+    present = _Joint(statistics, units, grids, base, np.array(places))
+    for _ in range(_MOST_ASCENTS):
+        profiles = present.profiles()
+        best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
+        gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
+        if gains.max() <= _NO_GAIN:
             break
-    at_mode = log_densities(scales[None])[0]
-    weights = sum(float(grid.log_weights[grid.scales == size][0]) for grid, size in zip(grids, scales, strict=True))
-    total = log_sum_exp(at_mode)
-    return Evaluated(float(total + weights + sum(sums)), scales, at_mode - total)
+        moved = _Joint(statistics, units, grids, base, np.where(gains > _NO_GAIN, best, present.places))
+        if moved.log_density <= present.log_density:
+            places = present.places.copy()
+            places[np.argmax(gains)] = best[np.argmax(gains)]
+            moved = _Joint(statistics, units, grids, base, places)
+            if moved.log_density <= present.log_density:
+                break
+        present = moved
+    profiles = present.profiles()
+    sums = np.array([log_sum_exp(p[1:]) - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
+    without = np.array([profile[0] for profile in profiles]) - sums + sums.sum()
+    log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)
+    return Evaluated(float(present.log_density + sums.sum()), present.scales, log_posterior, without)
 
 
-def _log_sign_factor(factor, signs, squares, freedom):
-    """Half-normal priors where physics gives the sign: ln 2 Phi(mean / std) of each such coefficient."""
+# Sizes lie on a grid, so that an ascent ends by itself; these end one that rounding keeps going.
+_MOST_ASCENTS, _NO_GAIN = 30, 1e-9
+
+
+class _Joint:
+    """Density of the readings under one model with one size for each unit."""
+
+    def __init__(self, statistics, units, grids, base, places):
+        self.units, self.grids, self.base, self.places = units, grids, base, places
+        self.freedom = statistics.freedom
+        self.scales = np.array([grid.scales[place] for grid, place in zip(grids, places, strict=True)])
+        self.log_weights = np.array([grid.log_weights[place] for grid, place in zip(grids, places, strict=True)])
+        columns = np.concatenate([unit.columns for unit in units])
+        self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
+        deviations = np.repeat(self.scales, np.diff(self.starts))
+        inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
+        self.covariance = np.linalg.inv(inner)
+        self.log_det = 2.0 * np.log(np.diagonal(np.linalg.cholesky(inner), axis1=1, axis2=2)).sum(axis=1)
+        along = deviations * statistics.along[:, columns]
+        self.mean = (self.covariance @ along[..., None])[..., 0]
+        self.squares = statistics.squares - (along * self.mean).sum(axis=1)
+        values = self.base - 0.5 * self.log_det + log_likelihood(self.squares, self.freedom)
+        signs = np.concatenate([unit.signs for unit in units])
+        self.sign_factors = np.zeros((len(units), len(base)))
+        for number in np.flatnonzero([unit.signs.any() for unit in units]):
+            mine = slice(self.starts[number], self.starts[number + 1])
+            variance = np.diagonal(self.covariance[:, mine, mine], axis1=1, axis2=2)
+            self.sign_factors[number] = _log_sign_factor(self.mean[:, mine], variance, signs[mine], self.squares, self.freedom)
+        self.by_pose_error = values + self.sign_factors.sum(axis=0)
+        self.log_density = float(log_sum_exp(self.by_pose_error) + self.log_weights.sum())
+
+    def profiles(self):
+        """Log density over the sizes of each unit, the others as they are, for size zero first; list of ndarray (1 + S,)."""
+        found = [None] * len(self.units)
+        widths = np.diff(self.starts)
+        for width in np.unique(widths):
+            numbers = np.flatnonzero(widths == width)
+            mine = self.starts[numbers][:, None] + np.arange(width)
+            precision = np.linalg.inv(self.covariance[:, mine[:, :, None], mine[:, None, :]])
+            mean = self.mean[:, mine]
+            scales = self.scales[numbers][:, None]
+            along = (precision @ mean[..., None])[..., 0] / scales
+            squares = self.squares[:, None] + (mean * along).sum(axis=-1) * scales[:, 0]
+            log_det = self.log_det[:, None] - np.linalg.slogdet(precision)[1]
+            values, vectors = np.linalg.eigh((precision - np.eye(width)) / scales[..., None] ** 2)
+            turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0]
+            for place, number in enumerate(numbers):
+                seen = np.clip(values[:, place], 0.0, None), vectors[:, place], turned[:, place]
+                found[number] = self._profile(number, *seen, squares[:, place], log_det[:, place])
+        return found
+
+    def _profile(self, number, values, vectors, turned, squares, log_det):
+        unit, grid = self.units[number], self.grids[number]
+        variances = np.concatenate([[0.0], grid.scales**2])[:, None, None]
+        widened = 1.0 + variances * values
+        left = squares - (variances * turned**2 / widened).sum(axis=-1)
+        density = self.base - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
+        density = density + self.sign_factors.sum(axis=0) - self.sign_factors[number]
+        if unit.signs.any():
+            mean = (vectors @ (variances * turned / widened)[..., None])[1:, ..., 0]
+            variance = (vectors**2 @ (variances / widened)[..., None])[1:, ..., 0]
+            density[1:] += _log_sign_factor(mean, variance, unit.signs, left[1:], self.freedom)
+        log_weights = np.concatenate([[0.0], grid.log_weights]) + self.log_weights.sum() - self.log_weights[number]
+        return log_sum_exp(density, axis=1) + log_weights
+
+
+def _log_sign_factor(mean, variance, signs, squares, freedom):
+    """Half-normal priors where physics gives the sign: ln 2 Phi(mean / std) of each such coefficient, summed."""
     signed = np.flatnonzero(signs)
-    inverse = np.linalg.inv(factor[..., :-1, :-1])
-    mean = (factor[..., -1:, :-1] @ inverse)[..., 0, signed]
-    variance = (inverse[..., signed] ** 2).sum(axis=-2)
     sigma = np.sqrt(np.maximum(squares / freedom, 1.0))[..., None]
-    return (np.log(2.0) + log_ndtr(signs[signed] * mean / (np.sqrt(variance) * sigma))).sum(axis=-1)
+    ratio = signs[signed] * mean[..., signed] / (np.sqrt(variance[..., signed]) * sigma)
+    return (np.log(2.0) + log_ndtr(ratio)).sum(axis=-1)

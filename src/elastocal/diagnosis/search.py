@@ -10,6 +10,7 @@ References
 """
 
 from dataclasses import dataclass
+from heapq import nlargest
 
 import numpy as np
 
@@ -28,6 +29,8 @@ from elastocal.diagnosis.hypotheses import OTHER
 
 # Models below the best by more than this, in log odds, hold nothing.
 _NEGLIGIBLE = 9.0
+# A round that raises the best by less than this brings nothing.
+_BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
 _UNLIKELY, _TELLING_UNITS = -9.0, 10
 
@@ -155,7 +158,7 @@ class _Searcher:
         self.grids = [problem.grid(number) for number in range(len(problem.units))]
         self.free_grid = problem.grid()
         self.empty = self.evaluated((), np.ones(len(problem.base)))
-        self.met, self.sizes, self.extended = {(): 0.0}, {(): self.empty.scales}, set()
+        self.met, self.sizes, self.measured, self.extended = {(): 0.0}, {(): self.empty.scales}, {}, set()
         self.extend(())
 
     def evaluated(self, model, start):
@@ -207,15 +210,22 @@ class _Searcher:
         self.empty = self.evaluated((), self.empty.scales)
 
     def measure(self, model):
-        """Meet a model as it is, in full."""
+        """Meet a model as it is, in full, and what it would be without each of its units."""
         start = self.sizes.get(model)
         if start is None:
             start = np.concatenate([self.empty.scales, np.full(len(model), self.problem.settings.scale_center)])
         found = self.evaluated(model, start)
-        odds = found.log_evidence - self.empty.log_evidence
-        odds += self.problem.prior.log_odds_of(self.problem.units[n] for n in model)
+        units, prior, fixed = self.problem.units, self.problem.prior, len(self.problem.base)
+        odds = found.log_evidence - self.empty.log_evidence + prior.log_odds_of(units[n] for n in model)
         self.met[model], self.sizes[model] = odds, found.scales
-        return Model(model, odds, found.scales, self.pose_error(found))
+        self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
+        for place, _number in enumerate(model):
+            smaller = model[:place] + model[place + 1 :]
+            if smaller not in self.met:
+                left = found.without[fixed + place] - self.empty.log_evidence
+                self.met[smaller] = left + prior.log_odds_of(units[n] for n in smaller)
+                self.sizes[smaller] = np.delete(found.scales, fixed + place)
+        return self.measured[model]
 
     def pose_error(self, found):
         """Most probable size of the pose error, rad."""
@@ -235,42 +245,27 @@ class _Searcher:
                 self.measure(whole)
 
     def grow(self):
-        """Extend and shrink the best models of each size until a size brings nothing more."""
-        settings = self.problem.settings
-        best, size = max(self.met.values()), 1
-        while size < settings.largest_model:
-            same = sorted((m for m in self.met if len(m) == size), key=self.met.get, reverse=True)[: settings.beam]
-            same = [model for model in same if self.met[model] > best - _NEGLIGIBLE]
-            for model in same:
+        """Extend the best models that have not been, in rounds, until rounds bring nothing better."""
+        settings, idle = self.problem.settings, 0
+        while idle < settings.patience:
+            best = max(self.met.values())
+            waiting = [m for m, odds in self.met.items() if m not in self.extended and odds > best - _NEGLIGIBLE]
+            if not waiting:
+                break
+            for model in nlargest(settings.beam, waiting, key=self.met.get):
+                if model not in self.measured:
+                    self.measure(model)
                 self.extend(model)
-            self.shrink(same)
-            best, before = max(self.met.values()), best
-            size += 1
-            larger = [odds for model, odds in self.met.items() if len(model) == size]
-            if not larger or max(larger) < best - _NEGLIGIBLE or (size > 3 and max(larger) < best and best <= before):
-                bigger = [m for m, odds in self.met.items() if len(m) > size and odds > best - _NEGLIGIBLE]
-                if not bigger:
-                    break
-                size = min(len(model) for model in bigger)
-
-    def shrink(self, models):
-        """Meet the better models of some without each of their units."""
-        for model in models[:2]:
-            if len(model) < 3:
-                continue
-            for number in model:
-                smaller = tuple(n for n in model if n != number)
-                if smaller not in self.met:
-                    self.sizes[smaller] = np.delete(self.sizes[model], len(self.problem.base) + model.index(number))
-                    self.measure(smaller)
+            idle = 0 if max(self.met.values()) > best + _BETTER else idle + 1
 
     def weigh(self):
         """Evaluate the best models in full."""
         best = max(self.met.values())
-        order = sorted((m for m in self.met if self.met[m] > best - _NEGLIGIBLE), key=self.met.get, reverse=True)
-        models = [self.measure(model) for model in order[: self.problem.settings.kept_models]]
+        good = [model for model, odds in self.met.items() if odds > best - _NEGLIGIBLE]
+        order = nlargest(self.problem.settings.kept_models, good, key=self.met.get)
+        models = [self.measured.get(model) or self.measure(model) for model in order]
         if () not in order:
-            models.append(self.measure(()))
+            models.append(self.measured[()])
         models.sort(key=lambda model: -model.log_odds)
         odds = np.array([model.log_odds for model in models])
         return Posterior(tuple(models), np.exp(odds - log_sum_exp(odds)))

@@ -18,11 +18,11 @@ class Settings:
 
     alarm_level: float = _setting(
         0.02,
-        "probability of an alarm where nothing is missing, exact by simulation; leaves half of a 4 % budget to imperfect noise models",
+        "probability of an alarm where nothing is missing, exact by simulation; half of a 4 % budget, the rest for noise models",
     )
     alarm_draws: int = _setting(
         499,
-        "draws of the null distribution; (1 + exceedances) / (1 + draws) is an exact Monte Carlo p-value (Davison and Hinkley 1997, 4.2)",
+        "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
         0.03, "prior probability of each mechanism: on average less than one of some 25 is there"
@@ -66,7 +66,8 @@ class Settings:
         100.0,
         "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
     )
-    beam: int = _setting(6, "models of each size whose extensions are tried; more change probabilities by less than 1 %")
+    beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
+    patience: int = _setting(3, "rounds without a better model after which the search ends")
     largest_model: int = _setting(40, "most units of one model; UR10 series use some 30 bands of gear harmonics")
     kept_models: int = _setting(
         60, "models whose evidence is computed in full; the rest holds less than 1 % of the probability"

@@ -2,7 +2,7 @@
 
 Readings y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by the
 noise of the readings. The readings of a pose may have an error in common as well: that of the joints when the pose was taken,
-of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves all readings of a pose), seen through the Jacobian. By the
+of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By the
 matrix inversion lemma
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
@@ -146,7 +146,7 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
         pose_rows[mine] = seen @ rows[members]
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
     white = rows[:, :-1]
-    freedom = max(int(round(len(rows) - (rows[:, :count] ** 2).sum())), 1)
+    freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)
     return Products(count, every.T @ every, pose_rows, pose_gram, joint_rad, white.T @ white, len(rows), freedom)
 
 
