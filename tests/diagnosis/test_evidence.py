@@ -128,6 +128,17 @@ def test_evidence_of_units_that_do_not_overlap_is_exact():
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(sum(singles), abs=1e-6)
 
 
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_evidence_without_each_unit_is_that_of_the_smaller_model(signal):
+    """Exact where nothing else is in the model; to 0.1 nats where the sizes of others stay as they were."""
+    rows = quiet(3, SIGNALS[signal])
+    (alone,) = evaluated(rows, UNITS[:1]).without
+    assert alone == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
+    found = evaluated(rows, UNITS).without
+    smaller = [evaluated(rows, UNITS[:n] + UNITS[n + 1 :]).log_evidence for n in range(3)]
+    np.testing.assert_allclose(found, smaller, atol=0.1)
+
+
 def test_weights_of_the_pose_error_are_its_posterior():
     rows = made_rows(5, poses=12).drawn(np.random.default_rng(6), tau=1.8)
     rows = replace(rows, residual=rows.expected + QUIET * (rows.residual - rows.expected))
