@@ -4,38 +4,19 @@ import runpy
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "workflow" / "scripts"
-PARAMS = {"replicates": 200, "seed": 1, "states": 4}
-FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
+PARAMS = {"seed": 1}
 STEPS = (
     ("read_campaign", "", "training held_out descriptions"),
-    ("check_data", "descriptions training", "faults"),
-    ("estimate_noise", "descriptions training", "noise"),
-    ("fit_declared", "descriptions training noise", "declared:parameters correlations"),
     (
-        "trace_effects",
-        "descriptions training faults noise declared",
-        "looks found final:parameters final_correlations:correlations confounding",
+        "diagnose_campaign",
+        "descriptions training",
+        "diagnosis steps correlations models confounding candidates",
     ),
-    ("weigh_rivals", "descriptions training noise found final:parameters", "rivals doubts experiment"),
-    (
-        "judge_held_out",
-        "descriptions training held_out noise declared looks found final:parameters rivals",
-        "before_after errors residuals",
-    ),
-    (
-        "state_verdict",
-        "descriptions training faults noise declared looks found final:parameters rivals doubts before_after errors",
-        "verdict candidates",
-    ),
-    *((f"draw_{figure}", "descriptions residuals candidates confounding before_after errors", figure) for figure in FIGURES),
-    (
-        "compile_loop_report",
-        "verdict candidates before_after residuals experiment final:parameters descriptions",
-        "report",
-    ),
+    ("judge_campaign", "descriptions training held_out diagnosis steps", "verdict before_after splits residuals"),
+    ("draw_residuals", "descriptions residuals", "residuals_figure"),
+    ("draw_arrows", "descriptions residuals", "arrows_figure"),
 )
-SUFFIXES = dict.fromkeys(("descriptions", "faults", "noise", "doubts", "errors", "verdict"), ".json")
-SUFFIXES |= dict.fromkeys(("experiment", "before_after"), ".csv") | {"report": ".pdf"}
+SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json") | dict.fromkeys(("before_after", "splits"), ".csv")
 
 
 class _Named(dict):
@@ -48,7 +29,7 @@ class _Job:
 
 
 def run_loop(folder, robots, out, steps=STEPS):
-    """Run every step from a campaign's folder to its report; results stand in `out`.
+    """Run every step from a campaign's folder to its verdict and figures; results stand in `out`.
 
     Parameters
     ----------
@@ -57,7 +38,7 @@ def run_loop(folder, robots, out, steps=STEPS):
     Returns
     -------
     Path
-        `out`, with ``verdict.json`` and ``report.pdf``.
+        `out`, with ``verdict.json``.
     """
     out.mkdir(parents=True, exist_ok=True)
 
@@ -75,8 +56,6 @@ def run_loop(folder, robots, out, steps=STEPS):
         )
         if script.startswith("draw_"):
             job.output = _Named({kind: (out / f"{outputs}.{kind}").as_posix() for kind in ("pdf", "png")})
-        if script == "compile_loop_report":
-            job.input["figures"] = [(out / f"{figure}.pdf").as_posix() for figure in FIGURES]
         run_script(script, job)
     return out
 

@@ -34,15 +34,16 @@ def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeat
         approach=rng.choice([-1.0, 1.0], (count, joints)),
         time_s=np.sort(rng.uniform(0, 4 * 3600, count)),
         temperature_c=20 + np.sort(rng.uniform(0, 10, count)),
+        row=1 + np.arange(count),
     )
 
 
 def equipped(holder):
-    """Sites of a robot, or of a chain, with a compensator beside its shoulder so that no effect is out of place there."""
+    """Sites of a robot or a chain with a compensator beside its shoulder and a known gear: no effect is out of place there."""
     sites = sites_of(holder)
     if sites.compensator is None and sites.shoulder is not None:
         sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
-    return sites
+    return sites if sites.gear_ratio else replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
 
 
 def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):

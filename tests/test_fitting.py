@@ -400,17 +400,17 @@ def robust_objective(found):
 @pytest.mark.parametrize(("seed", "lag"), [(1, 900.0), (3, 450.0), (5, 900.0), (13, 3000.0)])
 def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, lag, monkeypatch):
     model, seen = bent(fanuc, seed, lag)
-    found = fit(model, seen, NOISE, discrepancy_m=0.0)
+    found = fit(model, seen, NOISE)
     assert found.converged
     monkeypatch.setattr("elastocal.fitting._HALVINGS", 0)
-    whole = fit(model, seen, NOISE, discrepancy_m=0.0)
+    whole = fit(model, seen, NOISE)
     assert not whole.converged
     assert robust_objective(found) < robust_objective(whole) - 0.01
 
 
 def test_fit_that_converged_is_at_a_minimum_of_its_objective(fanuc):
     model, seen = bent(fanuc, 3, 450.0)
-    found = fit(model, seen, NOISE, discrepancy_m=0.0)
+    found = fit(model, seen, NOISE)
     deviation = np.sqrt(np.diag(found.covariance))
     for number, size in enumerate(deviation):
         for sign in (-0.1, 0.1):
@@ -422,13 +422,13 @@ def test_fit_that_converged_is_at_a_minimum_of_its_objective(fanuc):
 @pytest.mark.parametrize(("seed", "lag", "end"), [(4, 8000.0, 36000.0), (8, 900.0, 300.0)])
 def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end):
     model, seen = bent(fanuc, seed, lag)
-    found = fit(model, seen, NOISE, discrepancy_m=0.0)
+    found = fit(model, seen, NOISE)
     assert found.converged and found.estimate.shapes[0][0] == end
     # The others are where they are best given that end: held there they do not move.
     frozen = replace(model.effects[0], shapes=(), displacement=lambda around: model.effects[0].displacement(around, end))
     without = replace(model, effects=(frozen,))
     start = replace(found.estimate, shapes=(np.zeros(0),))
-    again = fit(without, seen, NOISE, start, discrepancy_m=0.0)
+    again = fit(without, seen, NOISE, start)
     deviation = np.sqrt(again.covariance[-1, -1])
     assert abs(again.estimate.coefficients[0][0] - found.estimate.coefficients[0][0]) < 2e-3 * deviation
 
@@ -436,7 +436,7 @@ def test_fit_converges_at_the_end_of_the_range_of_a_shape(fanuc, seed, lag, end)
 def test_fit_says_when_it_ran_out_of_steps(fanuc, monkeypatch):
     model, seen = bent(fanuc, 3, 450.0)
     monkeypatch.setattr("elastocal.fitting._STEPS", 3)
-    assert not fit(model, seen, NOISE, discrepancy_m=0.0).converged
+    assert not fit(model, seen, NOISE).converged
 
 
 def test_ordinary_fits_converge(fanuc):

@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
-from support import OTHER_CHAINS, PinocchioPoint, chain_of, homogeneous, random_angles
+from support import (
+    ODD_CHAINS,
+    OTHER_CHAINS,
+    PARALLELOGRAM,
+    TRACK,
+    PinocchioPoint,
+    chain_of,
+    homogeneous,
+    random_angles,
+)
 
 from elastocal import kinematics
 from elastocal.kinematics import (
@@ -325,3 +334,50 @@ def test_coordinates_that_nothing_moves_change_no_digit(kuka_extended):
         strict=True,
     ):
         np.testing.assert_allclose(still, walked, rtol=0, atol=1e-15)
+
+
+def test_robot_on_a_track_is_where_trigonometry_puts_it():
+    chain = chain_of(TRACK)
+    q = np.random.default_rng(33).uniform(-2, 2, (6, 4))
+    reach = 0.3 + 0.7 * np.cos(q[:, 2]) + 0.6 * np.cos(q[:, 2] + q[:, 3])
+    height = 0.8 - 0.7 * np.sin(q[:, 2]) - 0.6 * np.sin(q[:, 2] + q[:, 3])
+    expected = np.stack([-q[:, 0] + reach * np.cos(q[:, 1]), reach * np.sin(q[:, 1]), height], axis=1)
+    position, _, jacobian = poses_and_jacobians(chain, q, chain.end_effector)
+    np.testing.assert_allclose(position, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(jacobian[:, :, 0], np.broadcast_to([-1.0, 0, 0, 0, 0, 0], (6, 6)), rtol=0, atol=ROUNDING)
+    assert_agrees_with_pinocchio(chain, chain.end_effector, q)
+
+
+def test_parallelogram_keeps_the_forearm_from_turning_with_the_upper_arm():
+    chain = chain_of(PARALLELOGRAM)
+    q = np.random.default_rng(34).uniform(-1.5, 1.5, (6, 4))
+    q[:, 3] = 0.0
+    # The forearm's angle to the horizontal is q3, whatever q2 is, and the hand stays level.
+    reach = 0.3 + 0.8 * np.sin(q[:, 1]) + 0.9 * np.cos(q[:, 2]) + 0.1
+    height = 0.5 + 0.8 * np.cos(q[:, 1]) - 0.9 * np.sin(q[:, 2]) - 0.1
+    expected = np.stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), height], axis=1)
+    position, rotation = poses(chain, q, chain.end_effector)
+    np.testing.assert_allclose(position, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(rotation[:, 2], np.broadcast_to([0.0, 0.0, 1.0], (6, 3)), rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", ODD_CHAINS)
+def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central_differences(name):
+    chain = chain_of(ODD_CHAINS[name])
+    q = np.random.default_rng(35).uniform(-1.5, 1.5, (5, chain.coordinates))
+    points = list(chain.points)
+    many = poses_and_jacobians_of_points(chain, q, points)[2]
+    moved = motion(chain, q, points)
+    for number, point in enumerate(points):
+        jacobian = poses_and_jacobians(chain, q, point)[2]
+        for coordinate in range(chain.coordinates):
+            step = 1e-6 * np.eye(chain.coordinates)[coordinate]
+            slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
+            np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(many[number], jacobian, rtol=0, atol=ROUNDING)
+        found = moved.jacobian(point.after, moved.position[number])
+        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
+        wrench = np.random.default_rng(36).standard_normal((5, 6))
+        moment = wrench[:, 3:] + np.cross(moved.position[number].T, wrench[:, :3])
+        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T).T
+        np.testing.assert_allclose(forces, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)

@@ -1,14 +1,13 @@
 """The composite model: predictions by hand-made chains, sensitivities by central differences of its own exact residuals."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, chain_of, random_angles
-from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
+from synthetic import made_estimate, made_model, made_readings, made_states, seen_exactly, slopes, small_steps, with_noise
 
 from elastocal.campaign import Campaign, Target
 from elastocal.effects.catalogue import candidates_on
@@ -26,6 +25,7 @@ from elastocal.model import (
     residuals,
     stepped,
 )
+from elastocal.robot import Mass
 
 TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2)), Target("C", "6DoF", None)
 
@@ -222,16 +222,26 @@ def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
 @pytest.mark.parametrize(("frame", "fitted"), [("tracker", True), ("base", False)])
 @pytest.mark.parametrize("compliance", ["nominal", "identify"])
 def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fitted, compliance):
-    campaign = Campaign(
-        "c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, SimpleNamespace(time_s=np.array([7.0, 5.0]))
-    )
+    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
+    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    readings = replace(readings, time_s=np.array([7.0, 5.0]), row=np.array([4, 9]))
+    campaign = Campaign("c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, readings)
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
     model = declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TARGETS)
     assert model.identifies_compliance == (compliance == "identify")
     assert [effect.key for effect in model.effects][-1] == "joint_offset@2"
     np.testing.assert_array_equal(model.nominal_compliance, fanuc.compliance)
-    assert model.time_zero_s == 5.0
+    assert model.time_zero_s == 5.0 and model.row_span == (4, 9)
+
+
+def test_declared_model_weighs_what_the_robot_file_weighs(fanuc):
+    bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
+    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    robot = replace(fanuc, masses=(Mass(2, 100.0, (0.5, 0.0, 0.0), 0.1),), gravity_m_s2=(0.0, 0.0, 9.0), gear_ratio=(None,) * 6)
+    model = declared_model(Campaign("c", robot, "position", "base", TARGETS, "identify", (), None, {}, readings))
+    assert [effect.key for effect in model.effects] == ["joint_compliance", "declared_weight"]
+    assert model.sites.masses == robot.masses and model.sites.gravity_m_s2 == (0.0, 0.0, 9.0)
 
 
 def test_coordinate_jacobian_is_that_of_each_target(case):

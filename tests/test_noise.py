@@ -191,3 +191,15 @@ def test_derivatives_of_the_likelihood_agree_with_differences(fanuc, rows, monke
     slope = seen["function"](at, *seen["data"])[1]
     error = check_grad(lambda x: seen["function"](x, *seen["data"])[0], lambda x: seen["function"](x, *seen["data"])[1], at)
     assert error < 1e-4 * np.linalg.norm(slope)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_repeats_that_do_not_differ_say_nothing(fanuc, rows):
+    """A sensor that stands still has no noise to be found; what is declared is used."""
+    model, estimate, readings = drawn(fanuc, 1, rows=rows)
+    still = replace(readings, position=np.ones_like(readings.position))
+    if rows == 6:
+        still = replace(still, rotation_vector=np.zeros_like(still.rotation_vector))
+    assert noise_from_repeats(model, estimate, still) is None
+    taken, warnings = taken_noise(campaign(fanuc, position_m=5e-5), model, estimate, still)
+    assert taken.source == "declared" and warnings == []

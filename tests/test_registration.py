@@ -1,5 +1,7 @@
 """Registration: frames and targets from nothing but readings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, chain_of
@@ -108,3 +110,18 @@ def test_effects_start_at_zero_and_compliances_at_their_nominal_values(fanuc):
     np.testing.assert_array_equal(found.coefficients[0], fanuc.compliance)
     assert [values.tolist() for values in found.coefficients[1:]] == [[0.0], [0.0]]
     assert [values.tolist() for values in found.shapes] == [[], [], [effects[1].shapes[0].start]]
+
+
+def test_a_target_without_a_reading_stays_where_it_was(fanuc):
+    """All of its readings may be held out."""
+    model = made_model(fanuc.chain, TWO, 6)
+    states = unloaded(made_states(6, 40, seed=1))
+    true = made_estimate(model, seed=2)
+    seen = seen_exactly(model, true, states)
+    first = seen.target == 0
+    one = replace(
+        seen, state=seen.state[first], target=seen.target[first], position=seen.position[first], rotation=seen.rotation[first]
+    )
+    found = registered(model, one)
+    np.testing.assert_allclose(found.target_offset[0], true.target_offset[0], rtol=0, atol=KNOWN_M)
+    np.testing.assert_array_equal(found.target_offset[1], 0.0)

@@ -117,12 +117,14 @@ def test_blanks_and_line_breaks_separate_tokens_alike():
         ("Tz(l1) Rz(q1) Tx() [A]", ["'Tx()'"]),
         ("Tz(l1) Rz(q1) Tx(l2) []", ["'[]'"]),
         ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
-        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2 or degrees"]),
-        ("Tz(l1) Rz(q1) Tx(l2) Ry(q1) [A]", ["'Ry(q1)'", "q2 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2, a joint before it or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(q1) Tx(l2) [A]", ["'Tx(q1)'", "R.() or in T.() alone"]),
+        ("Tz(l1) Tx(q1) Rz(q1) Tx(l2) [A]", ["'Rz(q1)'", "R.() or in T.() alone"]),
+        ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(90) [A]", ["'Ry(90)'", "90deg"]),
         ("Tz(l1) Rz(q1) Tx(l2) Ry(l2) [A]", ["'Ry(l2)'"]),
         ("Tz(l1) Rz(q1) Tx(l9) [A]", ["'Tx(l9)'", "l1, l2 or metres"]),
-        ("Tz(l1) Rz(q1) Tx(q2) [A]", ["'Tx(q2)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(q3) [A]", ["'Tx(q3)'", "q2, a joint before it or l1, l2 or metres"]),
         ("Tz(l1) Rz(q1) Tx(5deg) [A]", ["'Tx(5deg)'", "l1, l2 or metres"]),
         ("Tz(l1) Rz(q1) Tx(1,5) [A]", ["'Tx(1,5)'"]),
         ("Tz(l1) Rz(q1) [A] Tx(l2) [A]", ["[A] twice", "once"]),
@@ -178,6 +180,12 @@ def test_reported_angles_are_converted_both_ways():
         ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),
         ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
         ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
+        (
+            {"lengths_m": {"l1": 500, "l2": 250, "l3": 1500}},
+            "lengths_m",
+            ["reaches 2250 m", "in metres (not millimetres)", "10 m"],
+        ),
+        ({"chain": "Tz(0.5) Rz(q1) Tx(-9) Ry(q2) Tx(0.6) [B]", "lengths_m": None}, "chain", ["reaches 10.1 m", "metres"]),
         ({"links": TUBES | {"tubes": TUBES["tubes"] * 2}}, "links.tubes", ["2 tubes", "each of the 3"]),
         ({"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}}, "links.tubes", ["0.101", "half"]),
     ],
@@ -311,3 +319,44 @@ def test_weights_that_do_not_suit_the_robot_are_refused(changes, key, words):
 def test_schema_refuses_weights_that_cannot_be(changes, key):
     with refused("robots/two.yaml", key):
         check_document(document(**changes), "robot", "robots/two.yaml")
+
+
+TRACKED = {
+    "name": "on a track",
+    "chain": "Tx(q1) Tz(0.5) Rz(q2) Tx(1) Ry(q3) Tx(1) Ry(-q3) [hand]",
+    "joint_limits_deg": [[-0.5, 4.0], [-180, 180], [-90, 90]],
+    "compliance_urad_per_Nm": [0.02, 1.0, 2.0],
+    "reported_joints": {"matrix": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_deg": [2.5, 0, 90]},
+}
+
+
+def test_prismatic_joints_are_in_metres_and_newtons():
+    robot = robot_from_document(TRACKED)
+    assert robot.chain.prismatic == (True, False, False) and robot.joints == 3
+    np.testing.assert_allclose(robot.joint_limits, [[-0.5, 4.0], [-np.pi, np.pi], [-np.pi / 2, np.pi / 2]], rtol=1e-15)
+    np.testing.assert_allclose(robot.reported_offset, [2.5, 0.0, np.pi / 2], rtol=1e-15)
+    np.testing.assert_allclose(robot.compliance, [2e-8, 1e-6, 2e-6], rtol=1e-15)
+
+
+def test_joint_in_two_places_is_one_coordinate_and_passive_in_the_second():
+    chain = robot_from_document(TRACKED).chain
+    assert [t.coordinate for t in chain.transforms if t.coordinate is not None] == [0, 1, 2, 2]
+    assert [place for place in range(len(chain.transforms)) if chain.is_passive(place)] == [6]
+    assert chain.moved_by(chain.end_effector) == (0, 1, 2)
+
+
+def test_robot_on_a_track_becomes_a_document_that_gives_it_back():
+    robot = robot_from_document(TRACKED)
+    again = robot_from_document(document_of(robot))
+    assert again.chain == robot.chain
+    for name in ("joint_limits", "reported_offset", "compliance", "reported_matrix"):
+        np.testing.assert_allclose(getattr(again, name), getattr(robot, name), rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("chain", "what"),
+    [("Tx(q1) Tz(0.5) Rz(q2) Tx(1) [B]", "prismatic joints"), ("Rz(q1) Tx(1) Ry(q2) Tx(1) Ry(-q2) [B]", "passive joints")],
+)
+def test_tubes_are_refused_where_links_change_their_length_or_turn_by_themselves(chain, what):
+    with refused("robots/x.yaml", "links", what):
+        robot_from_document(document(chain=chain, lengths_m=None, links=TUBES), "robots/x.yaml")

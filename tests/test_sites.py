@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
-from support import OTHER_CHAINS, PinocchioPoint, chain_of, homogeneous, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, PinocchioPoint, chain_of, homogeneous, random_angles
 
 from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
 from elastocal.sites import sites_of
@@ -193,4 +193,24 @@ def test_lever_of_weight_is_the_gravity_torque_of_pinocchio(chain):
             found = sites.lever_of_weight(angles, joint, link)
             held = [pin.computeGeneralizedGravity(one.model, data, q[one.order]) for q in angles]
             expected = [-h[one.order.index(joint)] if joint in one.order else 0.0 for h in held]
+            np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
+
+
+def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
+    sites = sites_of(chain_of(TRACK))
+    assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
+    np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)
+    sites = sites_of(chain_of(PARALLELOGRAM))
+    assert (sites.joints, len(sites.tilt), len(sites.link_end)) == (4, 4, 5)
+    # A link ends where a passive joint turns.
+    np.testing.assert_allclose(sites.link_vectors_m[2:4], [(0, 0, 0.8), (0.9, 0, 0)], atol=1e-16)
+
+
+@pytest.mark.parametrize("name", ODD_CHAINS)
+def test_sites_leave_odd_robots_as_they_were(name):
+    chain = chain_of(ODD_CHAINS[name])
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(7), chain, 5)
+    coordinates = np.concatenate([angles, np.zeros((5, sites.chain.coordinates - sites.joints))], axis=1)
+    for point, own in zip(sites.chain.points, chain.points, strict=True):
+        for found, expected in zip(poses(sites.chain, coordinates, point), poses(chain, angles, own), strict=True):
             np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)

@@ -2,11 +2,35 @@
 
 import numpy as np
 
+from elastocal.faults.placement import IMPLAUSIBLE_M
+from elastocal.model import joint_compliances
+
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's.
 MOST_OFF_NOMINAL = 5.0
 # So many standard errors beyond what robots have are no chance.
 _SURE = 2.0
+
+
+def fitted_compliance_warnings(fitted):
+    """`compliance_warnings` of a fit.
+
+    Parameters
+    ----------
+    fitted : Fit
+
+    Returns
+    -------
+    list of str
+        None where compliances are not identified, nor where readings are wrong by centimetres: they mean nothing there.
+    """
+    model = fitted.model
+    off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())
+    if not model.identifies_compliance or off > IMPLAUSIBLE_M:
+        return []
+    mine = [owner == "joint_compliance" for owner, _ in fitted.parameters]
+    deviations = np.sqrt(np.diag(fitted.covariance))[mine]
+    return compliance_warnings(joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance)
 
 
 def compliance_warnings(compliance, std_error, nominal):

@@ -49,6 +49,8 @@ class Model:
         Joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
     time_zero_s : float
         From which effects count the time: the first reading to be fitted.
+    row_span : (int, int) or None
+        First and last row of the readings to be fitted, between which the campaign made its progress.
     """
 
     sites: Sites
@@ -58,6 +60,7 @@ class Model:
     nominal_compliance: np.ndarray
     effects: tuple = ()
     time_zero_s: float = 0.0
+    row_span: tuple | None = None
 
     @property
     def identifies_compliance(self):
@@ -149,6 +152,7 @@ def declared_model(campaign, effects=()):
         campaign.robot.compliance,
         (*springs, *weight, *effects),
         0.0 if campaign.readings.time_s is None else float(campaign.readings.time_s.min()),
+        (int(campaign.readings.row.min()), int(campaign.readings.row.max())) if len(campaign.readings) else None,
     )
 
 
@@ -167,7 +171,7 @@ def circumstances(model, estimate, states):
     Circumstances
     """
     compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections)
+    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span)
     for _ in range(_PASSES):
         around = at_coordinates(around, displaced_coordinates(model, estimate, around))
     return around

@@ -25,6 +25,8 @@ class States:
     approach : ndarray (S, n) or None
         Sense in which each joint was approached, -1, 0, +1.
     time_s, temperature_c : ndarray (S,) or None
+    row : ndarray (S,) or None
+        First row of the file that belongs to the state.
     """
 
     session: np.ndarray
@@ -36,6 +38,7 @@ class States:
     approach: np.ndarray | None = None
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
+    row: np.ndarray | None = None
 
     def __len__(self):
         return len(self.pose)
@@ -173,6 +176,8 @@ def _observations(readings, key):
 
     repeats = np.full(len(first), len(readings))
     np.minimum.at(repeats, pairs[:, 0], np.bincount(pair_of))
+    first_row = readings.row[first].copy()
+    np.minimum.at(first_row, state_of, readings.row)
     states = States(
         session=readings.session[first],
         pose=readings.pose[first],
@@ -183,6 +188,7 @@ def _observations(readings, key):
         approach=None if readings.approach is None else readings.approach[first],
         time_s=of_states(readings.time_s),
         temperature_c=of_states(readings.temperature_c),
+        row=first_row,
     )
     rotation = None
     if readings.rotation_vector is not None:

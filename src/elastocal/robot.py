@@ -6,7 +6,9 @@ The chain notation is the paper's matrix product written in a line (equations 1-
 
 ``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a
 length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign;
-``[NAME]`` marks a measuring point.
+``[NAME]`` marks a measuring point. ``T.(q3)`` is a prismatic joint: its coordinate is in metres, and so are its limits and its
+offset; its compliance is in µm/N. A joint that stands in several places, such as ``Ry(q2) Tz(l) Ry(-q2)``, moves all of them:
+what a parallelogram or another coupling does. It is where it stands first; behind a later place a passive joint turns.
 
 A robot file may say what the links weigh::
 
@@ -119,9 +121,20 @@ class Chain:
         raise KeyError(f"measuring point {name!r}; the chain has {', '.join(p.name for p in self.points)}")
 
     def moved_by(self, point):
-        """Indices of the coordinates before `point`: those that can move it."""
+        """Indices of the coordinates before `point`, each once: those that can move it."""
         transforms = self.transforms[: point.after]
-        return tuple(t.coordinate for t in transforms if t.coordinate is not None)
+        return tuple(dict.fromkeys(t.coordinate for t in transforms if t.coordinate is not None))
+
+    @property
+    def prismatic(self):
+        """Whether each coordinate is a shift and not a turn, tuple of bool."""
+        kinds = {t.coordinate: t.kind == "T" for t in self.transforms if t.coordinate is not None}
+        return tuple(kinds.get(coordinate, False) for coordinate in range(self.coordinates))
+
+    def is_passive(self, place):
+        """Whether the transform at a place is moved by a coordinate that moves one before it as well."""
+        coordinate = self.transforms[place].coordinate
+        return coordinate is not None and any(t.coordinate == coordinate for t in self.transforms[:place])
 
 
 @dataclass(frozen=True)
@@ -205,9 +218,9 @@ class Robot:
     name : str
     chain : Chain
     compliance : ndarray (n,)
-        Joint compliances, rad/(N m).
+        Joint compliances, rad/(N m); of prismatic joints m/N.
     joint_limits : ndarray (n, 2)
-        rad.
+        rad; of prismatic joints m.
     links : tuple of Link
         Elastic links of the extended model; empty for the reduced model.
     reported_matrix, reported_offset : ndarray (n, n), (n,)
@@ -289,10 +302,10 @@ def parse_chain(text, lengths_m, source):
     Raises
     ------
     InputError
-        A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, no measuring point,
-        a measuring point named twice.
+        A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in
+        one place and shifts in another, no measuring point, a measuring point named twice.
     """
-    transforms, points, joints, used = [], [], 0, set()
+    transforms, points, used, kinds = [], [], set(), {}
     for word in text.split():
         token = _TOKEN.fullmatch(word)
         if not token:
@@ -311,19 +324,21 @@ def parse_chain(text, lengths_m, source):
         elif _NUMBER.fullmatch(number) and (kind == "T" or argument.endswith("deg")):
             value = float(number)
             transforms.append(Transform(kind, axis, sign * (value if kind == "T" else math.radians(value))))
-        elif kind == "R" and argument == f"q{joints + 1}":
-            transforms.append(Transform(kind, axis, 0.0, joints, sign))
-            joints += 1
+        elif argument == f"q{len(kinds) + 1}" or argument in kinds:
+            if kinds.setdefault(argument, kind) != kind:
+                raise InputError(source, "chain", repr(word), f"{argument} in R.() or in T.() alone")
+            transforms.append(Transform(kind, axis, 0.0, int(argument[1:]) - 1, sign))
         else:
-            allowed = f"q{joints + 1} or degrees such as 90deg" if kind == "R" else f"{', '.join(lengths_m)} or metres"
+            others = "degrees such as 90deg" if kind == "R" else f"{', '.join(lengths_m)} or metres"
+            allowed = f"q{len(kinds) + 1}{', a joint before it' if kinds else ''} or {others}"
             raise InputError(source, "chain", repr(word), f"in {kind}{token['axis']}(): {allowed}")
-    if not joints:
-        raise InputError(source, "chain", "no joint", "at least one R.(q1)")
+    if not kinds:
+        raise InputError(source, "chain", "no joint", "at least one R.(q1) or T.(q1)")
     if not points or points[-1].after != len(transforms):
         raise InputError(source, "chain", f"{text.split()[-1]!r} at its end", "a measuring point such as [6DoF] at the end")
     if unused := sorted(set(lengths_m) - used):
         raise InputError(source, "lengths_m", ", ".join(unused), "lengths that the chain uses")
-    return Chain(tuple(transforms), tuple(points), joints)
+    return Chain(tuple(transforms), tuple(points), len(kinds))
 
 
 def with_target_offset(holder, offset_m):
@@ -360,33 +375,39 @@ def stretches(chain):
     return tuple(found)
 
 
-def joint_limits(limits_deg, joints, source):
-    """Joint limits in rad.
+def joint_limits(limits_deg, chain, source):
+    """Joint limits in rad, of prismatic joints in m.
 
     Parameters
     ----------
     limits_deg : sequence of (float, float)
-        Lower and upper limit of each joint.
-    joints : int
-        How many there must be.
+        Lower and upper limit of each joint; of prismatic ones in metres.
+    chain : Chain
+        Whose joints they are.
     source : str
         Named in errors.
 
     Returns
     -------
-    ndarray (joints, 2)
+    ndarray (n, 2)
 
     Raises
     ------
     InputError
         Where there are too few or too many, or a lower limit is not below the upper one.
     """
+    joints = chain.coordinates
     if len(limits_deg) != joints:
         raise InputError(source, "joint_limits_deg", f"{len(limits_deg)} entries", f"one for each of the {joints} joints")
     for joint, (low, high) in enumerate(limits_deg):
         if low >= high:
             raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
-    return np.radians(np.array(limits_deg, float))
+    return np.array(limits_deg, float) * _per_degree(chain)[:, None]
+
+
+def _per_degree(chain):
+    """What one degree, or of prismatic joints one metre, of a robot file is in SI units, ndarray (n,)."""
+    return np.where(chain.prismatic, 1.0, math.radians(1.0))
 
 
 def robot_from_document(document, source="robot"):
@@ -424,10 +445,10 @@ def robot_from_document(document, source="robot"):
         name=document["name"],
         chain=chain,
         compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
-        joint_limits=joint_limits(document["joint_limits_deg"], n, source),
+        joint_limits=joint_limits(document["joint_limits_deg"], chain, source),
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
-        reported_offset=np.radians(np.array(offset, float)),
+        reported_offset=np.array(offset, float) * _per_degree(chain),
         masses=_masses(document.get("masses", ()), n, source),
         gravity_m_s2=_gravity(document.get("gravity_m_s2", STANDING), source),
         gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
@@ -452,11 +473,11 @@ def document_of(robot):
     document = {
         "name": robot.name,
         "chain": notation(robot.chain),
-        "joint_limits_deg": np.degrees(robot.joint_limits).tolist(),
+        "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
         "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
     }
     if (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
-        offset = np.degrees(robot.reported_offset).tolist()
+        offset = (robot.reported_offset / _per_degree(robot.chain)).tolist()
         document["reported_joints"] = {"matrix": robot.reported_matrix.tolist(), "offset_deg": offset}
     if robot.masses:
         document["masses"] = [vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses]
@@ -550,8 +571,13 @@ def _check_reach(chain, key, source):
 def _links(chain, described, source):
     if described is None:
         return ()
-    if any(t.kind == "R" and t.coordinate is None for t in chain.transforms):
-        raise InputError(source, "links", "a chain with fixed rotations", "links on chains that turn at their joints only")
+    odd = {
+        "fixed rotations": any(t.kind == "R" and t.coordinate is None for t in chain.transforms),
+        "prismatic joints": any(chain.prismatic),
+        "passive joints": any(chain.is_passive(place) for place in range(len(chain.transforms))),
+    }
+    for what in (what for what, there in odd.items() if there):
+        raise InputError(source, "links", f"a chain with {what}", "links on chains that turn at their joints only")
     rigid = stretches(chain)
     tubes = described["tubes"]
     if len(tubes) not in (1, len(rigid)):

@@ -36,7 +36,14 @@ class Sites:
     joint_axes : tuple of int
         0, 1, 2 for a joint about x, y, z of its frame.
     link_vectors_m : ndarray (n + 1, 3)
-        From the near to the far end of each link, in the frame of its far end.
+        From the near to the far end of each link, in the frame of its far end. A link ends at a passive joint; what lies behind
+        that and before the next joint belongs to no link.
+    link_rotations : ndarray (n + 1, 3, 3)
+        From the frame at the far end of each link to that at its near end: fixed rotations between two joints.
+    joint_signs : tuple of float
+        Sense in which each joint turns about its axis, +1 or -1.
+    prismatic : tuple of bool
+        Which joints shift along their axis instead; theirs are metres and newtons.
     masses : tuple of Mass
         What the links weigh, where the robot file says so.
     gravity_m_s2 : tuple of float
@@ -54,6 +61,9 @@ class Sites:
     link_end: tuple
     joint_axes: tuple
     link_vectors_m: np.ndarray
+    link_rotations: np.ndarray
+    joint_signs: tuple
+    prismatic: tuple
     masses: tuple = ()
     gravity_m_s2: tuple = STANDING
     gear_ratio: tuple | None = None
@@ -195,23 +205,27 @@ def sites_of(holder):
     chain = holder
     springs = _Springs(chain.coordinates)
     base = springs.add("TTTRRR")
-    tilt, link_end, axes, vectors, moved, start = [], [], [], [], {}, 0
+    tilt, link_end, axes, signs, links, moved, start = [], [], [], [], [], {}, 0
     # A point at the end of a link is moved by the link's end; one inside a link is not.
     for index, transform in enumerate((*chain.transforms, None)):
-        if transform is None or transform.coordinate is not None:
+        passive = transform is not None and chain.is_passive(index)
+        if (transform is None or transform.coordinate is not None) and len(link_end) == len(axes):
             link_end.append(springs.add("TTTRRR"))
-            vectors.append(_link_vector(chain.transforms[start:index]))
+            links.append(_link(chain.transforms[start:index]))
         moved[index] = len(springs.transforms)
         if transform is None:
             break
         springs.transforms.append(transform)
-        if transform.coordinate is not None:
+        if transform.coordinate is not None and not passive:
             tilt.append(springs.add("RRR"))
             axes.append(transform.axis)
+            signs.append(transform.sign)
             start = index + 1
     points = tuple(MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points)
     extended = Chain(tuple(springs.transforms), points, springs.count)
-    return Sites(extended, chain.coordinates, base, tuple(tilt), tuple(link_end), tuple(axes), np.array(vectors))
+    vectors, rotations = (np.array(part) for part in zip(*links, strict=True))
+    ways = tuple(axes), vectors, rotations, tuple(signs), chain.prismatic
+    return Sites(extended, chain.coordinates, base, tuple(tilt), tuple(link_end), *ways)
 
 
 class _Springs:
@@ -228,8 +242,8 @@ class _Springs:
         return tuple(range(first, self.count))
 
 
-def _link_vector(fixed):
-    """Vector along fixed transforms, in the frame at their end."""
+def _link(fixed):
+    """Vector along fixed transforms in the frame at their end, and rotation from that frame to the one at their start."""
     end = MeasuringPoint("end", len(fixed))
     position, rotation = poses(Chain(tuple(fixed), (end,), 1), np.zeros((1, 1)), end)
-    return rotation[0].T @ position[0]
+    return rotation[0].T @ position[0], rotation[0]

@@ -64,11 +64,11 @@ def test_the_full_size_has_the_nulls_effects_levels_and_robots_that_the_protocol
             found = sum(c.group == "single" and c.effects == (effect,) and c.levels == (level,) for c in proof)
             assert found == (8 if effect.startswith("compensator") else 16)
     for effect in FOREIGN:
-        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) == 16
+        assert sum(c.group == "outside" and c.effects == (effect,) and c.levels == (200.0,) for c in proof) == 20
     for level in (50.0, 200.0):
         assert sum(c.group == "pair" and c.levels == (level, level) for c in proof) == 200
     for group in ("several_joints", "gear_gravity"):
-        assert sum(c.group == group for c in proof) == 200
+        assert sum(c.group == group for c in proof) >= 200
     assert {case.setting for case in cases if case.group != "sweep"} == set(SETTINGS)
     assert {case.robot for case in cases} == {*PROOF, *TUNED}
 
@@ -215,7 +215,7 @@ def test_centres_off_the_line_lie_beyond_what_is_declared_and_three_kilonewtons_
 
 @pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])
 def test_a_stand_that_is_knocked_moves_all_readings_after_one_row_among_the_training_poses(setting):
-    case = replace(a_case(("outside:moved_setup",), (200.0,), setting=setting), group="moved")
+    case = replace(a_case(("setup_step",), (200.0,), setting=setting), group="moved")
     robot, design = specimen_of(case, ROBOTS), design_of(case)
     bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])
     schedule = schedule_of(robot.arm, design, case.seed)

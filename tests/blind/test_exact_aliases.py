@@ -19,13 +19,16 @@ from elastocal.screening import directions
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE = 1e-6
+# Weight acts on the arm as it is bent: of a non-centrality of 200 a share of this, squared, leaves a thousandth.
+_BENT = 2e-3
 
 
 @pytest.fixture(scope="module", params=["fanuc", "abb"])
 def seen(request, tmp_path_factory):
     """What every candidate makes of the readings of a robot without an effect, off the declared model."""
     folder = tmp_path_factory.mktemp(request.param)
-    made = Case("aliases", "none", request.param, (), (), "usual", 314159)
+    # Of an arm whose file tells no weights: where it does, weights absorb some of what is compared here.
+    made = Case("aliases", "none", request.param, (), (), "weight_compensated", 314159)
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
     descriptions, training, _ = taken_in((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
     case = case_from(descriptions, reading_columns(training))
@@ -60,7 +63,7 @@ def test_the_weight_of_the_upper_arm_turns_joint_2_as_a_compensator_does(seen):
     angle = states.joint_angles[:, 1]
     waves = np.linalg.qr(np.array([np.cos(angle), np.sin(angle)]).T)[0]
     torque = states.weight[2][:, 1]
-    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) < _SINE * np.linalg.norm(torque)
+    assert np.linalg.norm(torque - waves @ (waves.T @ torque)) < _BENT * np.linalg.norm(torque)
     # The weight of the forearm does not.
     torque = states.weight[3][:, 1]
     assert np.linalg.norm(torque - waves @ (waves.T @ torque)) > 0.01 * np.linalg.norm(torque)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import OTHER_CHAINS, chain_of, refused
+from support import ODD_CHAINS, OTHER_CHAINS, chain_of, refused
 from synthetic import (
     circumstances_on,
     displacements,
@@ -28,20 +28,21 @@ from elastocal.model import circumstances, linearize
 
 # The table of the design, without the data family: that is no physics.
 TABLE = {
-    "geometry": "joint_offset, link_geometry",
+    "geometry": "joint_offset, link_geometry, tracker_scale",
     "gravity": "link_weight, payload, compensator_torque",
-    "transmission": "transmission_harmonic, transmission_ratio",
+    "transmission": "transmission_harmonic, transmission_ratio, transmission_order, motor_eccentricity, bearing_runout",
     "elastic": "link_elasticity, joint_tilt, base_compliance, cross_compliance, "
-    "joint_dependent_stiffness, compensator_stiffness",
+    "joint_dependent_stiffness, compensator_stiffness, flange_flexibility",
     "gearbox": "stiffening, lost_motion, hysteresis",
     "load": "force_misalignment, force_bias, application_point, force_scale",
-    "drift": "thermal_growth, frame_drift",
+    "drift": "thermal_growth, temperature_gradient, frame_drift, setup_step",
 }
 FAMILIES = {name: family for family, names in TABLE.items() for name in names.split(", ")}
-CHAINS = ["fanuc", "ur10", "fixed rotations"]
+CAUSES = ("temperature", "time")
+CHAINS = ["fanuc", "ur10", "fixed rotations", *ODD_CHAINS]
 UNITS = {
     *("rad", "m", "N", "kg", "kg m", "1", "rad/rad", "m/m", "1/K", "m/h", "rad/h"),
-    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)", "rad kg m/(N m)"),
+    *("rad/(N m)", "m/N", "rad/(N m)^3", "1/(N m^2)", "rad kg/(N m)", "rad kg m/(N m)", "1/m", "1/(K m)"),
 }
 # What one parameter of plausible size may do to a robot of this size under some kilonewton: more is no small deviation.
 LEAST_M, LARGEST_M = 1e-7, 2e-2
@@ -49,7 +50,7 @@ LEAST_M, LARGEST_M = 1e-7, 2e-2
 
 @pytest.fixture(params=CHAINS)
 def chain(request, fanuc):
-    return fanuc.chain if request.param == "fanuc" else chain_of(OTHER_CHAINS[request.param])
+    return fanuc.chain if request.param == "fanuc" else chain_of((OTHER_CHAINS | ODD_CHAINS)[request.param])
 
 
 def test_names_and_families_are_those_of_the_design():
@@ -89,6 +90,13 @@ def test_keys_are_unique_and_readable(chain):
         ("joint_tilt", "@1 @2 @3 @4 @5 @6"),
         ("base_compliance", " [rocking]"),
         ("transmission_ratio", "@1 @2 @3 @4 @5 @6 @5[from_4] @6[from_4]"),
+        ("motor_eccentricity", "@1"),
+        ("flange_flexibility", " [turns]"),
+        ("bearing_runout", " ".join(f"@{joint}[{way}]" for way in ("radial", "axial", "wobble") for joint in range(1, 7))),
+        (
+            "temperature_gradient",
+            " ".join(f"{link}{cause}]" for link in ("[column_", "@1[", "@2[", "@3[", "@6[", "[along_") for cause in CAUSES),
+        ),
         ("stiffening", "@1 @2 @3 @4 @5 @6 " + " ".join(f"@{joint}[two_slopes]" for joint in range(1, 7))),
         ("lost_motion", "@1 @2 @3 @4 @5 @6"),
         ("hysteresis", "@1 @2 @3 @4 @5 @6"),
@@ -106,6 +114,7 @@ def test_places_on_the_fanuc(fanuc, effect, places):
         ("compensator_torque@2", "compensator_torque@2[first order]", [0, 1]),
         ("base_compliance", "base_compliance[rocking]", [2]),
         ("transmission_ratio@5", "transmission_ratio@5[from 4]", [1]),
+        ("flange_flexibility", "flange_flexibility[turns]", [3, 4, 5]),
         ("link_weight@3[off the line]", "link_weight@3", [0, 1]),
     ],
 )

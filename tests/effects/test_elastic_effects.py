@@ -19,6 +19,7 @@ LINEAR = (
     "cross_compliance",
     "joint_dependent_stiffness",
     "compensator_stiffness",
+    "flange_flexibility",
 )
 
 
@@ -203,9 +204,22 @@ def test_elastic_effects_are_reciprocal(effect, name, fanuc):
             assert np.abs(there).max() > 0
 
 
-@pytest.mark.parametrize("effect", ["link_elasticity", "joint_tilt", "base_compliance"])
+@pytest.mark.parametrize("effect", ["link_elasticity", "joint_tilt", "base_compliance", "flange_flexibility"])
 def test_loads_do_work_on_what_gives_way(effect, fanuc):
     around = circumstances_on(fanuc.chain, made_states(6, 30, seed=9))
     for candidate in candidates_on(around.sites).values():
         if candidate.effect == effect:
             assert ((displacements(candidate, around) * around.load).sum(axis=2) >= 0).all()
+
+
+@pytest.mark.parametrize("name", ["fanuc", "ur10", "fixed rotations"])
+def test_flange_gives_under_the_load_seen_along_its_axes(name, fanuc):
+    chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
+    states = made_states(chain.coordinates, 5, seed=11)
+    around = circumstances_on(chain, states)
+    seen = wrench_at(chain, states, MeasuringPoint("end", chain.end_effector.after))
+    made = displacements(candidate_on(chain, "flange_flexibility"), around)
+    for number, coordinate in enumerate(around.sites.link_end[-1]):
+        expected = np.zeros_like(made[number])
+        expected[:, coordinate] = seen[:, number]
+        np.testing.assert_allclose(made[number], expected, rtol=0, atol=1e-10)

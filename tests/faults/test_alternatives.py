@@ -152,8 +152,8 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
     position = rotation.apply(readings.position) + np.where(session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0])
     (fault,) = find(campaign, replace(readings, session=session, position=position))
     told = {value.name: value.value for value in fault.parameters}
-    assert told["base x in session 0"] == pytest.approx(1.0, abs=1e-3)
-    assert told["base y in session 1"] == pytest.approx(3.0, abs=1e-3)
+    assert told["x of the base in the frame of session 0"] == pytest.approx(1.0, abs=1e-3)
+    assert told["y of the base in the frame of session 1"] == pytest.approx(3.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("joint", [1, 2])

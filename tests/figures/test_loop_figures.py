@@ -258,3 +258,9 @@ def test_where_nothing_can_be_tested_the_figures_say_so():
 def test_a_single_candidate():
     table = candidate_table(count=1)
     assert_nothing_cut_off(scree(table))
+
+
+def test_residuals_of_one_pose_are_a_note():
+    table = residual_table(loaded=False, timed=False)
+    table |= {f"q{joint}": np.full(len(table["pose"]), 0.3) for joint in range(1, 7)}
+    assert any("nothing to draw them against" in text for text in texts(residuals(table)))

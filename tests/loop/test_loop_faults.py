@@ -88,7 +88,7 @@ def check(verdict, name, words):
 def test_a_decisive_fault_ends_in_a_verdict_that_names_it(fault, kuka, config_folder, tmp_path):
     change, settings, name, words = FAULTS[fault]
     folder = folder_of(tmp_path / "made", kuka, change, settings)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
     json.dumps(verdict, allow_nan=False)
     check(verdict, name, words)
 
@@ -99,18 +99,18 @@ def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, config_
     folder = folder_of(tmp_path / "made", kuka, change, settings)
     out = run_loop(folder, config_folder / "robots", tmp_path / "out")
     check(json.loads((out / "verdict.json").read_text(encoding="utf-8")), name, words)
-    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert (out / "residuals_figure.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder, tmp_path):
     """Translation to the 60 µm of the readings over their root, and deflections; rotation likewise."""
     folder = folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
     told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
     for axis, place, turn in zip("xyz", PLACE, TURN, strict=True):
-        value, unit = told[f"base {axis}"]
+        value, unit = told[f"{axis} of the base in the frame of the readings"]
         assert unit == "m" and abs(value - place) < 5e-4
-        value, unit = told[f"base rotation vector {axis}"]
+        value, unit = told[f"rotation vector {axis} of the base in the frame of the readings"]
         assert unit == "rad" and abs(value - turn) < 5e-4
 
 
@@ -124,7 +124,7 @@ def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
         offset = [factor * value for value in OFFSET]
         targets = {point: {"point": point, "offset_m": offset} for point in ("3DoF", "6DoF")}
         folder = made_folder(tmp_path / f"made{factor:g}", kuka, table=table, targets=targets, **POSE)
-        verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+        verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
         faults = [effect for effect in verdict["effects"] if effect["family"] == "data"]
         assert [effect["name"] for effect in faults] == ([name] if name else [])
         assert all(words in effect["detail"] for effect in faults)
@@ -147,14 +147,14 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tm
     out = run_loop(folder, config_folder / "robots", tmp_path / "out")
     verdict = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
-    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert (out / "residuals_figure.pdf").read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(("factor", "words"), [(-1.0, "negative"), (1 / 9.80665, "times nominal")])
 def test_compliances_that_no_robot_has_are_a_warning(factor, words, kuka_extended, config_folder, tmp_path):
     """Of a robot whose links bend too, which the declared one lacks: no single unit explains its deflections."""
     folder = folder_of(tmp_path / "made", kuka_extended, lambda t: scaled(t, WRENCH, factor), POSE)
-    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 100, 1)
+    verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
     (warning,) = (text for text in verdict["warnings"] if "joint compliances" in text)
     assert words in warning and "±" in warning
 
@@ -168,6 +168,6 @@ def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, config_folder, tmp_
     (folder / "campaign.yaml").write_text(document.replace("robot: kuka", "robot: mine.yaml"), encoding="utf-8")
     (folder / "mine.yaml").write_text("\n".join(lines), encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        diagnosed(folder.as_posix(), Path(config_folder / "robots").as_posix(), 100, 1)
+        diagnosed(folder.as_posix(), Path(config_folder / "robots").as_posix(), 1)
     (line,) = str(caught.value).splitlines()
     assert "mine.yaml: lengths_m: " in line and "3656 m" in line and "metres (not millimetres)" in line

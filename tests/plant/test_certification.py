@@ -17,7 +17,7 @@ from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
 from elastocal.plant.campaigns import usual_force_N
 from elastocal.plant.multibody import machine_of
 from elastocal.plant.random_numbers import stream
-from elastocal.plant.statics import Loading, equilibrium, generalized_forces
+from elastocal.plant.statics import Loading, equilibrium, generalized_forces, places
 from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
 from elastocal.plant.weights import declared_masses, gravity_torque, on_stretches, true_masses
 from elastocal.robot import Link, Tube, stretches
@@ -36,7 +36,7 @@ def angles_and_wrenches(arm, force=1000.0, seed=0):
 def at_rest(arm, angles, wrench, structure=None, compliance=None):
     compliance = arm.compliance if compliance is None else compliance
     machine = machine_of(arm, structure or Structure(), compliance)
-    loading = Loading(angles, wrench, np.zeros(len(angles)))
+    loading = Loading(angles, wrench, np.zeros((len(angles), arm.joints + 1)))
     return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
 
 
@@ -54,7 +54,7 @@ def deflections(arm, angles, wrench, **more):
 
 
 def loading_of(angles):
-    return Loading(angles, np.zeros((len(angles), 6)), np.zeros(len(angles)))
+    return Loading(angles, np.zeros((len(angles), 6)), np.zeros((len(angles), angles.shape[1] + 1)))
 
 
 def linear_deflections(chain, coordinates, wrench, compliance):
@@ -241,10 +241,26 @@ def test_base_and_links_yield_under_the_arms_own_weight(arm):
     np.testing.assert_allclose(moved, np.cross(turn, still), atol=2e-3 * np.abs(moved).max())
 
 
+def test_stretches_that_grow_each_by_its_own_move_targets_as_longer_links_do(arm):
+    angles, wrench = angles_and_wrenches(arm)
+    growth = np.linspace(2e-4, -1e-4, arm.joints + 1)
+    machine = machine_of(arm, Structure())
+    coordinates = np.zeros((STATES, machine.model.nq))
+    coordinates[:, machine.drive] = angles
+    found = places(machine, coordinates, np.broadcast_to(growth, (STATES, arm.joints + 1))).position[:, -1]
+    longer = tuple(
+        replace(s, vector_m=s.vector_m * (1 + g), points=tuple(replace(p, position_m=p.position_m * (1 + g)) for p in s.points))
+        for s, g in zip(arm.stretches, growth, strict=True)
+    )
+    wanted = at_rest(replace(arm, stretches=longer), angles, 0.0 * wrench)[1].position[:, -1]
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
 def everything(arm):
     tubes = {k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3)}
     return Structure(
         base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
+        flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
         tilt={1: (1e-7, 1e-7), 4: (2e-7, 2e-7)},
         tubes=tubes,
         masses=(Mass(2, 300.0), Mass(3, 200.0, 0.4, (0.0, 0.0, 0.1))),

@@ -28,6 +28,8 @@ COMPARABLE = {
     "transmission_ratio": 0.02,
     "joint_tilt": 0.02,
     "cross_compliance": 0.02,
+    "flange_flexibility": 0.02,
+    "tracker_scale": 0.02,
     # A dead band with edges is not a tanh where the torque is small.
     "lost_motion": 0.3,
     "force_scale": 0.02,
@@ -45,6 +47,11 @@ def yardstick(fanuc_specimen, schedule):
 
 def test_every_effect_of_the_catalogue_can_be_a_defect():
     assert set(NAMED) == set(effects())
+
+
+def test_no_kind_outside_of_the_catalogue_bears_a_name_of_it():
+    """Else what the catalogue finds rightly would count as a wrong name."""
+    assert not {kind.removeprefix(OUTSIDE) for kind in FOREIGN} & set(effects())
 
 
 def test_at_least_eight_kinds_are_outside_of_the_catalogue():
@@ -74,6 +81,8 @@ def test_a_defects_readings_depend_on_its_seed_and_on_nothing_else(fanuc_specime
 def test_what_acts_without_a_load_is_what_the_catalogue_counts_as_such(weightless, schedule, kind):
     """Class A of the catalogue at load zero; the elastic, the gearbox but for hysteresis, and the load not."""
     defect = drawn_defect(kind, weightless.arm, 3)
+    # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
+    schedule = replace(schedule, time_s=3.0 * schedule.time_s)
     unloaded = schedule.load == 0
     change = np.abs(seen_poses(with_defects(weightless, [defect]), schedule)[0] - seen_poses(weightless, schedule)[0]).max(
         axis=(1, 2)
@@ -164,7 +173,7 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
 
 
 def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc_specimen, schedule):
-    """A mass that is two standard deviations off has a non-centrality of at most four."""
+    """A mass that is two standard deviations off: four, or two where a centre one off and a mass one off do the same."""
     arm = fanuc_specimen.arm
     declared = declared_masses(arm)
     heavier = replace(declared[2], mass_kg=declared[2].mass_kg * 1.2)
@@ -173,7 +182,9 @@ def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc
         for masses in (declared, (*declared[:2], heavier, *declared[3:]))
     )
     signal = Yardstick(nominal, schedule, declared=declared).signal(off)
-    assert signal.retained < 4.0 < 0.01 * signal.raw
+    assert 0.5 < signal.retained < 2.0 < 0.01 * signal.raw
+    # Where this link's weight alone is open. The shoulder feels its mass times its lever; the elbow does not.
+    assert Yardstick(nominal, schedule, declared=declared[2:3]).signal(off).retained == pytest.approx(2.0, rel=0.02)
 
 
 def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_specimen, schedule):
@@ -187,3 +198,20 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
         columns.append(yardstick.change(replace(fanuc_specimen, compliance=softer))[schedule.training].ravel())
     left = seen - np.array(columns).T @ np.linalg.lstsq(np.array(columns).T, seen, rcond=None)[0]
     assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)
+
+
+@pytest.mark.parametrize("joint", [1, 4])
+def test_a_runout_moves_what_turns_with_the_joint_by_the_circle_of_its_axis(weightless, schedule, joint):
+    """And by its lean: at the joint itself by no more than the size."""
+    bad = with_defects(weightless, [Defect("bearing_runout", (joint,), 3e-5, 2)])
+    # Under a load the levers change too.
+    bare = schedule.load == 0
+    change = np.linalg.norm(seen_poses(bad, schedule)[0] - seen_poses(weightless, schedule)[0], axis=2)[bare]
+    names = weightless.arm.points
+    before = [names.index(name) for name in ("2DoF", "3DoF")] if joint == 4 else []
+    assert not change[:, before].any()
+    # [4DoF] of joint 4 lies on it; of joint 1 every target is far away.
+    near = change[:, names.index("4DoF")]
+    assert (near > 0).all()
+    if joint == 4:
+        np.testing.assert_allclose(near, 3e-5, rtol=1e-3)

@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from elastocal.plant.drives import CablePull, Repeatability, SlippingZero, TransmissionError, Visits, WrongRatio, ZeroOffset
+from elastocal.plant.drives import (
+    CablePull,
+    PoseError,
+    Repeatability,
+    Runout,
+    SlippingZero,
+    TransmissionError,
+    Visits,
+    WrongRatio,
+    ZeroOffset,
+)
 
 
 @pytest.fixture
@@ -50,3 +60,19 @@ def test_the_same_seed_gives_the_same_draws_and_another_seed_others(visits):
     np.testing.assert_array_equal(law(visits), law(visits))
     other = Visits(visits.angle, visits.approach, visits.pose, visits.time_s, 6)
     assert (law(visits) != law(other)).all()
+
+
+def test_an_error_of_the_pose_is_the_same_in_all_its_readings(visits):
+    poses = np.arange(200) // 8
+    turn = PoseError((1e-5, 0.0, 1e-5, 1e-5))(Visits(visits.angle, visits.approach, poses, visits.time_s, 5))
+    assert not turn[:, 1].any()
+    for pose in range(25):
+        assert np.ptp(turn[poses == pose], axis=0).max() == 0.0
+    assert np.unique(turn[:, 0]).size == 25
+
+
+def test_a_runout_comes_back_after_a_turn_and_is_opposite_after_half(visits):
+    law = Runout(2, 1e-5, 0.3)
+    half = Visits(visits.angle + np.pi, visits.approach, visits.pose, visits.time_s, 5)
+    np.testing.assert_allclose(law(half), -law(visits), atol=1e-18)
+    assert 0.9e-5 < np.abs(law(visits)).max() <= 1e-5

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from elastocal.plant.arm import turned
-from elastocal.plant.tracker import Drift, EccentricNest, Tracker, rotation_vector
+from elastocal.plant.tracker import Drift, EccentricNest, Move, Tracker, rotation_vector
 
 
 @pytest.fixture
@@ -56,11 +56,23 @@ def test_a_steady_drift_moves_all_targets_as_one_body(targets):
     np.testing.assert_allclose(turned_too, turn[:, None] @ rotation, atol=1e-12)
 
 
-def test_bent_light_and_a_wrong_wavelength_err_along_the_line_of_sight(targets):
+def test_bent_light_errs_along_the_line_of_sight_and_a_wrong_wavelength_from_the_base_that_it_measured(targets):
     tracker = Tracker(refraction_per_m=1e-6, scale=2e-6)
     sight = targets[0] - np.array(tracker.stand_m)
     far = np.linalg.norm(sight, axis=-1, keepdims=True)
-    np.testing.assert_allclose(tracker.seen(*targets)[0] - targets[0], (2e-6 * far + 1e-6 * far**2) * sight / far, atol=1e-14)
+    wanted = 1e-6 * far * sight + 2e-6 * targets[0]
+    np.testing.assert_allclose(tracker.seen(*targets)[0] - targets[0], wanted, atol=1e-14)
+
+
+def test_a_stand_that_is_knocked_turns_all_later_readings_about_itself(targets):
+    move = Move(2.0, (1e-3, 0.0, -2e-3), (0.0, 0.0, 1e-4))
+    tracker, (position, rotation, time_s) = Tracker(move=move), targets
+    found = tracker.seen(position, rotation, time_s)[0]
+    later = time_s > 2.0
+    np.testing.assert_allclose(found[~later], position[~later], atol=1e-14)
+    lever = position[later] - np.array(tracker.stand_m)
+    wanted = np.array([1e-3, 0.0, -2e-3]) + np.cross([0.0, 0.0, 1e-4], lever)
+    np.testing.assert_allclose(found[later] - position[later], wanted, atol=1e-7)
 
 
 def test_an_eccentric_nest_circles_twice_a_turn_of_the_tool():

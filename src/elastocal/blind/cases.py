@@ -36,6 +36,7 @@ WEIGHT = "link_weight"
 SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED = "several_joints", "gear_gravity", "moved", "undeclared"
 # Mechanisms that come at several joints at once, as a bad mastering or one make of gears does.
 WIDESPREAD = (
+    "bearing_runout",
     "hysteresis",
     "joint_dependent_stiffness",
     "joint_offset",
@@ -43,8 +44,10 @@ WIDESPREAD = (
     "link_elasticity",
     "link_geometry",
     "lost_motion",
+    "motor_eccentricity",
     "stiffening",
     "transmission_harmonic",
+    "transmission_order",
     "transmission_ratio",
 )
 _FEWEST_JOINTS = 3
@@ -54,7 +57,7 @@ _CARRIES = 0.2
 _HIGH = 200.0
 # A stand that is knocked moves by a millimetre rather than by what can just be seen, and nobody's arm weighs a few kilograms.
 _KNOCKED, _HEAVY = 1e5, 1e6
-_MOVED_SETUP = OUTSIDE + "moved_setup"
+_MOVED_SETUP = "setup_step"
 _DRAWS = 8
 # Times the plausible size.
 _IMPLAUSIBLE = 3.0
@@ -108,8 +111,8 @@ _HARD_NULLS = tuple(name for name in SETTINGS if name != "usual" and not name.st
 # Effects that cannot be seen without what a setting leaves out.
 _UNSEEN = {
     "without_approach": ("hysteresis",),
-    "without_time_and_temperature": ("frame_drift", "thermal_growth"),
-    "without_covariates": ("hysteresis", "frame_drift", "thermal_growth"),
+    "without_time_and_temperature": ("frame_drift", "temperature_gradient", "thermal_growth"),
+    "without_covariates": ("hysteresis", "frame_drift", "temperature_gradient", "thermal_growth"),
 }
 
 
@@ -244,12 +247,12 @@ SIZES = {
     "full": Counts(
         none=500,
         single=8,
-        outside=8,
+        outside=10,
         pair=100,
         setting=3,
         sweep=1,
         hard=100,
-        several_joints=10,
+        several_joints=8,
         gear_gravity=25,
         moved=5,
         undeclared=5,

@@ -12,6 +12,7 @@ COMPLIANCE = "joint_compliance"
 EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"
 # How far a parameter of the plant is the catalogue's own; what is in neither list is it exactly.
 _FIRST_ORDER = ("link_geometry", "payload", "force_misalignment", "force_bias", "application_point", "base_compliance")
+_FIRST_ORDER += ("flange_flexibility", "tracker_scale")
 _KEYS = ("kind", "effect", "comparable", "parameter", "level")
 _OTHER_LAW = ("lost_motion", "hysteresis")
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.linearize import linearized
@@ -182,6 +183,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
+    said += fitted_compliance_warnings(final)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")

@@ -153,7 +153,7 @@ def fault_entry(fault):
         "parameters": [value | {"std_error": None} for value in fault["parameters"]],
         "p_value": None,
         "heldout_gain": None,
-        "alternatives": [],
+        "alternatives": list(fault["alternatives"]),
         "angle_to_nearest_deg": None,
     }
 

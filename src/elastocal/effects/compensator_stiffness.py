@@ -12,7 +12,6 @@ NAME, FAMILY = "compensator_stiffness", "elastic"
 
 def candidates(sites):
     """One candidate, where the robot file has a compensator."""
-    if sites.compensator is None:
-        return []
-    at_joint = joint_dependent_stiffness.candidates(sites)[sites.compensator.joint - 1]
-    return [replace(at_joint, effect=NAME, family=FAMILY)]
+    joint = sites.compensator.joint if sites.compensator else None
+    found = [candidate for candidate in joint_dependent_stiffness.candidates(sites) if candidate.joints == (joint,)]
+    return [replace(candidate, effect=NAME, family=FAMILY) for candidate in found]

@@ -14,7 +14,7 @@ _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order
 
 def candidates(sites):
     """Two candidates where the robot file has a compensator: with the crank's part, and as for a crank that is very short."""
-    if sites.compensator is None:
+    if sites.compensator is None or sites.prismatic[sites.compensator.joint - 1]:
         return []
     joint = sites.compensator.joint - 1
 

@@ -12,7 +12,7 @@ _PARAMETERS = (Parameter("compliance", "rad/(N m)", 2e-7),)
 
 
 def candidates(sites):
-    """One candidate a pair of joints."""
+    """One candidate a pair of joints that turn."""
 
     def of(one, other):
         def displacement(circumstances):
@@ -20,4 +20,5 @@ def candidates(sites):
 
         return Candidate(NAME, FAMILY, (one + 1, other + 1), "", _PARAMETERS, displacement, frozenset({"load"}))
 
-    return [of(one, other) for one, other in combinations(range(sites.joints), 2)]
+    revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
+    return [of(one, other) for one, other in combinations(revolute, 2)]

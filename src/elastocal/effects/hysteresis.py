@@ -6,7 +6,8 @@ Catalogue row 14. Where the approach is not recorded this is part of the repeata
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "hysteresis", "gearbox"
-_PARAMETERS = (Parameter("half_width", "rad", 1e-4),)
+# The nut of a spindle has some hundredths of a millimetre.
+_TURN, _SHIFT = Parameter("half_width", "rad", 1e-4), Parameter("half_width", "m", 2e-5)
 
 
 def candidates(sites):
@@ -16,6 +17,7 @@ def candidates(sites):
         def displacement(circumstances):
             return [{joint: circumstances.approach[:, joint]}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"approach"}))
+        parameter = _SHIFT if sites.prismatic[joint] else _TURN
+        return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement, frozenset({"approach"}))
 
-    return per_joint(sites, at)
+    return per_joint(sites, at, prismatic=True)

@@ -12,5 +12,6 @@ def candidate(sites):
     def displacement(circumstances):
         return [{joint: circumstances.total[:, joint]} for joint in range(sites.joints)]
 
-    parameters = tuple(Parameter(f"c{joint + 1}", "rad/(N m)", 1e-5) for joint in range(sites.joints))
+    sizes = [("m/N", 1e-6) if prismatic else ("rad/(N m)", 1e-5) for prismatic in sites.prismatic]
+    parameters = tuple(Parameter(f"c{joint}", unit, size) for joint, (unit, size) in enumerate(sizes, 1))
     return Candidate("joint_compliance", "declared", (), "", parameters, displacement, frozenset({"load"}))

@@ -8,7 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "joint_offset", "geometry"
-_PARAMETERS = (Parameter("offset", "rad", 1e-3),)
+_TURN, _SHIFT = Parameter("offset", "rad", 1e-3), Parameter("offset", "m", 1e-3)
 
 
 def candidates(sites):
@@ -18,6 +18,7 @@ def candidates(sites):
         def displacement(circumstances):
             return [{joint: np.ones(len(circumstances.joint_angles))}]
 
-        return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)
+        parameter = _SHIFT if sites.prismatic[joint] else _TURN
+        return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement)
 
-    return per_joint(sites, at)
+    return per_joint(sites, at, prismatic=True)

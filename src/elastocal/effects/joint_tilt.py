@@ -12,7 +12,8 @@ def candidates(sites):
     """One candidate a joint, with one compliance for each axis across its own."""
 
     def at(joint):
-        across = [axis for axis in range(3) if axis != sites.joint_axes[joint]]
+        # A carriage rolls about its own axis too, which is no joint's.
+        across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
         parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
@@ -21,4 +22,4 @@ def candidates(sites):
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
 
-    return per_joint(sites, at)
+    return per_joint(sites, at, prismatic=True)

@@ -24,4 +24,4 @@ def candidates(sites):
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)
 
-    return per_joint(sites, at)
+    return per_joint(sites, at, prismatic=True)

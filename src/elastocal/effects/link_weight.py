@@ -21,7 +21,11 @@ def candidates(sites):
     """
     if sites.masses:
         return []
-    found = [(_candidate(sites, joint, False), _candidate(sites, joint, True)) for joint in range(sites.joints)]
+    found = [
+        (_candidate(sites, joint, False), _candidate(sites, joint, True))
+        for joint in range(sites.joints)
+        if not sites.prismatic[joint]
+    ]
     return [candidate for variant in zip(*found, strict=True) for candidate in variant if candidate]
 
 

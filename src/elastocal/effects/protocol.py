@@ -60,6 +60,9 @@ class Shape:
         Where the search starts.
     lowest, highest : float
         Range in which the law keeps its meaning.
+    tried : int
+        How many evenly spaced values a search must try lest it step over the law, one for the start alone; 0 where a few values
+        of growing size will do.
     """
 
     name: str
@@ -67,6 +70,19 @@ class Shape:
     start: float
     lowest: float
     highest: float
+    tried: int = 0
+
+    def values(self, few):
+        """Values for a search to start from, ndarray: those that must be tried, or a few in geometric series in the range."""
+        if self.tried == 1:
+            return np.array([self.start])
+        if self.tried:
+            return np.linspace(self.lowest, self.highest, self.tried)
+        return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
+
+
+_REFERENCE_C = 20.0
+_LAG = Shape("lag", "s", 3600.0, 300.0, 36000.0)
 
 
 @dataclass(frozen=True)
@@ -152,6 +168,8 @@ class Circumstances:
     time_s : ndarray (S,) or None
         Since the first reading to which the model was fitted.
     temperature_c : ndarray (S,) or None
+    progress : ndarray (S,)
+        How far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
     """
 
     sites: Sites
@@ -163,6 +181,7 @@ class Circumstances:
     approach: np.ndarray | None = None
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
+    progress: np.ndarray | None = None
 
     @cached_property
     def load(self):
@@ -260,7 +279,28 @@ class Circumstances:
         return sum(gravity[i] * twist[i] for i in range(3)), turning
 
 
-def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, coordinates=None):
+def progress_of(states, row_span=None):
+    """How far a campaign had come in each state.
+
+    Parameters
+    ----------
+    states : States
+    row_span : (int, int), optional
+        First and last row of the campaign; those of the states without. States that have no row come after it.
+
+    Returns
+    -------
+    ndarray (S,)
+        0 at the first row, 1 at the last. Where no rows are known, poses count in the order of their numbers.
+    """
+    if not len(states) or (states.row is None and row_span is not None):
+        return np.ones(len(states))
+    place = states.pose if states.row is None else states.row
+    first, last = (place.min(), place.max()) if row_span is None else row_span
+    return (place - first) / max(last - first, 1)
+
+
+def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None):
     """What effects may depend on, in some states.
 
     Parameters
@@ -273,16 +313,16 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
         From which effects count the time.
     mass_corrections : ndarray (4 m,), optional
         As in `Circumstances`; zero without.
-    coordinates : ndarray (S, C), optional
-        Where the robot has yielded to; as commanded without.
+    row_span : (int, int), optional
+        As in `progress_of`.
 
     Returns
     -------
     Circumstances
+        With loads at the commanded poses.
     """
-    if coordinates is None:
-        coordinates = np.zeros((len(states), sites.chain.coordinates))
-        coordinates[:, : sites.joints] = states.joint_angles
+    coordinates = np.zeros((len(states), sites.chain.coordinates))
+    coordinates[:, : sites.joints] = states.joint_angles
     return Circumstances(
         sites,
         np.asarray(compliance),
@@ -293,6 +333,7 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
         states.approach,
         None if states.time_s is None else states.time_s - time_zero_s,
         states.temperature_c,
+        progress_of(states, row_span),
     )
 
 
@@ -338,9 +379,47 @@ def offered(sites, states):
     return frozenset(name for name, present in there.items() if present)
 
 
-def per_joint(sites, make):
-    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each joint."""
-    return [make(joint) for joint in range(sites.joints)]
+def per_joint(sites, make, prismatic=False):
+    """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
+
+    Parameters
+    ----------
+    sites : Sites
+    make : callable
+    prismatic : bool
+        Whether the effect has a meaning for prismatic joints; most of them are about what turns.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    return [make(joint) for joint in range(sites.joints) if prismatic or not sites.prismatic[joint]]
+
+
+def by_warmth(candidate_of):
+    """Candidates of an effect of warmth: by the temperature where it was measured, and by the time since the campaign began.
+
+    Parameters
+    ----------
+    candidate_of : callable
+        ``candidate_of(cause, rise, needs, shapes)`` gives a candidate; ``rise(circumstances, *shapes)`` is by how much it is
+        warmer, ndarray (S,): in K from 20 °C, at which dimensions are stated (ISO 1), or the share of a first order lag.
+
+    Returns
+    -------
+    list of Candidate
+    """
+
+    def by_temperature(circumstances):
+        return circumstances.temperature_c - _REFERENCE_C
+
+    def by_time(circumstances, lag):
+        return -np.expm1(-circumstances.time_s / lag)
+
+    return [
+        candidate_of("temperature", by_temperature, frozenset({"temperature"}), ()),
+        candidate_of("time", by_time, frozenset({"time"}), (_LAG,)),
+    ]
 
 
 def lever_m(sites, joint):

@@ -4,34 +4,32 @@ Catalogue row 18. With a measured temperature dT is counted from 20 °C, at whic
 alone it is the rise of a first order lag since the campaign began, 1 - exp(-t / t_0).
 """
 
-import numpy as np
-
-from elastocal.effects.protocol import Candidate, Parameter, Shape
+from elastocal.effects.protocol import Candidate, Parameter, by_warmth
 
 NAME, FAMILY = "thermal_growth", "drift"
-_REFERENCE_C = 20.0
-_LAG = Shape("lag", "s", 3600.0, 300.0, 36000.0)
+_PARAMETERS = {
+    "temperature": Parameter("expansion", "1/K", 3e-5, sign=1),
+    "time": Parameter("final_growth", "m/m", 3e-4),
+}
 
 
 def candidates(sites):
     """One candidate by temperature and one by time."""
 
-    def grown(rise):
-        return {
-            coordinate: rise * along
-            for link in range(sites.joints + 1)
-            for coordinate, along in zip(sites.link_end[link][:3], sites.link_vectors_m[link], strict=True)
-            if along
-        }
+    def candidate_of(cause, rise, needs, shapes):
+        def displacement(circumstances, *values):
+            return [longer(sites, rise(circumstances, *values))]
 
-    def by_temperature(circumstances):
-        return [grown(circumstances.temperature_c - _REFERENCE_C)]
+        return Candidate(NAME, FAMILY, (), cause, (_PARAMETERS[cause],), displacement, needs, shapes)
 
-    def by_time(circumstances, lag):
-        return [grown(-np.expm1(-circumstances.time_s / lag))]
+    return by_warmth(candidate_of)
 
-    coefficient, growth = Parameter("expansion", "1/K", 3e-5, sign=1), Parameter("final_growth", "m/m", 3e-4)
-    return [
-        Candidate(NAME, FAMILY, (), "temperature", (coefficient,), by_temperature, frozenset({"temperature"})),
-        Candidate(NAME, FAMILY, (), "time", (growth,), by_time, frozenset({"time"}), (_LAG,)),
-    ]
+
+def longer(sites, share):
+    """Displacement by which the column and every link are longer by a share (S,), as a dict by coordinate."""
+    return {
+        coordinate: share * along
+        for ends, vector in zip(sites.link_end, sites.link_vectors_m, strict=True)
+        for coordinate, along in zip(ends[:3], vector, strict=True)
+        if along
+    }

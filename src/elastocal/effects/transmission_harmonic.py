@@ -18,7 +18,7 @@ _AMPLITUDE_RAD = 2e-4
 
 def candidates(sites):
     """One candidate a joint and band of orders."""
-    return [_candidate(joint, low, high) for joint in range(sites.joints) for low, high in _BANDS]
+    return [_candidate(joint, low, high) for joint in range(sites.joints) if not sites.prismatic[joint] for low, high in _BANDS]
 
 
 def _candidate(joint, low, high):

@@ -471,17 +471,18 @@ def _frame_told(estimate, before, after):
     parameters, away, turned = [], 0.0, 0.0
     for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
         vector = Rotation.from_matrix(rotation).as_rotvec()
-        of = f" in session {session}" if len(estimate.sessions) > 1 else ""
-        parameters += [Value(f"base {axis}{of}", float(value), "m") for axis, value in zip("xyz", position, strict=True)]
+        of = f"of the base in the frame of {f'session {session}' if len(estimate.sessions) > 1 else 'the readings'}"
+        parameters += [Value(f"{axis} {of}", float(value), "m") for axis, value in zip("xyz", position, strict=True)]
         parameters += [
-            Value(f"base rotation vector {axis}{of}", float(value), "rad") for axis, value in zip("xyz", vector, strict=True)
+            Value(f"rotation vector {axis} {of}", float(value), "rad") for axis, value in zip("xyz", vector, strict=True)
         ]
         away, turned = max(away, float(np.linalg.norm(position))), max(turned, float(np.linalg.norm(vector)))
-    where = f"{away:.3g} m away, turned by {np.degrees(turned):.3g}°"
+    distance = f"{away:.3g} m" if away >= 0.1 else f"{1e3 * away:.2g} mm"
+    where = f"{distance} away, turned by {np.degrees(turned):.3g}°"
     if away > _NEAR_M or turned > _NEAR_RAD:
         return f"readings do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
     better = before.together / max(after.together, 1e-12)
-    return f"readings would fit {better:.2g} times better if the base stood {where}", tuple(parameters), False
+    return f"readings would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
 def _targets_told(targets, written, fitted):

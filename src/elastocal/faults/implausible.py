@@ -1,6 +1,6 @@
 """Readings that this robot cannot have made, however the file is read: nothing can be traced in them, somebody must look."""
 
-from elastocal.faults.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, rms, robustly_placed, spread, trimmed_rms
+from elastocal.faults.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, rms, robustly_placed, spread, trimmed_rms
 from elastocal.faults.protocol import Fault, Value
 
 NAMES, FAMILY, AFTER = ("implausible_readings",), "data", ("constant_columns", "alternatives", "shuffled_rows")
@@ -22,11 +22,14 @@ def find(campaign, readings):
     list of Fault
         One, or none.
     """
-    placement = robustly_placed(campaign, spread(readings))
-    away = trimmed_rms(placement.distance)
-    turned = 0.0 if placement.turn is None else trimmed_rms(placement.turn)
-    if away < _FARTHEST_M and turned < _FARTHEST_RAD:
-        return []
+    some = spread(readings)
+    # Nearly all campaigns are done with the first, which takes a sixth of the time.
+    for place in (placed, robustly_placed):
+        placement = place(campaign, some)
+        away = trimmed_rms(placement.distance)
+        turned = 0.0 if placement.turn is None else trimmed_rms(placement.turn)
+        if away < _FARTHEST_M and turned < _FARTHEST_RAD:
+            return []
     what = f"positions lie {away:.2g} m" if away >= _FARTHEST_M else f"orientations lie {turned:.2g} rad"
     detail = (
         f"{what} (RMS) from where the robot file puts them, and no other sense, unit, axis, frame or order of rows that was"

@@ -16,6 +16,7 @@ from elastocal.errors import InputError
 STANDARD_GRAVITY = 9.80665
 _RELATIVE_STD = 0.1
 # What counts as heavy, and gears as stiff as a heavy arm's.
+_USUAL_RATIOS = (191.25, 171.74, 153.4, 129.6, 118.9, 101.0, 101.0)
 _HEAVY_KG, _STIFF_RAD_PER_NM = 140.0, 2e-6
 _WORD = re.compile(r"([TR])([xyz])\((-?)([\w.]+)\)|\[([^\]]+)\]")
 
@@ -101,6 +102,8 @@ class Arm:
         Rated load, where the file has one.
     compensated : bool
         Whether the arm has a gravity compensator at the shoulder.
+    ratios : tuple of float
+        Turns of the motor for one of each joint, where the file has them.
     """
 
     name: str
@@ -114,6 +117,7 @@ class Arm:
     gravity_m_s2: tuple = (0.0, 0.0, -STANDARD_GRAVITY)
     rated_kg: float | None = None
     compensated: bool = True
+    ratios: tuple = ()
 
     @property
     def joints(self):
@@ -129,6 +133,11 @@ class Arm:
     def payload_kg(self):
         """Rated load; where the file has none, 8 kg m^-3 times the cube of the reach, as arms of 1 to 3 m have."""
         return 8.0 * self.reach_m**3 if self.rated_kg is None else self.rated_kg
+
+    @property
+    def gear_ratio(self):
+        """Turns of the motor for one of each joint, tuple of float; usual ones where the file has none."""
+        return self.ratios or tuple(_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(self.joints))
 
     @property
     def load_share(self):
@@ -223,6 +232,7 @@ def arm_from_document(document, source="robot"):
         document.get("payload_kg"),
         # A file that tells nothing of weights tells nothing of a compensator either.
         "compensator" in document or "masses" not in document,
+        tuple(document.get("gear_ratio", ())),
     )
 
 

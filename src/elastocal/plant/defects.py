@@ -23,6 +23,8 @@ OUTSIDE = "outside:"
 _AXES = "xyz"
 _SHORTEST_LINK_M = 0.1
 _HEAVY_REACH_M = 2.5
+# Radius of a bearing, and how thick a link is.
+_BEARING_M, _LINK_M = 0.15, 0.25
 # In the first half of the training poses, with repeats and without, at a state in 25 s.
 _KNOCKED_S = (700.0, 2000.0)
 # Share of the largest torque below which a weight does not turn a joint.
@@ -196,6 +198,11 @@ def _each_link(arm):
     return [(link,) for link in range(1, arm.joints + 1) if lengths[link] > _SHORTEST_LINK_M]
 
 
+def _warmed(arm):
+    """Along the whole arm, or across one of its links."""
+    return [(), *_each_link(arm)]
+
+
 def _each_pair(arm):
     return list(combinations(range(1, arm.joints + 1), 2))
 
@@ -278,6 +285,12 @@ def _link_geometry(robot, joints, size, draws):
     return changed, _named("d", robot.arm.stretches[stretch].rotation.T @ vector) | _named("r", turn)
 
 
+@_register("tracker_scale", "1", 2e-5, _nowhere)
+def _tracker_scale(robot, joints, size, draws):
+    """A wrong wavelength, at which the frame of the base was measured too."""
+    return replace(robot, tracker=replace(robot.tracker, scale=size)), {"scale": size}
+
+
 # Gravity
 
 
@@ -320,8 +333,8 @@ def _compensator_torque(robot, joints, size, draws):
 
 @_register("transmission_harmonic", "rad", 8e-5, _each_joint)
 def _transmission_harmonic(robot, joints, size, draws):
-    """An eccentric wheel: an order near 1 or 2 that is no integer, and half as much of its double."""
-    order, phases = draws.choice([1, 2]) * draws.uniform(0.9, 1.1), draws.uniform(0, 2 * np.pi, 2)
+    """An eccentric wheel that turns with the joint: an order of 1 or 2 but for creep, and half as much of its double."""
+    order, phases = draws.choice([1, 2]) * draws.uniform(0.98, 1.02), draws.uniform(0, 2 * np.pi, 2)
     waves = ((order, size, phases[0]), (2 * order if order < 1.5 else order / 2, 0.5 * size, phases[1]))
     return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
 
@@ -333,6 +346,37 @@ def _transmission_ratio(robot, joints, size, draws):
     of = joint if joint == 0 else joint - draws.integers(2)
     size = size * draws.choice([-1.0, 1.0])
     return _with_drive(robot, drives.WrongRatio(joint, int(of), size)), {f"per_q{of + 1}": size}
+
+
+@_register("bearing_runout", "m", 3e-5, _each_joint)
+def _bearing_runout(robot, joints, size, draws):
+    """The axis of a joint circles once a turn by `size`, and wobbles by as much at the edge of its bearing."""
+    joint, phase, lean = joints[0], draws.uniform(0, 2 * np.pi), draws.uniform(0, 2 * np.pi)
+    structure, number, sense = robot.structure, joints[0] + 1, draws.choice([-1.0, 1.0])
+    tilt = structure.tilt | {number: structure.tilt.get(number, (0.0, 0.0))}
+    changed = _with_structure(robot, loose=tuple({*structure.loose, number}), tilt=tilt)
+    laws = []
+    for which in range(2):
+        quarter = which * sense * np.pi / 2
+        laws.append((f"shift{number}_{which}", drives.Runout(joint, size, phase + quarter)))
+        laws.append((f"tilt{number}_{which}", drives.Runout(joint, size / _BEARING_M, lean + quarter)))
+    return replace(changed, offsets=(*robot.offsets, *laws)), {}
+
+
+@_register("motor_eccentricity", "rad", 6e-5, _each_joint)
+def _motor_eccentricity(robot, joints, size, draws):
+    """A wheel on the motor's shaft: once and twice a turn of the motor, which is no whole number of turns of the joint."""
+    order, phases = robot.arm.gear_ratio[joints[0]], draws.uniform(0, 2 * np.pi, 2)
+    waves = ((order, size, phases[0]), (2.0 * order, 0.4 * size, phases[1]))
+    return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
+
+
+@_register("transmission_order", "rad", 8e-5, _each_joint)
+def _transmission_order(robot, joints, size, draws):
+    """A planet or a cage: an order between two integers, and a quarter as much of its double."""
+    order, phases = draws.integers(2, 30) + draws.uniform(0.25, 0.75), draws.uniform(0, 2 * np.pi, 2)
+    waves = ((order, size, phases[0]), (2.0 * order, 0.25 * size, phases[1]))
+    return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
 
 
 # Elasticity
@@ -383,6 +427,14 @@ def _compensator_stiffness(robot, joints, size, draws):
     anchor, crank, free = draws.uniform(0.3, 0.5), draws.uniform(0.15, 0.22), draws.uniform(0.15, 0.3)
     zero = draws.uniform(-np.pi, np.pi)
     return _with_gear(robot, gears.CompensatorStiffness(joint, robot.compliance[joint], size, anchor, crank, free, zero)), {}
+
+
+@_register("flange_flexibility", "rad/(N m)", 2e-7, _nowhere, scale=(1.0, 0.0))
+def _flange_flexibility(robot, joints, size, draws):
+    """A tool changer between flange and target: it turns in three directions, and shifts by a tenth of a metre's lever."""
+    turns, shifts = size * draws.uniform(0.4, 1.0, 3), 0.01 * size * draws.uniform(0.4, 1.0, 3)
+    flange = tuple(old + new for old, new in zip(robot.structure.flange or (0.0,) * 6, (*shifts, *turns), strict=True))
+    return _with_structure(robot, flange=flange), _named("shift_", shifts) | _named("turn_", turns)
 
 
 # Gearboxes
@@ -458,6 +510,34 @@ def _thermal_growth(robot, joints, size, draws):
     return replace(robot, expansion_per_K=size), {}
 
 
+@_register("setup_step", "m", 1e-3, _nowhere)
+def _setup_step(robot, joints, size, draws):
+    """The tracker's stand is knocked between two rows: a shift, and a turn about the stand of as much at three metres."""
+    move = Move(draws.uniform(*_KNOCKED_S), tuple(size * _direction(draws)), tuple(size / 3.0 * _direction(draws)))
+    return replace(robot, tracker=replace(robot.tracker, move=move)), {}
+
+
+@_register("temperature_gradient", "1/K", 1.2e-5, _warmed, ("temperature",))
+def _temperature_gradient(robot, joints, size, draws):
+    """Motors at the foot and a cold tip, beside what the arm grows on average; or a link that is warmer on one side."""
+    arm, size = robot.arm, size * draws.choice([-1.0, 1.0])
+    lengths = np.array([np.linalg.norm(stretch.vector_m) for stretch in arm.stretches])
+    if not joints:
+        share = np.linspace(1.0, -1.0, arm.joints + 1)
+        mean = share @ lengths / lengths.sum()
+        gradient = tuple(np.array(robot.gradient_per_K) + size * (share[[0, -1]] - mean))
+        return replace(robot, gradient_per_K=gradient), {}
+    link, about = joints[0] + 1, draws.uniform(0, 2 * np.pi)
+    pieces, tubes = robot.structure.segments, {link: TaperedTube(np.inf, np.inf)} | robot.structure.tubes
+    bend = size * lengths[link] / _LINK_M / pieces
+    laws = tuple(
+        (f"link{link}_{piece}_bend{which}", drives.WarmBend(bend * part, robot.warmth))
+        for piece in range(pieces)
+        for which, part in enumerate((np.cos(about), np.sin(about)))
+    )
+    return replace(_with_structure(robot, tubes=tubes), offsets=(*robot.offsets, *laws)), {}
+
+
 # Outside of the catalogue
 
 
@@ -518,18 +598,6 @@ def _foot_slip(robot, joints, size, draws):
 @_register(OUTSIDE + "refraction", "1/m", 2e-6, _nowhere)
 def _refraction(robot, joints, size, draws):
     return replace(robot, tracker=replace(robot.tracker, refraction_per_m=size)), {}
-
-
-@_register(OUTSIDE + "tracker_scale", "1", 2e-5, _nowhere)
-def _tracker_scale(robot, joints, size, draws):
-    return replace(robot, tracker=replace(robot.tracker, scale=size)), {}
-
-
-@_register(OUTSIDE + "moved_setup", "m", 1e-3, _nowhere)
-def _moved_setup(robot, joints, size, draws):
-    """The tracker's stand is knocked between two rows: a shift, and a turn about the stand of as much at three metres."""
-    move = Move(draws.uniform(*_KNOCKED_S), tuple(size * _direction(draws)), tuple(size / 3.0 * _direction(draws)))
-    return replace(robot, tracker=replace(robot.tracker, move=move)), {}
 
 
 @_register(OUTSIDE + "eccentric_nest", "m", 1e-4, _nowhere)

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_REFERENCE_C = 20.0
+
 
 @dataclass(frozen=True)
 class Visits:
@@ -110,6 +112,43 @@ class SlippingZero:
         number = int(visits.approach.max()) + 1
         slips = self.step_rad * sizes.standard_normal(number) * (whether.random(number) < self.share)
         return _one(visits, self.joint, np.cumsum(slips)[visits.approach])
+
+
+@dataclass(frozen=True)
+class Runout:
+    """One coordinate of an axis that wobbles as its bearing turns: size cos(q - phase), (S,), rad or m.
+
+    Attributes
+    ----------
+    joint : int
+        From 0.
+    size, phase_rad : float
+    """
+
+    joint: int
+    size: float
+    phase_rad: float
+
+    def __call__(self, visits):
+        return self.size * np.cos(visits.angle[:, self.joint] - self.phase_rad)
+
+
+@dataclass(frozen=True)
+class WarmBend:
+    """A piece of a link that bends as one side of it warms up: per_K (T - 20 °C), (S,), rad.
+
+    Attributes
+    ----------
+    per_K : float
+    warmth : object
+        Has `of_castings`, temperature at times, °C.
+    """
+
+    per_K: float
+    warmth: object
+
+    def __call__(self, visits):
+        return self.per_K * (self.warmth.of_castings(visits.time_s) - _REFERENCE_C)
 
 
 @dataclass(frozen=True)

@@ -74,7 +74,7 @@ def dynamic_table(robot, readings, seed, rate_hz=1000.0):
     position = np.empty((readings, 1, 3))
     for part in _parts(readings):
         schedule = _unloaded(angle[part], time[part], seed)
-        drive, growth, _ = driven(robot, schedule)
+        drive, growth, _, _ = driven(robot, schedule, machine)
         coordinates = np.zeros((len(drive), machine.model.nq))
         coordinates[:, machine.drive], coordinates[:, sprung] = drive, deflection(time[part])
         where = places(machine, coordinates, growth)

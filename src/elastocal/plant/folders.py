@@ -40,7 +40,7 @@ def robot_document(document, arm, declared, gravity_m_s2):
             {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
             for m in declared
         ]
-    told |= {"gravity_m_s2": list(gravity_m_s2), "payload_kg": round(arm.payload_kg, 1)}
+    told |= {"gravity_m_s2": list(gravity_m_s2), "payload_kg": round(arm.payload_kg, 1), "gear_ratio": list(arm.gear_ratio)}
     if arm.compensated:
         told["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
     return told

@@ -39,6 +39,8 @@ class Machine:
         Which bodies each coordinate moves: all from its own on, for the tree is a chain.
     slides : ndarray of bool (coordinates,)
         Which coordinates are lengths; the others are angles.
+    body_stretch, site_stretch : ndarray of int (bodies,), (sites,)
+        Stretch of whose vector the place of each body and site is a part.
     flange : str
     compensator : structure.Compensator or None
     xml : str
@@ -53,6 +55,8 @@ class Machine:
     links: np.ndarray
     beyond: np.ndarray
     slides: np.ndarray
+    body_stretch: np.ndarray
+    site_stretch: np.ndarray
     flange: str
     compensator: object
     xml: str
@@ -77,6 +81,12 @@ class _Tree:
         SubElement(self.body, "joint", name=name, type=kind, axis=_text(axis), armature="1", **stiffness)
         if compliance is not None:
             self.compliance[name] = compliance
+
+    def six_springs(self, name, compliances):
+        """Along and about x, y and z of the current body; none where `compliances` is None."""
+        names = [f"{name}_{kind}{axis}" for kind in ("", "r") for axis in "xyz"]
+        for number, compliance in enumerate(compliances or ()):
+            self.joint(names[number], "slide" if number < 3 else "hinge", np.eye(3)[number % 3], compliance)
 
     def weigh(self, mass, position):
         """Put a mass on the current body; masses add up at their common centre."""
@@ -105,21 +115,24 @@ def machine_of(arm, structure, gear_compliance=None):
     SubElement(root, "option", gravity=_text(structure.gravity_m_s2))
     tree = _Tree(SubElement(root, "worldbody"))
     tree.descend("foot")
-    for number, name in enumerate(f"{kind}{axis}" for kind in ("base_", "base_r") for axis in "xyz"):
-        if structure.base is not None:
-            kind = "slide" if number < 3 else "hinge"
-            tree.joint(name, kind, np.eye(3)[number % 3], structure.base[number])
+    tree.six_springs("base", structure.base)
     stiffness = np.zeros(arm.joints) if gear_compliance is None else gear_compliance
     for number, stretch in enumerate(arm.stretches):
-        _add_stretch(tree, number, stretch, structure)
+        _add_stretch(tree, number, stretch, structure, arm.points[-1] if structure.flange else None)
         if number < arm.joints:
             tree.descend(f"arm{number + 1}")
             axis = arm.axes[number]
             tree.joint(f"drive{number + 1}", "hinge", axis)
             tree.joint(f"gear{number + 1}", "hinge", axis, stiffness[number])
             across = [e for e in np.eye(3) if abs(e @ axis) < 0.5]
+            for which in range(2 if number + 1 in structure.loose else 0):
+                tree.joint(f"shift{number + 1}_{which}", "slide", across[which], 0.0)
             for which, compliance in enumerate(structure.tilt.get(number + 1, ())):
                 tree.joint(f"tilt{number + 1}_{which}", "hinge", across[which], compliance)
+    if structure.flange is not None:
+        tree.descend("flange")
+        tree.six_springs("flange", structure.flange)
+        _add_site(tree, arm.points[-1], np.zeros(3), np.eye(3))
     if structure.payload is not None:
         load = structure.payload
         tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
@@ -147,10 +160,22 @@ def _indexed(arm, structure, tree, xml):
         np.array([model.body(name).id for name in ("foot", *(f"arm{j}" for j in numbers))]),
         np.arange(model.nbody) >= model.jnt_bodyid[:, None],
         model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE,
+        *_stretches_of(model),
         arm.points[-1],
         structure.compensator,
         xml,
     )
+
+
+def _stretches_of(model):
+    """Stretches of all bodies and of all sites: a body behind a drive is placed by the stretch before it."""
+    arms, bodies = 0, []
+    for number in range(model.nbody):
+        behind_drive = model.body(number).name.startswith("arm")
+        bodies.append(arms)
+        arms += behind_drive
+    within = np.array(bodies) + [model.body(number).name.startswith("arm") for number in range(model.nbody)]
+    return np.array(bodies), within[model.site_bodyid]
 
 
 @lru_cache(maxsize=4)
@@ -159,17 +184,18 @@ def _compiled(xml):
     return mujoco.MjModel.from_xml_string(xml)
 
 
-def _add_stretch(tree, number, stretch, structure):
-    """Walk from the near to the far end of a stretch and leave the tree there."""
+def _add_stretch(tree, number, stretch, structure, elsewhere):
+    """Walk from the near to the far end of a stretch and leave the tree there; one measuring point may be put elsewhere."""
     vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, (0.0, 0.0, 0.0)))
     turn = turned(np.array(structure.wrong_turns.get(number, (0.0, 0.0, 0.0))))
     rotation = stretch.rotation @ turn
     weights = [(mass.mass_kg, mass.along, np.array(mass.aside_m)) for mass in structure.masses if mass.stretch == number]
+    points = [point for point in stretch.points if point.name != elsewhere]
     tube = structure.tubes.get(number)
     if tube is None:
         for mass, along, aside in weights:
             tree.weigh(mass, tree.position + tree.rotation @ (along * vector + aside))
-        for point in stretch.points:
+        for point in points:
             # What is wrong about a stretch is wrong at its far end.
             at_end = np.allclose(point.position_m, stretch.vector_m, atol=1e-12)
             where, facing = (vector, point.rotation @ turn) if at_end else (point.position_m, point.rotation)
@@ -177,7 +203,7 @@ def _add_stretch(tree, number, stretch, structure):
         tree.position, tree.rotation = tree.position + tree.rotation @ vector, tree.rotation @ rotation
         return
     _add_segments(tree, number, vector, tube, structure.segments, weights)
-    for point in stretch.points:
+    for point in points:
         if not np.allclose(point.position_m, stretch.vector_m, atol=1e-12):
             raise InputError("structure", f"tubes[{number}]", f"[{point.name}] inside it", "points at the far end of a link")
         _add_site(tree, point.name, tree.position, point.rotation @ turn)

@@ -60,7 +60,11 @@ class PhysicalRobot:
         Errors of angle; see `drives`.
     structure_laws : tuple of (str, callable)
         Laws of structural springs by the start of their names.
+    offsets : tuple of (str, callable)
+        By what structural coordinates are off, of `Visits`, beside what their springs do.
     expansion_per_K : float
+    gradient_per_K : (float, float)
+        Further expansion of the column and of the flange; in between it changes evenly from stretch to stretch.
     warmth : Warmth
     cell : LoadCell
     tracker : Tracker
@@ -74,7 +78,9 @@ class PhysicalRobot:
     gears: tuple = ()
     drives: tuple = ()
     structure_laws: tuple = ()
+    offsets: tuple = ()
     expansion_per_K: float = 0.0
+    gradient_per_K: tuple = (0.0, 0.0)
     warmth: Warmth = field(default_factory=Warmth)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
@@ -183,13 +189,13 @@ def at_rest(robot, schedule, start=None):
     rest : Equilibrium
     """
     machine = machine_of(robot.arm, robot.structure)
-    drive, growth, warm = driven(robot, schedule)
+    drive, growth, warm, offsets = driven(robot, schedule, machine)
     facing = np.broadcast_to(np.eye(3), (len(drive), 3, 3))
     if robot.cell.in_flange:
         coordinates = np.zeros((len(drive), machine.model.nq))
         coordinates[:, machine.drive] = drive
         facing = places(machine, coordinates, growth).rotation[:, -1]
-    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth)
+    loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth, offsets)
     laws = (LinearSprings(robot.compliance), *robot.gears)
 
     def gear_deflection(torque, unloaded):
@@ -200,27 +206,36 @@ def at_rest(robot, schedule, start=None):
     return machine, equilibrium(machine, loading, gear_deflection, robot.structure_laws, begin)
 
 
-def driven(robot, schedule):
+def driven(robot, schedule, machine):
     """Where the drives really stand, and how warm everything is.
 
     Parameters
     ----------
     robot : PhysicalRobot
     schedule : Schedule
+    machine : Machine
 
     Returns
     -------
     drive : ndarray (S, n)
         rad.
-    growth : ndarray (S,)
-        Relative growth of all lengths.
+    growth : ndarray (S, n + 1)
+        Relative growth of all lengths of each stretch.
     warm : ndarray (S,)
         Temperature of the castings, °C.
+    offsets : dict of int to ndarray (S,)
+        Of structural coordinates.
     """
     visits = Visits(schedule.angle, schedule.approach, schedule.pose, schedule.time_s, schedule.seed)
     drive = schedule.angle + sum((law(visits) for law in robot.drives), np.zeros_like(schedule.angle))
     warm = robot.warmth.of_castings(schedule.time_s)
-    return drive, robot.expansion_per_K * (warm - _REFERENCE_C), warm
+    per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
+    growth = (warm - _REFERENCE_C)[:, None] * per_kelvin
+    offsets = {}
+    for name, law in robot.offsets:
+        index = machine.springs[name]
+        offsets[index] = offsets.get(index, 0.0) + law(visits)
+    return drive, growth, warm, offsets
 
 
 def seen_at_rest(robot, schedule, rest):

@@ -5,7 +5,7 @@ theta = law(tau). The forces depend on the deflections only through the geometry
 thousandth or so, so that Newton's iteration with the springs' own tangent gains about three digits a sweep.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import mujoco
 import numpy as np
@@ -27,13 +27,16 @@ class Loading:
         Angles at which the drives really stand, rad.
     wrench : ndarray (S, 6)
         That the flange really feels, at its deflected origin, base axes; N, N m.
-    growth : ndarray (S,)
-        Relative growth of all lengths.
+    growth : ndarray (S, n + 1)
+        Relative growth of all lengths of each stretch.
+    offsets : dict of int to ndarray (S,)
+        By which structural coordinates are off beside what their springs do, rad or m.
     """
 
     drive: np.ndarray
     wrench: np.ndarray
     growth: np.ndarray
+    offsets: dict = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -105,8 +108,8 @@ def places(machine, coordinates, growth):
     ----------
     machine : Machine
     coordinates : ndarray (S, coordinates)
-    growth : ndarray (S,)
-        Relative growth of all lengths.
+    growth : ndarray (S, n + 1)
+        Relative growth of all lengths of each stretch.
 
     Returns
     -------
@@ -120,12 +123,14 @@ def places(machine, coordinates, growth):
     # MuJoCo's own arrays, seen through views that follow each call.
     seen = ((anchor, data.xanchor), (axis, data.xaxis), (mass, data.xipos), (body, data.xpos), (turn, data.xmat))
     seen += ((position, data.site_xpos), (rotation, data.site_xmat))
-    coordinate, bodies, sites, grown = data.qpos, model.body_pos.copy(), model.site_pos.copy(), np.append(0.0, growth)
+    coordinate, bodies, sites = data.qpos, model.body_pos.copy(), model.site_pos.copy()
+    grown = np.vstack([np.zeros_like(growth[:1]), growth])
+    changed = (np.diff(grown, axis=0) != 0.0).any(axis=1)
     try:
         for state, row in enumerate(coordinates):
-            if grown[state + 1] != grown[state]:
-                model.body_pos[:] = bodies * (1.0 + grown[state + 1])
-                model.site_pos[:] = sites * (1.0 + grown[state + 1])
+            if changed[state]:
+                model.body_pos[:] = bodies * (1.0 + growth[state, machine.body_stretch, None])
+                model.site_pos[:] = sites * (1.0 + growth[state, machine.site_stretch, None])
             coordinate[:] = row
             mujoco.mj_kinematics(model, data)
             for kept, now in seen:
@@ -226,6 +231,8 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=(), start=None
         following[:, gear] = gear_deflection(force[:, gear], unloaded)
         for index, law in extra:
             following[:, index] += law(force[:, index])
+        for index, offset in loading.offsets.items():
+            following[:, index] += offset
         change, size = np.abs(following - coordinates), np.abs(following)
         change[:, machine.drive] = size[:, machine.drive] = 0.0
         # The poses are those of `coordinates`; once the next would be the same they need no further sweep.

@@ -77,8 +77,12 @@ class Structure:
     ----------
     base : tuple of float or None
         Compliances of the foot along x, y, z (m/N) and about x, y, z (rad/(N m)).
+    flange : tuple of float or None
+        Compliances between the last stretch and the flange along x, y, z (m/N) and about x, y, z (rad/(N m)) of its frame.
     tilt : dict of int to (float, float)
         Of a joint, from 1: compliances across its axis, rad/(N m), in the order of the remaining axes.
+    loose : tuple of int
+        Joints, from 1, whose bearings let the arm shift across the axis, by what `PhysicalRobot.offsets` say.
     tubes : dict of int to TaperedTube
         Elastic stretches.
     segments : int
@@ -94,7 +98,9 @@ class Structure:
     """
 
     base: tuple | None = None
+    flange: tuple | None = None
     tilt: dict = field(default_factory=dict)
+    loose: tuple = ()
     tubes: dict = field(default_factory=dict)
     segments: int = 6
     masses: tuple = ()

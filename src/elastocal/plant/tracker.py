@@ -73,7 +73,7 @@ class Tracker:
     refraction_per_m : float
         Bent light: a target at range r is read at r + k r^2.
     scale : float
-        A wrong wavelength: at (1 + s) r.
+        A wrong wavelength. The frame of the base was measured with it too, so that a target at x is read at (1 + s) x.
     outliers : float
         Share of the readings that are off by far.
     outlier_sigmas : float
@@ -108,7 +108,7 @@ class Tracker:
         """
         sight = position - np.array(self.stand_m)
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
-        position = position + (self.scale + self.refraction_per_m * far) * sight
+        position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
         for motion, about in ((self.drift, np.zeros(3)), (self.move, np.array(self.stand_m))):
             if motion is not None:
                 shift, turn = motion.moved(time_s)

@@ -1,0 +1,73 @@
+"""A bearing that runs out: the axis of a joint moves once and twice per turn.
+
+Error motions of an axis of rotation (ISO 230-7): radial along two fixed axes across it, axial along it, and tilt about the two,
+each a sum of cosines and sines of q and 2 q. Fixed axes are those of the link before the joint.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+NAME, FAMILY = "bearing_runout", "transmission"
+_ORDERS = (1, 2)
+_WAVES = (("cos", np.cos), ("sin", np.sin))
+_SAMPLES_PER_PERIOD = 4
+# Large slewing bearings run out by some hundredths of a millimetre. Over the part of a turn that a joint uses the two orders
+# are nearly one function, and like a link of other dimensions: a prior of that size keeps them from cancelling each other.
+_RUNOUT_M, _WOBBLE_RAD = 5e-5, 5e-5
+
+
+def candidates(sites):
+    """Three candidates a joint: radial, axial, and wobble."""
+    return [
+        *per_joint(sites, lambda joint: _candidate(sites, joint, "radial")),
+        *per_joint(sites, lambda joint: _candidate(sites, joint, "axial")),
+        *per_joint(sites, lambda joint: _candidate(sites, joint, "wobble")),
+    ]
+
+
+def _candidate(sites, joint, motion):
+    own = sites.joint_axes[joint]
+    axes = (own,) if motion == "axial" else ((own + 1) % 3, (own + 2) % 3)
+    unit, size = ("rad", _WOBBLE_RAD) if motion == "wobble" else ("m", _RUNOUT_M)
+    parameters = tuple(
+        Parameter(f"{motion}_{'xyz'[axis]}_{name}_{order}q", unit, size, size)
+        for axis in axes
+        for order in _ORDERS
+        for name, _ in _WAVES
+    )
+
+    def displacement(circumstances):
+        angle = circumstances.joint_angles[:, joint]
+        fixed = [_seen_behind(sites, joint, axis, angle) for axis in axes]
+        return [
+            _at(sites, joint, motion, direction * wave(order * angle))
+            for direction in fixed
+            for order in _ORDERS
+            for _, wave in _WAVES
+        ]
+
+    distinct = _SAMPLES_PER_PERIOD * max(_ORDERS)
+    return Candidate(NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, place=motion)
+
+
+def _seen_behind(sites, joint, axis, angle):
+    """Unit vector along an axis of the frame before a joint, in the frame that turns with it, ndarray (3, S)."""
+    own, turned = sites.joint_axes[joint], sites.joint_signs[joint] * angle
+    seen = np.zeros((3, len(angle)))
+    if axis == own:
+        seen[axis] = 1.0
+    else:
+        # R(-turned) e_axis: the other axis across follows or goes before it.
+        other = 3 - own - axis
+        ahead = 1.0 if (own + 1) % 3 == axis else -1.0
+        seen[axis], seen[other] = np.cos(turned), -ahead * np.sin(turned)
+    return seen
+
+
+def _at(sites, joint, motion, vector):
+    """A shift or turn (3, S) just behind a joint, in the frame there, on coordinates: a link shifts as its far end does."""
+    if motion == "wobble":
+        return dict(zip(sites.tilt[joint], vector, strict=True))
+    shifted = sites.link_rotations[joint + 1].T @ vector
+    return dict(zip(sites.link_end[joint + 1][:3], shifted, strict=True))

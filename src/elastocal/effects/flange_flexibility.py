@@ -1,0 +1,29 @@
+"""A flange, its bearing or a tool changer that gives: a spring in six directions behind the last joint.
+
+What holds the tool shifts and turns along the axes of the flange under the external load, u = C w with a diagonal C. The turn
+about the axis of the last joint is that of its compliance, and is held by the fit where that is identified.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "flange_flexibility", "elastic"
+# A bolted joint of a tool gives some ten micrometres and a tenth of a milliradian under a kilonewton at half a metre.
+_SHIFTS = tuple(Parameter(f"shift_{axis}", "m/N", 2e-8, sign=1) for axis in "xyz")
+_TURNS = tuple(Parameter(f"turn_{axis}", "rad/(N m)", 2e-7, sign=1) for axis in "xyz")
+
+
+def candidates(sites):
+    """Two candidates at the last measuring point: all six directions, and turns alone, which is most of what a flange does."""
+    coordinates = sites.link_end[-1]
+
+    def displacement(circumstances):
+        return [{coordinate: circumstances.load[:, coordinate]} for coordinate in coordinates]
+
+    def turning(circumstances):
+        return displacement(circumstances)[3:]
+
+    load = frozenset({"load"})
+    return [
+        Candidate(NAME, FAMILY, (), "", (*_SHIFTS, *_TURNS), displacement, load),
+        Candidate(NAME, FAMILY, (), "turns", _TURNS, turning, load),
+    ]

@@ -1,0 +1,35 @@
+"""An eccentric motor, resolver or input pinion: transmission error once and twice per turn of the motor.
+
+theta_i = sum_k a_k cos(k N q_i) + b_k sin(k N q_i), k = 1, 2, with N the gear ratio, which must be known well enough for the
+phase of its waves. Where the robot file has no gear ratio of a joint nothing is offered there.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter
+
+NAME, FAMILY = "motor_eccentricity", "transmission"
+_ORDERS = (1, 2)
+# An eccentric of some milliradians at the motor, over a ratio of a hundred.
+_AMPLITUDE_RAD = 5e-5
+# Any angles tell the waves of the motor apart; twice as many as there are of them, and some.
+_DISTINCT_ANGLES = 12
+
+
+def candidates(sites):
+    """One candidate for each joint whose gear ratio is known."""
+    ratios = sites.gear_ratio or (None,) * sites.joints
+    turning = [joint for joint in range(sites.joints) if ratios[joint] is not None and not sites.prismatic[joint]]
+    return [_candidate(joint, ratios[joint]) for joint in turning]
+
+
+def _candidate(joint, ratio):
+    parameters = tuple(
+        Parameter(f"{wave}_{order}_motor", "rad", _AMPLITUDE_RAD) for order in _ORDERS for wave in ("cos", "sin")
+    )
+
+    def displacement(circumstances):
+        angle = ratio * circumstances.joint_angles[:, joint]
+        return [{joint: wave(order * angle)} for order in _ORDERS for wave in (np.cos, np.sin)]
+
+    return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, distinct_angles=_DISTINCT_ANGLES)

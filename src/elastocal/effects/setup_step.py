@@ -1,0 +1,25 @@
+"""A tracker, a nest or a foot that was moved between two rows: a rigid motion of all readings from there on.
+
+A step needs no clock: the rows stand in the order in which they were read, and where the rows are not known the poses count by
+their numbers. Where in the campaign it happens is a shape: 0 is its first row, 1 its last.
+"""
+
+from elastocal.effects.protocol import Candidate, Parameter, Shape
+
+NAME, FAMILY = "setup_step", "drift"
+_PARAMETERS = (
+    *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
+    *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),
+)
+# Twelfths of the campaign: one nearest to the step has all but a 24th of the readings on the right side.
+_WHEN = Shape("when", "1", 0.5, 0.04, 0.96, tried=12)
+
+
+def candidates(sites):
+    """One candidate, at the foot."""
+
+    def displacement(circumstances, when):
+        after = (circumstances.progress >= when).astype(float)
+        return [{coordinate: after} for coordinate in sites.base]
+
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,))]

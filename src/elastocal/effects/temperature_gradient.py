@@ -1,0 +1,69 @@
+"""An arm that is warmer on one side or at one end than at the other.
+
+Across a link a gradient g bends it to the curvature alpha g (Boley and Weiner 1960), so that a link of length l ends by l^2 / 2
+times that to the side and turned by l times that. Along the arm motors and gears at its foot are warmer than the wrist: each
+link grows by a share that goes with how far from the foot it sits. Both in proportion to the temperature where it is measured,
+or to a first order lag since the campaign began.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter, by_warmth
+
+NAME, FAMILY = "temperature_gradient", "drift"
+# Steel, half of the warmth across 0.3 m; by time some 8 K of it.
+_PLAUSIBLE = {"temperature": ("1/(K m)", 2e-5), "time": ("1/m", 1.5e-4)}
+_SHORTEST_M = 0.05
+
+
+def candidates(sites):
+    """Across each link with a length, named by the joint before it, and the column; and along the arm; by each cause."""
+    lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
+    across = [k for k in range(sites.joints + 1) if lengths[k] > _SHORTEST_M]
+    bending = [candidate for link in across for candidate in _across(sites, link)]
+    return [*bending, *_along(sites, lengths)]
+
+
+def _across(sites, link):
+    coordinates, vector = sites.link_end[link], sites.link_vectors_m[link]
+    length = np.linalg.norm(vector)
+    # About the two axes least along the link, made square to it.
+    about = [np.eye(3)[axis] - vector[axis] * vector / length**2 for axis in sites.transverse_axes(link)]
+    names = [f"curvature_about_{'xyz'[axis]}" for axis in sites.transverse_axes(link)]
+
+    def bent(warmer):
+        # A turn about e by s / l carries the end of a beam along x by e cross x over half its length.
+        shifts = [np.cross(e, vector) * length / 2 for e in about]
+        ends = [np.concatenate([shift, length * e]) for shift, e in zip(shifts, about, strict=True)]
+        return [{c: warmer * part for c, part in zip(coordinates, end, strict=True) if part} for end in ends]
+
+    def candidate_of(cause, rise, needs, shapes):
+        unit, plausible = _PLAUSIBLE[cause]
+        parameters = tuple(Parameter(name, unit, plausible) for name in names)
+        where = cause if link else f"column {cause}"
+        law = lambda circumstances, *values: bent(rise(circumstances, *values))  # noqa: E731
+        place = "" if link else "column"
+        return Candidate(NAME, FAMILY, (link,) if link else (), where, parameters, law, needs, shapes, place=place)
+
+    return by_warmth(candidate_of)
+
+
+def _along(sites, lengths):
+    middle = np.cumsum(lengths) - lengths / 2
+    further = middle - middle @ lengths / lengths.sum()
+
+    def grown(warmer):
+        return {
+            coordinate: warmer * along * distance
+            for ends, vector, distance in zip(sites.link_end, sites.link_vectors_m, further, strict=True)
+            for coordinate, along in zip(ends[:3], vector, strict=True)
+            if along
+        }
+
+    def candidate_of(cause, rise, needs, shapes):
+        unit, plausible = _PLAUSIBLE[cause]
+        law = lambda circumstances, *values: [grown(rise(circumstances, *values))]  # noqa: E731
+        growth = (Parameter("growth_along", unit, plausible),)
+        return Candidate(NAME, FAMILY, (), f"along {cause}", growth, law, needs, shapes, place="along")
+
+    return by_warmth(candidate_of)

@@ -1,0 +1,37 @@
+"""Transmission error of an order that is no integer: parts of a gear that do not come round with the joint.
+
+theta_i = a cos(k q_i) + b sin(k q_i) with k between two integers: planets, cranks and cages turn by ratios of numbers of teeth.
+Integers themselves are those of `transmission_harmonic`. Over the part of a turn that a joint uses, orders nearer than half a
+wave over that part are nearly one function, so that the middle between two integers is where a search has to try.
+"""
+
+import numpy as np
+
+from elastocal.effects.protocol import Candidate, Parameter, Shape
+
+NAME, FAMILY = "transmission_order", "transmission"
+_HIGHEST = 18
+# Nearer to an integer than this an order cannot be told from it.
+_MARGIN = 0.25
+_SAMPLES_PER_PERIOD = 4
+_AMPLITUDE_RAD = 2e-4
+
+
+def candidates(sites):
+    """One candidate a joint and interval between two integers."""
+    revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
+    return [_candidate(joint, above) for joint in revolute for above in range(_HIGHEST)]
+
+
+def _candidate(joint, above):
+    order = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
+    parameters = tuple(Parameter(f"{wave}_kq", "rad", _AMPLITUDE_RAD, order=above + 1) for wave in ("cos", "sin"))
+
+    def displacement(circumstances, order):
+        angle = order * circumstances.joint_angles[:, joint]
+        return [{joint: np.cos(angle)}, {joint: np.sin(angle)}]
+
+    detail, angles = f"order {above}-{above + 1}", _SAMPLES_PER_PERIOD * (above + 1)
+    return Candidate(
+        NAME, FAMILY, (joint + 1,), detail, parameters, displacement, shapes=(order,), distinct_angles=angles, place=detail
+    )
