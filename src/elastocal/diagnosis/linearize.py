@@ -151,7 +151,7 @@ def shapes_tried(candidate, fitted):
     if candidate.key in {effect.key for effect in fitted.model.effects}:
         return [tuple(fitted.values_of(candidate.key)[1].tolist())]
     (shape,) = candidate.shapes
-    return [(float(value),) for value in np.geomspace(shape.lowest, shape.highest, _SHAPES_TRIED + 2)[1:-1]]
+    return [(float(value),) for value in shape.values(_SHAPES_TRIED)]
 
 
 def lacking(candidate, sites, states):
