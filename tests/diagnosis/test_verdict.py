@@ -1,6 +1,7 @@
 """From made posteriors to each of the six verdicts."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -21,11 +22,12 @@ from elastocal.diagnosis.verdict import (
     location_probabilities,
 )
 
+OF_THE_ROBOT, OF_THE_SETUP = SimpleNamespace(family="geometry"), SimpleNamespace(family="drift")
 UNITS = (
-    made_unit("offset", (2,), 0),
-    made_unit("offset", (3,), 1),
-    made_unit("payload", (), 2),
-    made_unit("tilt", (2,), 3),
+    made_unit("offset", (2,), 0, candidate=OF_THE_ROBOT),
+    made_unit("offset", (3,), 1, candidate=OF_THE_ROBOT),
+    made_unit("payload", (), 2, candidate=OF_THE_ROBOT),
+    made_unit("tilt", (2,), 3, candidate=OF_THE_ROBOT),
     made_unit(OTHER, (1,), 4),
     made_unit(OTHER, (2,), 5),
 )
@@ -123,6 +125,14 @@ def test_nothing_is_testable_where_only_the_competitor_is_left():
     problem = replace(PROBLEM, units=units)
     found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
     assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
+
+
+def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
+    """A step between set-ups can be tested on a single pose: without one, nothing was tested; with one, it has a name."""
+    problem = replace(PROBLEM, units=(made_unit("setup_step", (), 0, candidate=OF_THE_SETUP), *UNITS[OTHER_1:]))
+    assert concluded(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
+    found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
+    assert found.verdict == NAMED and found.best.mechanisms == ("setup_step",)
 
 
 def test_hypotheses_gather_locations_laws_and_sum_to_one():
