@@ -63,7 +63,9 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
     counts = [sum(value for places, value in by_places.items() if len(places) == size) / odds for size in (1, 2, 3)]
     np.testing.assert_allclose(counts, np.array([4, 2, 1]) / 7)
     for size in (1, 2, 3):
-        np.testing.assert_allclose([v for p, v in by_places.items() if len(p) == size], counts[size - 1] * odds / [3, 3, 1][size - 1])
+        np.testing.assert_allclose(
+            [v for p, v in by_places.items() if len(p) == size], counts[size - 1] * odds / [3, 3, 1][size - 1]
+        )
 
 
 def test_one_mechanism_at_many_joints_costs_less_than_as_many_mechanisms():

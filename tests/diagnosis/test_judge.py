@@ -169,7 +169,9 @@ def test_splits_stand_beside_the_held_out_errors(made):
     observations = held_out.observations
     spoiled = replace(held_out, observations=replace(observations, position=observations.position + 0.01))
     assert split_table(diagnosis_of(case, steps), spoiled, 1)[0] != rows[0]
-    assert [row["after_rms_m"] for row in split_table(diagnosis_of(case, steps), spoiled, 1)[1:]] == [row["after_rms_m"] for row in rows[1:]]
+    assert [row["after_rms_m"] for row in split_table(diagnosis_of(case, steps), spoiled, 1)[1:]] == [
+        row["after_rms_m"] for row in rows[1:]
+    ]
 
 
 @pytest.mark.parametrize("frame", ["base", "tracker"])

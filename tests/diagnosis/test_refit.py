@@ -89,7 +89,9 @@ def test_mean_square_left_is_that_of_the_penalised_fit(found):
 @pytest.mark.parametrize("factor", [0.25, 1.0, 9.0])
 def test_remaining_noise_is_at_least_the_noise(found, factor):
     _, declared, problem, models = found
-    scaled = replace(problem.statistics, squares=factor * problem.statistics.squares, along=factor**0.5 * problem.statistics.along)
+    scaled = replace(
+        problem.statistics, squares=factor * problem.statistics.squares, along=factor**0.5 * problem.statistics.along
+    )
     problem = replace(problem, statistics=scaled)
     model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
     left = remaining_noise(problem, model, declared.noise)
