@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from elastocal.compliance_check import fitted_compliance_warnings
-from elastocal.compliance_check import compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.linearize import linearized
@@ -188,8 +187,6 @@ def _document(case, declared, final, found, known, settings, warnings):
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
-    compliances = _compliances(declared, final)
-    said += compliance_warnings(compliances["after"], compliances["std_error"], final.model.nominal_compliance)
     tested = {unit.candidate.key for unit in found.linearized.problem.units if unit.candidate} if found else set()
     return {
         "campaign": case.campaign.name,
@@ -199,7 +196,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         "noise": _noise_facts(declared.noise, final.noise),
         "misfit": misfit,
         "heldout": None,
-        "compliance_urad_per_Nm": {name: (1e6 * values).tolist() for name, values in compliances.items()},
+        "compliance_urad_per_Nm": _compliances(declared, final),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
@@ -234,13 +231,13 @@ def _noise_facts(measured, left):
 
 
 def _compliances(declared, final):
-    """rad/(N m)."""
     deviations = np.zeros(final.model.sites.joints)
     if final.model.identifies_compliance:
         mine = np.flatnonzero([owner == "joint_compliance" for owner, _ in final.parameters])
         deviations = np.sqrt(np.diag(final.covariance))[mine]
-    return {
+    found = {
         "before": joint_compliances(declared.model, declared.estimate),
         "after": joint_compliances(final.model, final.estimate),
         "std_error": deviations,
     }
+    return {name: (1e6 * values).tolist() for name, values in found.items()}
