@@ -6,7 +6,7 @@ from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "workflow" / "scripts"
 PARAMS = {"seed": 1}
-ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
+STEPS = ("read_campaign", "diagnose_campaign", "judge_campaign", "draw_residuals", "draw_arrows")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
 SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv")
@@ -31,8 +31,8 @@ class _Job:
         self.__dict__.update(parts)
 
 
-def run_loop(folder, robots, out):
-    """Run every step from a campaign's folder to its verdict; results stand in `out`.
+def run_loop(folder, robots, out, steps=STEPS):
+    """Run every step from a campaign's folder to its verdict and figures; results stand in `out`.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def run_loop(folder, robots, out):
         `out`, with ``verdict.json``.
     """
     out.mkdir(parents=True, exist_ok=True)
-    for script in ANALYSIS:
+    for script in steps:
         job = _Job(
             input=Files(out),
             output=Files(out),
@@ -52,6 +52,9 @@ def run_loop(folder, robots, out):
             wildcards=_Named(campaign=folder.name),
             log=[(out / f"{script}.log").as_posix()],
         )
+        if script.startswith("draw_"):
+            figure = script.removeprefix("draw_")
+            job.output = _Named({kind: (out / f"{figure}_figure.{kind}").as_posix() for kind in ("pdf", "png")})
         run_script(script, job)
     return out
 
