@@ -128,7 +128,7 @@ def _explained(case, declared, settings, seed, tell):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
-        alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
+        alarm = alarm_of(problem.problem, problem.products, nothing, draws)
         conclusion = concluded(problem.problem, found, alarm)
         evidence = Evidence(problem, found, nothing, alarm, conclusion)
         tell(_told(conclusion, alarm))

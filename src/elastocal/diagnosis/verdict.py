@@ -12,6 +12,8 @@ from elastocal.diagnosis.hypotheses import OTHER
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
+# Family of what any readings test, even of a single pose: that nothing of it shows says nothing of the robot.
+_OF_THE_SETUP = "drift"
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,8 @@ def concluded(problem, posterior, alarm):
     Conclusion
         adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for. class: one
         mechanism, but which of some, or whether a related one, remains ambiguous. several: more than one mechanism.
-        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism.
+        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism of
+        the robot, and nothing of the set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
@@ -85,7 +88,9 @@ def concluded(problem, posterior, alarm):
         for mechanism in hypothesis.mechanisms:
             present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
     mechanisms = dict(sorted(present.items(), key=lambda entry: -entry[1]))
-    if all(unit.mechanism == OTHER for unit in problem.units):
+    tested = [unit for unit in problem.units if unit.mechanism != OTHER]
+    of_the_robot = [unit for unit in tested if unit.candidate.family != _OF_THE_SETUP]
+    if not tested or not (of_the_robot or alarm.raised):
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
     if not alarm.raised:
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
