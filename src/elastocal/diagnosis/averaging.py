@@ -1,9 +1,9 @@
 """Parameters averaged over models, so that values and intervals are honest after selection.
 
-The exact fit is that of the most probable model. What the others say differently is taken from the linearised problem: the mean
-over models moves the estimate, and their spread widens its standard error (law of total variance). Parameters of the declared
-model are averaged over all models; those of an effect over the models that have it, so that they answer how large it is if it
-is there.
+The exact fit is that of the most probable model at its most probable sizes. What the others say differently is taken from the
+linearised problem: the mean over models moves the estimate, and their spread widens its standard error (law of total variance).
+Parameters of the declared model are averaged over all models; those of an effect over its sizes and the models that have it, so
+that they answer how large it is if it is there.
 
 References
 ----------
@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
 
@@ -89,12 +90,16 @@ def _moments(linearized, model, equations, owners):
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
-    start = declared
-    for unit in units:
-        mine = slice(start, start + len(unit.columns))
-        start += len(unit.columns)
-        if unit.candidate:
-            values = unit.sizes * mean[mine], unit.sizes**2 * np.diag(covariance)[mine]
-            for parameter, value, spread in zip(unit.candidate.parameters, *values, strict=True):
-                found[unit.candidate.key, parameter.name] = value, spread
+    for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model), strict=True):
+        for index, parameter in enumerate(unit.candidate.parameters if unit.candidate else ()):
+            found[unit.candidate.key, parameter.name] = unit.sizes[index] * value[index], unit.sizes[index] ** 2 * spread[index]
     return found
+
+
+def _coefficients(problem, units, model):
+    """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
+    if not units:
+        return []
+    places = np.searchsorted(problem.grid.scales, model.scales)
+    base = problem.statistics.log_likelihood + problem.log_pose
+    return Joint(problem.statistics, units, problem.grid, base, places).moments()
