@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_problems import made_rows
-from scipy.stats import chi2, kstest, ks_2samp
+from scipy.stats import chi2, ks_2samp, kstest
 
 from elastocal.diagnosis.statistics import null_draws, pose_error_unit, statistics_of
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from elastocal.diagnosis.diagnose import Step, declared_sizes
+from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.search import single_log_bayes_factors
@@ -86,12 +86,11 @@ def _with_effects(declared, case, effects):
     settings = Settings()
     for effect, joints in effects:
         listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
-        problem = linearized(declared, case.observations, listed, declared_sizes(declared.model), settings).problem
+        problem = linearized(declared, case.observations, listed, settings).problem
         factors = single_log_bayes_factors(problem)
         # Each at the shape that fits best.
         best = {}
-        for number in problem.candidates:
-            unit = problem.units[number]
+        for number, unit in enumerate(problem.units):
             if unit.candidate and factors[number] > best.get(unit.candidate.key, (-np.inf,))[0]:
                 best[unit.candidate.key] = factors[number], unit.candidate, unit.shapes
         alternatives = [[best[m.key] for m in members if m.key in best] for members in members_of(effect, joints, listed)]

@@ -1,8 +1,8 @@
 """Is anything missing at all? One test, exact by simulation.
 
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
-distribution is that of simulated readings of the same design, at the pose error and the sizes of declared effects that fit best,
-with the pose error averaged over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
+distribution is that of simulated readings of the same design, at the pose error that fits best, with the pose error averaged
+over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
 no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw.
 
 References
@@ -11,11 +11,11 @@ References
 .. [2] Good, I. J. (1992). The Bayes/non-Bayes compromise: a brief review. JASA 87, 597-606.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.diagnosis.evidence import blocks_of, condition, log_likelihood, log_sum_exp
+from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
 from elastocal.diagnosis.statistics import null_draws
 
 
@@ -36,15 +36,15 @@ class Alarm:
     raised: bool
 
 
-def alarm_of(problem, products, nothing, stream):
+def alarm_of(problem, products, pose_error_rad, stream):
     """Test whether the declared model lacks anything.
 
     Parameters
     ----------
     problem : Problem
     products : Products
-    nothing : search.Model
-        The declared model alone: readings are simulated at its pose error, with its sizes of declared effects.
+    pose_error_rad : float
+        Pose error of the declared model at which readings are simulated.
     stream : numpy.random.Generator
 
     Returns
@@ -52,19 +52,12 @@ def alarm_of(problem, products, nothing, stream):
     Alarm
     """
     settings, statistics = problem.settings, problem.statistics
-    chosen = _near(statistics.pose_error_rad, nothing.pose_error_rad)
+    chosen = _near(statistics.pose_error_rad, pose_error_rad)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
-    draws = null_draws(products, nothing.pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
-    # What is declared is in every draw as it is in the readings, and taken off both alike.
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in problem.base)])
-    deviations = np.repeat(nothing.scales, [len(problem.units[number].columns) for number in problem.base])
-    along, squares = _with_declared(statistics.gram, *draws, columns, deviations, stream)
-    every = replace(
-        statistics,
-        along=np.concatenate([statistics.along[..., None], along], axis=2),
-        squares=np.concatenate([statistics.squares[:, None], squares], axis=1),
-    )
-    found = _average_bayes_factors(problem, condition(every, columns, deviations, log_pose), statistics.freedom)
+    along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
+    along = np.concatenate([statistics.along[..., None], along], axis=2)
+    squares = np.concatenate([statistics.squares[:, None], squares], axis=1)
+    found = _average_bayes_factors(problem, statistics, log_pose, along, squares)
     p_value = (1 + (found[1:] >= found[0]).sum()) / len(found)
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
@@ -75,28 +68,18 @@ def _near(pose_error_rad, fitted):
     return np.arange(max(place - 2, 0), min(place + 3, len(pose_error_rad)))
 
 
-def _with_declared(gram, along, squares, columns, deviations, stream):
-    """Draws of white noise with declared effects drawn from their priors added."""
-    values = deviations[:, None] * stream.standard_normal((len(columns), squares.shape[1]))
-    moved = gram[:, :, columns] @ values
-    squares = squares + (values * (2 * along[:, columns] + moved[:, columns])).sum(axis=1)
-    return along + moved, squares
-
-
-def _average_bayes_factors(problem, conditioned, freedom):
+def _average_bayes_factors(problem, statistics, log_pose, along, squares):
     """Log of the average Bayes factor for N sets of readings, ndarray (N,).
 
     Parameters
     ----------
-    problem : Problem
-    conditioned : Conditioned
-        By what is declared, of N sets of readings.
-    freedom : int
+    along : ndarray (T, K, N)
+    squares : ndarray (T, N)
     """
-    grid, prior, along, squares = problem.grid(), problem.prior, conditioned.along, conditioned.squares
-    start = conditioned.log_occam[:, None]
-    nothing = log_sum_exp(start + log_likelihood(squares, freedom), axis=0)
-    blocks = blocks_of(conditioned.gram, problem.units, problem.candidates)
+    grid, prior = problem.grid, problem.prior
+    start = (statistics.log_likelihood + log_pose)[:, None]
+    nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
+    blocks = blocks_of(statistics.gram, problem.units, range(len(problem.units)))
     total = np.full(len(nothing), -np.inf)
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         for place, number in enumerate(members):
@@ -107,7 +90,7 @@ def _average_bayes_factors(problem, conditioned, freedom):
                 widened = 1.0 + scale**2 * values[:, place]
                 gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
                 occam = -0.5 * np.log(widened).sum(axis=1)[:, None]
-                likelihood = log_likelihood(squares - gain, freedom)
+                likelihood = log_likelihood(squares - gain, statistics.freedom)
                 terms.append(log_weight + start + occam + likelihood)
             total = np.logaddexp(total, log_prior + log_sum_exp(np.concatenate(terms), axis=0))
     return total - nothing

@@ -123,13 +123,12 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that is far from it."""
     candidates = list(case.candidates.values())
-    averaged = declared_sizes(declared.model)
     about = declared
     for round_number in range(settings.linearizations):
-        problem = linearized(about, case.observations, candidates, averaged, settings)
+        problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
-        alarm = alarm_of(problem.problem, problem.products, nothing, draws)
+        alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
         conclusion = concluded(problem.problem, found, alarm)
         evidence = Evidence(problem, found, nothing, alarm, conclusion)
         tell(_told(conclusion, alarm))
@@ -137,29 +136,20 @@ def _explained(case, declared, settings, seed, tell):
             return evidence, declared
         model = found.models[conclusion.best.model]
         noise = remaining_noise(problem.problem, model, declared.noise)
-        final = fit_with_sizes(declared, case.observations, noise, selected(problem.problem, model))
+        final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         if alarm.statistic < settings.relinearize_above:
             break
         about = replace(final, noise=noise)
     return evidence, final
 
 
-def declared_sizes(model):
-    """Declared effects whose sizes are averaged over: those without a prior of their own, but for the springs of the joints."""
-    return [
-        effect
-        for effect in model.effects
-        if effect.family != "declared" and all(p.prior_std is None for p in effect.parameters)
-    ]
-
-
 def _effect_steps(case, declared, final, found):
     """One step for each mechanism, the most probable first, each with those before it."""
-    conclusion, problem = found.conclusion, found.linearized.problem
+    conclusion = found.conclusion
     names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
     if not names:
         return []
-    chosen = selected(problem, found.posterior.models[conclusion.best.model])
+    chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
     steps = []
     for number, name in enumerate(names, 1):
         if number == len(names):

@@ -110,8 +110,8 @@ class Conditioned:
     Attributes
     ----------
     gram : ndarray (T, K, K)
-    along : ndarray (T, K) or (T, K, N)
-    squares : ndarray (T,) or (T, N)
+    along : ndarray (T, K)
+    squares : ndarray (T,)
     log_occam : ndarray (T,)
         -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau contributes alone and its prior.
     """
@@ -128,7 +128,6 @@ def condition(statistics, columns, deviations, log_pose):
     Parameters
     ----------
     statistics : Statistics
-        Of one set of readings, or ``along`` and ``squares`` of N sets.
     columns : ndarray of int (D,)
     deviations : ndarray (D,)
         Prior standard deviation of each, in plausible sizes.
@@ -144,12 +143,11 @@ def condition(statistics, columns, deviations, log_pose):
     inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
     factor = np.linalg.cholesky(inner)
     cross = np.linalg.solve(factor, deviations[:, None] * statistics.gram[:, columns])
-    along = statistics.along.reshape(*statistics.along.shape[:2], -1)
-    fitted = np.linalg.solve(factor, deviations[:, None] * along[:, columns])
+    fitted = np.linalg.solve(factor, (deviations * statistics.along[:, columns])[..., None])[..., 0]
     return Conditioned(
         statistics.gram - cross.transpose(0, 2, 1) @ cross,
-        (along - cross.transpose(0, 2, 1) @ fitted).reshape(statistics.along.shape),
-        statistics.squares - (fitted**2).sum(axis=1).reshape(statistics.squares.shape),
+        statistics.along - (fitted[:, None] @ cross)[:, 0],
+        statistics.squares - (fitted**2).sum(axis=1),
         start - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1),
     )
 
@@ -256,7 +254,7 @@ class Evaluated:
     without: np.ndarray
 
 
-def evaluate(statistics, units, grids, log_pose, start):
+def evaluate(statistics, units, grid, log_pose, start):
     """Evidence of one model, averaged over the sizes of its units.
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
@@ -268,8 +266,7 @@ def evaluate(statistics, units, grids, log_pose, start):
     ----------
     statistics : Statistics
     units : sequence of Unit
-    grids : sequence of Grid
-        One for each unit.
+    grid : Grid
     log_pose : ndarray (T,)
         Logarithm of the prior weight of each size of the pose error.
     start : sequence of float
@@ -283,19 +280,19 @@ def evaluate(statistics, units, grids, log_pose, start):
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
-    places = [int(np.argmin(np.abs(grid.scales - size))) for grid, size in zip(grids, start, strict=True)]
-    present = _Joint(statistics, units, grids, base, np.array(places))
+    places = [int(np.argmin(np.abs(grid.scales - size))) for size in start]
+    present = _Joint(statistics, units, grid, base, np.array(places))
     for _ in range(_MOST_ASCENTS):
         profiles = present.profiles()
         best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
         gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
         if gains.max() <= _NO_GAIN:
             break
-        moved = _Joint(statistics, units, grids, base, np.where(gains > _NO_GAIN, best, present.places))
+        moved = _Joint(statistics, units, grid, base, np.where(gains > _NO_GAIN, best, present.places))
         if moved.log_density <= present.log_density:
             places = present.places.copy()
             places[np.argmax(gains)] = best[np.argmax(gains)]
-            moved = _Joint(statistics, units, grids, base, places)
+            moved = _Joint(statistics, units, grid, base, places)
             if moved.log_density <= present.log_density:
                 break
         present = moved
@@ -313,11 +310,10 @@ _MOST_ASCENTS, _NO_GAIN = 30, 1e-9
 class _Joint:
     """Density of the readings under one model with one size for each unit."""
 
-    def __init__(self, statistics, units, grids, base, places):
-        self.units, self.grids, self.base, self.places = units, grids, base, places
+    def __init__(self, statistics, units, grid, base, places):
+        self.units, self.grid, self.base, self.places = units, grid, base, places
         self.freedom = statistics.freedom
-        self.scales = np.array([grid.scales[place] for grid, place in zip(grids, places, strict=True)])
-        self.log_weights = np.array([grid.log_weights[place] for grid, place in zip(grids, places, strict=True)])
+        self.scales, self.log_weights = grid.scales[places], grid.log_weights[places]
         columns = np.concatenate([unit.columns for unit in units])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
         deviations = np.repeat(self.scales, np.diff(self.starts))
@@ -358,7 +354,7 @@ class _Joint:
         return found
 
     def _profile(self, number, values, vectors, turned, squares, log_det):
-        unit, grid = self.units[number], self.grids[number]
+        unit, grid = self.units[number], self.grid
         variances = np.concatenate([[0.0], grid.scales**2])[:, None, None]
         widened = 1.0 + variances * values
         left = squares - (variances * turned**2 / widened).sum(axis=-1)

@@ -119,8 +119,8 @@ def prior_of(units, settings):
     return Prior(odds, counts)
 
 
-def units_of(tested, features, declared, settings):
-    """Units of candidates, of the competitor and of declared effects, numbered in the order of their columns.
+def units_of(tested, features, settings):
+    """Units of candidates and of the competitor, numbered in the order of their columns.
 
     Parameters
     ----------
@@ -128,18 +128,13 @@ def units_of(tested, features, declared, settings):
         With shape values.
     features : sequence of (tuple, int)
         Location and number of columns of each unit of `OTHER`.
-    declared : sequence of Candidate
-        Those of one effect make one unit.
     settings : Settings
 
     Returns
     -------
-    units : tuple of Unit
-        That a model may lack.
-    base : tuple of Unit
-        Declared.
+    tuple of Unit
     """
-    start, units, base, laws = 0, [], [], {}
+    start, units, laws = 0, [], {}
     for candidate, _ in tested:
         laws.setdefault((candidate.effect, candidate.location), []).append(candidate.key)
     for candidate, shapes in tested:
@@ -147,22 +142,13 @@ def units_of(tested, features, declared, settings):
         share = 1.0 / len(set(keys)) / keys.count(candidate.key)
         columns = np.arange(start, start + len(candidate.parameters))
         values = tuple(float(shape) for shape in shapes)
-        units.append(_unit(candidate.effect, candidate.location, [candidate], columns, settings, values, float(np.log(share))))
+        sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])
+        signs = np.array([parameter.sign for parameter in candidate.parameters])
+        log_share = float(np.log(share))
+        units.append(Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share))
         start += len(columns)
     for location, count in features:
         columns = np.arange(start, start + count)
         units.append(Unit(OTHER, location, None, (), columns, np.ones(count), np.zeros(count, int)))
         start += count
-    for effect in dict.fromkeys(candidate.effect for candidate in declared):
-        members = [candidate for candidate in declared if candidate.effect == effect]
-        places = np.cumsum([0, *(len(candidate.parameters) for candidate in declared)])
-        mine = [np.arange(places[n], places[n + 1]) for n, c in enumerate(declared) if c.effect == effect]
-        base.append(_unit(effect, (), members, start + np.concatenate(mine), settings))
-    return tuple(units), tuple(base)
-
-
-def _unit(effect, location, members, columns, settings, shapes=(), log_prior=0.0):
-    parameters = [parameter for candidate in members for parameter in candidate.parameters]
-    sizes = np.array([parameter.plausible * parameter.order**-settings.harmonic_decay for parameter in parameters])
-    signs = np.array([parameter.sign for parameter in parameters])
-    return Unit(effect, location, members[0], shapes, columns, sizes, signs, log_prior)
+    return tuple(units)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from elastocal.effects.protocol import offered
 from elastocal.fitted_range import outside_fitted_range, predictive_variances
 from elastocal.fitting import fit_frames
 from elastocal.held_out import (
@@ -146,8 +147,9 @@ def outside_poses(steps, case, held_out):
     ndarray of bool (P,)
         By `Observations.cluster`.
     """
-    fitted = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1]
-    unseen = held_out.observations
+    fitted, unseen = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1], held_out.observations
+    if not _same_campaign(case, held_out):
+        fitted = carried_over(fitted, unseen.states)
     variances = predictive_variances(fitted, case.observations, *_placed(fitted, case, held_out), unseen)
     outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
     return np.bincount(state_clusters(unseen.states), outside) > 0
@@ -190,10 +192,38 @@ def residual_blocks(diagnosis, held_out):
 
 def _placed(fitted, case, part):
     """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
-    if part is case or part.campaign.name == case.campaign.name:
+    if _same_campaign(case, part):
         return fitted.model, placed_estimate(fitted, part.observations)
-    model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=fitted.model.effects)
-    return model, fit_frames(fitted, model, part.observations, fitted.noise)
+    carried = carried_over(fitted, part.observations.states)
+    model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=carried.model.effects)
+    return model, fit_frames(carried, model, part.observations, fitted.noise)
+
+
+def _same_campaign(case, part):
+    return part is case or part.campaign.name == case.campaign.name
+
+
+def carried_over(fitted, states):
+    """A fit without the effects that another campaign cannot have, or does not record: a wandering tracker, a temperature.
+
+    Parameters
+    ----------
+    fitted : Fit
+    states : States
+        Of the other campaign.
+
+    Returns
+    -------
+    Fit
+    """
+    there = offered(fitted.model.sites, states) | {"load"}
+    kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
+    model = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
+    coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes
+    estimate = replace(
+        fitted.estimate, coefficients=tuple(coefficients[n] for n in kept), shapes=tuple(shapes[n] for n in kept)
+    )
+    return replace(fitted, model=model, estimate=estimate)
 
 
 def _in_order(readings):

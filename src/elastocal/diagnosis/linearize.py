@@ -6,6 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from elastocal.diagnosis import other
+from elastocal.diagnosis.evidence import log_likelihood
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
@@ -30,16 +31,19 @@ class Linearized:
     problem : Problem
     products : Products
         Of one pass over the readings.
+    declared_size : float
+        Size of declared geometry, in plausible sizes, that makes the readings most probable.
     untestable : dict of str to str
         Why a candidate is not tested.
     """
 
     problem: object
     products: object
+    declared_size: float
     untestable: dict
 
 
-def linearized(fitted, observations, candidates, declared, settings):
+def linearized(fitted, observations, candidates, settings):
     """Gather what the readings say of a fit and of all candidates.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is
@@ -51,8 +55,6 @@ def linearized(fitted, observations, candidates, declared, settings):
         Of the declared model, or with effects found already, about which the problem is then linear.
     observations : Observations
     candidates : sequence of Candidate
-    declared : sequence of Candidate
-        Declared effects of the fitted model whose sizes are averaged over, as of declared geometry.
     settings : Settings
 
     Returns
@@ -65,15 +67,14 @@ def linearized(fitted, observations, candidates, declared, settings):
     tested = [(c, shapes) for c in candidates if c.key not in untestable for shapes in shapes_tried(c, fitted)]
     places = other.locations(sites)
     waves = [other.displacements(around, place, settings.other_features) for place in places]
-    laws = [*tested, *((_Fixed(made), ()) for made in waves), *((c, ()) for c in declared)]
+    laws = [*tested, *((_Fixed(made), ()) for made in waves)]
     made = effect_columns(laws, around, line.coordinate_jacobian, observations.state)
-    units, base = units_of(tested, [(place, len(laws)) for place, laws in zip(places, waves, strict=True)], declared, settings)
-    for unit in units:
-        made[..., unit.columns] *= unit.sizes
+    units = units_of(tested, [(place, len(laws)) for place, laws in zip(places, waves, strict=True)], settings)
+    made *= np.concatenate([unit.sizes for unit in units])
     owners = np.array([owner for owner, _ in fitted.parameters])
-    averaged = np.isin(owners, [c.key for c in (*candidates, *declared)])
+    found = np.isin(owners, [candidate.key for candidate in candidates])
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
-    residual = line.residual + line.sensitivities[..., averaged] @ values[averaged]
+    residual = line.residual + line.sensitivities[..., found] @ values[found]
     root = np.sqrt(fitted.weights)
     whitener = whitening(observations, fitted.joint_jacobian, fitted.noise.of_readings)
 
@@ -81,33 +82,83 @@ def linearized(fitted, observations, candidates, declared, settings):
         weighted = values * root.reshape(-1, *[1] * (values.ndim - 1))
         return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
 
-    priors = [parameter for (_, parameter), left in zip(fitted.parameters, averaged, strict=True) if not left]
-    own = np.array([parameter.prior_std is not None for parameter in priors], bool)
-    deviation = np.array([_WIDE * p.plausible if p.prior_std is None else p.prior_std for p in priors])
+    parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
+    sensitivities, jacobian = white(line.sensitivities[..., ~found]), white(fitted.joint_jacobian)
+    pose = np.repeat(observations.cluster, fitted.model.rows)
+    present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
+    size = declared_size(fitted, parameters, owners[~found], sensitivities, white(line.residual), present, settings)
+    deviation = prior_deviations(fitted, parameters, owners[~found], size)
     products = products_of(
-        white(line.sensitivities[..., ~averaged]),
-        white(made),
-        white(residual),
-        white(fitted.joint_jacobian),
-        np.repeat(observations.cluster, fitted.model.rows),
-        deviation,
-        np.where(own, values[~averaged], 0.0),
-        np.zeros(sites.joints),
+        sensitivities, white(made), white(residual), jacobian, pose, deviation, present, np.zeros(sites.joints)
     )
     grid = pose_error_unit(products) * np.array(settings.pose_steps)
     statistics = statistics_of(products, grid)
     kept = testable(statistics, units, settings)
-    for unit, good in zip(units, kept, strict=True):
-        if not good and unit.candidate:
-            untestable.setdefault(unit.candidate.key, "too small to be seen at its plausible size")
-    untestable = {
-        key: why for key, why in untestable.items() if key not in {u.key for u, k in zip(units, kept, strict=True) if k}
-    }
-    # Columns of units that are left out stay in the statistics, where nothing refers to them.
     shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
-    everything = (*shown, *base)
-    free = tuple(range(len(shown), len(everything)))
-    return Linearized(Problem(statistics, everything, free, prior_of(shown, settings), settings), products, untestable)
+    small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
+    untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
+    # Columns of units that are left out stay in the statistics, where nothing refers to them.
+    return Linearized(Problem(statistics, shown, prior_of(shown, settings), settings), products, size, untestable)
+
+
+def declared_geometry(model):
+    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
+    return {
+        effect.effect
+        for effect in model.effects
+        if effect.family != "declared"
+        and all(parameter.prior_std is None or parameter.sized for parameter in effect.parameters)
+    }
+
+
+def prior_deviations(fitted, parameters, owners, size):
+    """Standard deviations of the priors of declared parameters, for one size of declared geometry.
+
+    Parameters
+    ----------
+    fitted : Fit
+    parameters : sequence of Parameter
+    owners : sequence of str
+        Of each parameter.
+    size : float
+        In plausible sizes.
+
+    Returns
+    -------
+    ndarray
+    """
+    sized = {effect.key for effect in fitted.model.effects if effect.effect in declared_geometry(fitted.model)}
+    own = [p.plausible * size if owner in sized else p.prior_std for p, owner in zip(parameters, owners, strict=True)]
+    return np.array([_WIDE * p.plausible if prior is None else prior for p, prior in zip(parameters, own, strict=True)])
+
+
+def has_prior(fitted):
+    """Which parameters of a fit have a prior about zero, declared geometry among them, ndarray of bool."""
+    sized = declared_geometry(fitted.model)
+    effects = {effect.key: effect.effect for effect in fitted.model.effects}
+    return np.array([p.prior_std is not None or effects.get(owner) in sized for owner, p in fitted.parameters], bool)
+
+
+def declared_size(fitted, parameters, owners, sensitivities, residual, present, settings):
+    """Size of declared geometry that makes the readings most probable (type II maximum likelihood, one number for all of it).
+
+    Returns
+    -------
+    float
+        1 where no geometry is declared.
+    """
+    if not declared_geometry(fitted.model):
+        return 1.0
+    best = (-np.inf, 1.0)
+    for size in settings.declared_sizes:
+        deviation = prior_deviations(fitted, parameters, owners, size)
+        rows = np.concatenate([sensitivities * deviation, np.eye(len(deviation))])
+        right = np.concatenate([residual, -present / deviation])
+        basis, factor = np.linalg.qr(rows)
+        squares = right @ right - ((basis.T @ right) ** 2).sum()
+        evidence = log_likelihood(squares, len(residual)) - np.log(np.abs(np.diag(factor))).sum()
+        best = max(best, (float(evidence), size))
+    return best[1]
 
 
 def testable(statistics, units, settings):

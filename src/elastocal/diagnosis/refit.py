@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from elastocal.diagnosis.linearize import declared_geometry
 from elastocal.fitting import fit
 
 
@@ -24,33 +25,32 @@ class Selected:
     ----------
     effects : tuple of (Candidate, ndarray)
         Found, with normal priors on their parameters, and shape values. Without the competitor, which predicts nothing.
-    declared : dict of str to float
-        Size of each declared effect whose size was averaged over, by its name, in plausible sizes.
+    declared_size : float
+        Size of declared geometry, in plausible sizes.
     """
 
     effects: tuple
-    declared: dict
+    declared_size: float
 
 
-def selected(problem, model):
+def selected(linearized, model):
     """What a model of the posterior is for the exact fit.
 
     Parameters
     ----------
-    problem : Problem
+    linearized : Linearized
     model : search.Model
 
     Returns
     -------
     Selected
     """
-    sizes = dict(zip((*problem.base, *model.units), model.scales, strict=True))
     effects = []
-    for number in model.units:
-        unit = problem.units[number]
+    for number, scale in zip(model.units, model.scales, strict=True):
+        unit = linearized.problem.units[number]
         if unit.candidate:
-            effects.append((_with_prior(unit.candidate, sizes[number] * unit.sizes), np.array(unit.shapes, float)))
-    return Selected(tuple(effects), {problem.units[number].mechanism: float(sizes[number]) for number in problem.base})
+            effects.append((_with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
+    return Selected(tuple(effects), linearized.declared_size)
 
 
 def fit_with_sizes(declared, observations, noise, chosen):
@@ -69,10 +69,10 @@ def fit_with_sizes(declared, observations, noise, chosen):
     -------
     Fit
     """
-    model = declared.model
+    model, sized = declared.model, declared_geometry(declared.model)
     known = tuple(
-        _with_prior(effect, chosen.declared[effect.effect] * np.array([p.plausible for p in effect.parameters]))
-        if effect.effect in chosen.declared
+        _with_prior(effect, chosen.declared_size * np.array([parameter.plausible for parameter in effect.parameters]))
+        if effect.effect in sized
         else effect
         for effect in model.effects
     )
@@ -97,9 +97,8 @@ def mean_square_left(problem, model):
     """
     statistics = problem.statistics
     place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
-    members = (*problem.base, *model.units)
-    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in members)])
-    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in members])
+    columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
+    deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
     along = deviations * statistics.along[place, columns]
     inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
     return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
@@ -124,7 +123,7 @@ def remaining_noise(problem, model, noise):
 
 def _with_prior(candidate, deviations):
     parameters = tuple(
-        replace(parameter, prior_std=float(deviation))
+        replace(parameter, prior_std=float(deviation), sized=True)
         for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
     )
     return replace(candidate, parameters=parameters)

@@ -43,28 +43,19 @@ class Problem:
     ----------
     statistics : Statistics
     units : tuple of Unit
-        Candidates, then those of the declared geometry.
-    base : tuple of int
-        Units that every model has: declared geometry.
     prior : Prior
     settings : Settings
     """
 
     statistics: object
     units: tuple
-    base: tuple
     prior: object
     settings: object
 
     @property
-    def candidates(self):
-        """Numbers of the units that a model may have or not."""
-        return [number for number in range(len(self.units)) if number not in set(self.base)]
-
-    def grid(self, number=None):
-        """Sizes of one unit; of a candidate without a number."""
-        scales = self.settings.declared_scales if number in self.base else self.settings.scales
-        return Grid(np.array(scales), scale_weights(scales, self.settings))
+    def grid(self):
+        """Sizes of a unit."""
+        return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
 
     @property
     def log_pose(self):
@@ -79,11 +70,11 @@ class Model:
     Attributes
     ----------
     units : tuple of int
-        Without those of the base, rising.
+        Rising.
     log_odds : float
-        Posterior log odds against the base alone.
+        Posterior log odds against the declared model alone.
     scales : ndarray
-        Most probable sizes, of the base's units first.
+        Most probable size of each unit.
     pose_error_rad : float
         Most probable size of the error common to the readings of a pose.
     """
@@ -119,13 +110,9 @@ def single_log_bayes_factors(problem):
     Returns
     -------
     ndarray (number of units,)
-        -inf for units of the base.
     """
     met, prior = _Searcher(problem).met, problem.prior
-    factors = np.full(len(problem.units), -np.inf)
-    for number in problem.candidates:
-        factors[number] = met[(number,)] - prior.log_odds_of([problem.units[number]])
-    return factors
+    return np.array([met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)])
 
 
 def posterior(problem):
@@ -154,18 +141,14 @@ class _Searcher:
     def __init__(self, problem):
         self.problem = problem
         self.statistics, self.log_pose = problem.statistics, problem.log_pose
-        self.candidates = np.array(problem.candidates, int)
-        self.grids = [problem.grid(number) for number in range(len(problem.units))]
-        self.free_grid = problem.grid()
-        self.empty = self.evaluated((), np.ones(len(problem.base)))
+        self.grid = problem.grid
+        self.empty = self.evaluated((), ())
         self.met, self.sizes, self.measured, self.extended = {(): 0.0}, {(): self.empty.scales}, {}, set()
         self.extend(())
 
     def evaluated(self, model, start):
         """Evidence of a model in full."""
-        members = (*self.problem.base, *model)
-        units, grids = [self.problem.units[n] for n in members], [self.grids[n] for n in members]
-        return evaluate(self.statistics, units, grids, self.log_pose, start)
+        return evaluate(self.statistics, [self.problem.units[n] for n in model], self.grid, self.log_pose, start)
 
     def extend(self, model):
         """Meet a model with each single unit added."""
@@ -174,15 +157,15 @@ class _Searcher:
         self.extended.add(model)
         units = self.problem.units
         taken = {(units[number].mechanism, units[number].location) for number in model}
-        open_units = [int(n) for n in self.candidates if (units[n].mechanism, units[n].location) not in taken]
+        open_units = [n for n, unit in enumerate(units) if (unit.mechanism, unit.location) not in taken]
         if not open_units:
             return
-        members, sizes = (*self.problem.base, *model), self.sizes[model]
-        columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in members)])
-        deviations = np.repeat(sizes, [len(units[n].columns) for n in members])
+        sizes = self.sizes[model]
+        columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in model)])
+        deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
         conditioned = condition(self.statistics, columns, deviations, self.log_pose)
         blocks = blocks_of(conditioned.gram, units, open_units)
-        by_pose_error = added_evidence(conditioned, blocks, self.free_grid, self.statistics.freedom, len(units))
+        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, len(units))
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
         # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
@@ -196,13 +179,13 @@ class _Searcher:
             key = tuple(sorted((*model, number)))
             if odds > self.met.get(key, -np.inf):
                 self.met[key] = float(odds)
-                place = len(self.problem.base) + key.index(number)
-                best = self.free_grid.scales[np.argmax(found[number])]
+                place = key.index(number)
+                best = self.grid.scales[np.argmax(found[number])]
                 self.sizes[key] = np.concatenate([sizes[:place], [best], sizes[place:]])
 
     def keep_likely_pose_errors(self, by_pose_error, total):
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
-        good = np.argsort(-total)[: min(_TELLING_UNITS, len(self.candidates))]
+        good = np.argsort(-total)[:_TELLING_UNITS]
         weights = log_sum_exp(by_pose_error[:, good], axis=2)
         weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
         kept = np.flatnonzero((weights > _UNLIKELY).any(axis=1))
@@ -213,18 +196,18 @@ class _Searcher:
         """Meet a model as it is, in full, and what it would be without each of its units."""
         start = self.sizes.get(model)
         if start is None:
-            start = np.concatenate([self.empty.scales, np.full(len(model), self.problem.settings.scale_center)])
+            start = np.full(len(model), self.problem.settings.scale_center)
         found = self.evaluated(model, start)
-        units, prior, fixed = self.problem.units, self.problem.prior, len(self.problem.base)
+        units, prior = self.problem.units, self.problem.prior
         odds = found.log_evidence - self.empty.log_evidence + prior.log_odds_of(units[n] for n in model)
         self.met[model], self.sizes[model] = odds, found.scales
         self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
         for place, _number in enumerate(model):
             smaller = model[:place] + model[place + 1 :]
             if smaller not in self.met:
-                left = found.without[fixed + place] - self.empty.log_evidence
+                left = found.without[place] - self.empty.log_evidence
                 self.met[smaller] = left + prior.log_odds_of(units[n] for n in smaller)
-                self.sizes[smaller] = np.delete(found.scales, fixed + place)
+                self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
 
     def pose_error(self, found):
@@ -234,12 +217,11 @@ class _Searcher:
     def start_from_whole_mechanisms(self):
         """Meet each mechanism at all its locations, with the best variant at each."""
         units = self.problem.units
-        for mechanism in dict.fromkeys(units[n].mechanism for n in self.candidates if units[n].mechanism != OTHER):
+        for mechanism in dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER):
             best = {}
-            for number in self.candidates:
-                unit = units[number]
-                if unit.mechanism == mechanism and self.met[(int(number),)] > self.met.get(best.get(unit.location), -np.inf):
-                    best[unit.location] = (int(number),)
+            for number, unit in enumerate(units):
+                if unit.mechanism == mechanism and self.met[(number,)] > self.met.get(best.get(unit.location), -np.inf):
+                    best[unit.location] = (number,)
             whole = tuple(sorted(number for (number,) in best.values()))
             if 1 < len(whole) <= self.problem.settings.largest_model:
                 self.measure(whole)

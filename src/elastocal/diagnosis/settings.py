@@ -18,7 +18,7 @@ class Settings:
 
     alarm_level: float = _setting(
         0.02,
-        "probability of an alarm where nothing is missing, exact by simulation; half of a 4 % budget, the rest for noise models",
+        "probability of an alarm where nothing is missing, exact by simulation; half of a 4 % budget; the rest for the noise",
     )
     alarm_draws: int = _setting(
         499,
@@ -42,7 +42,7 @@ class Settings:
     scale_spread: tuple = _setting(
         (3.0, 0.7), "spread of the logarithm of the size below and above the center: small effects are common"
     )
-    declared_scales: tuple = _setting(
+    declared_sizes: tuple = _setting(
         (0.1, 0.3, 1.0, 3.0, 10.0), "sizes of declared geometry: measured robots exceed data-sheet tolerances tenfold"
     )
     pose_steps: tuple = _setting(
@@ -68,7 +68,7 @@ class Settings:
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")
-    largest_model: int = _setting(40, "most units of one model; UR10 series use some 30 bands of gear harmonics")
+    largest_model: int = _setting(100, "most units of one model; UR10 series use some 40 bands of gear harmonics")
     kept_models: int = _setting(
         60, "models whose evidence is computed in full; the rest holds less than 1 % of the probability"
     )

@@ -149,7 +149,7 @@ def candidate_columns(diagnosis):
         angles = nearest_angles(problem, [number for number in chosen if problem.units[number].candidate])
         for number in np.argsort(-factors):
             unit = problem.units[number]
-            if unit.candidate and number not in problem.base:
+            if unit.candidate:
                 gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
                 shape = unit.shapes[0] if unit.shapes else np.nan
                 told = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
@@ -180,7 +180,7 @@ def confounding_columns(diagnosis):
     if not diagnosis.evidence:
         return {"one": [], "other": [], "angle_deg": np.zeros(0)}
     problem = diagnosis.evidence.linearized.problem
-    numbers = [n for n in problem.candidates if problem.units[n].candidate]
+    numbers = [number for number, unit in enumerate(problem.units) if unit.candidate]
     rows, columns = np.tril_indices(len(numbers), -1)
     angles = angles_between(problem, numbers)
     names = [problem.units[n].key for n in numbers]
@@ -191,7 +191,10 @@ def _with_priors(effect, columns):
     """An effect with the priors under which it was fitted."""
     mine = columns["owner"] == effect.key
     prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
+    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
+    # A prior that the catalogue does not have is one whose size was estimated.
     parameters = tuple(
-        replace(p, prior_std=None if np.isnan(prior[p.name]) else float(prior[p.name])) for p in effect.parameters
+        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
+        for p, deviation in zip(effect.parameters, priors, strict=True)
     )
     return replace(effect, parameters=parameters)

@@ -88,7 +88,7 @@ def concluded(problem, posterior, alarm):
         for mechanism in hypothesis.mechanisms:
             present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
     mechanisms = dict(sorted(present.items(), key=lambda entry: -entry[1]))
-    tested = [problem.units[number] for number in problem.candidates if problem.units[number].mechanism != OTHER]
+    tested = [unit for unit in problem.units if unit.mechanism != OTHER]
     of_the_robot = [unit for unit in tested if unit.candidate.family != _OF_THE_SETUP]
     if not tested or not (of_the_robot or alarm.raised):
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)

@@ -20,4 +20,4 @@ def candidates(sites):
         hours = circumstances.time_s / _HOUR_S
         return [{coordinate: hours} for coordinate in sites.base]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}))]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}), of_setup=True)]

@@ -39,6 +39,8 @@ class Parameter:
         That such an effect has by its physics; 0 where it may have either.
     order : int
         Of a harmonic, whose plausible size falls with it; 1 elsewhere.
+    sized : bool
+        Whether the prior's standard deviation was estimated from the readings, not known beforehand.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Parameter:
     prior_std: float | None = None
     sign: int = 0
     order: int = 1
+    sized: bool = False
 
 
 @dataclass(frozen=True)
@@ -106,6 +109,8 @@ class Candidate:
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be told from a smooth one.
+    of_setup : bool
+        Whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
     place : str
         Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
         location are variants of its law, of which only one can hold.
@@ -121,6 +126,7 @@ class Candidate:
     shapes: tuple = ()
     distinct_angles: int = 0
     place: str = ""
+    of_setup: bool = False
 
     @property
     def location(self):

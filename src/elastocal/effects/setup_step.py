@@ -22,4 +22,4 @@ def candidates(sites):
         after = (circumstances.progress >= when).astype(float)
         return [{coordinate: after} for coordinate in sites.base]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,))]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,), of_setup=True)]

@@ -1,5 +1,5 @@
-"""A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the same
-two calls, with a table between them."""
+"""A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
+same two calls, with tables between them."""
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
