@@ -138,6 +138,23 @@ class Sites:
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
         return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
 
+    def longest_weight_torque_Nm(self, joint):  # noqa: N802 - units in names keep their case
+        """Torque on a joint by the weight of all declared masses behind it, each at its longest lever.
+
+        Parameters
+        ----------
+        joint : int
+            From 0.
+
+        Returns
+        -------
+        float
+            A mass counts as in the middle of its link.
+        """
+        levers, gravity = self._longest_levers[:, joint], np.linalg.norm(self.gravity_m_s2)
+        behind = [mass for mass in self.masses if mass.link > joint]
+        return float(sum(mass.mass_kg * gravity * 0.5 * (levers[mass.link - 1] + levers[mass.link]) for mass in behind))
+
     def transverse_axes(self, link):
         """The two axes of the frame at the far end of a link that are least along it."""
         return sorted(np.argsort(np.abs(self.link_vectors_m[link]), kind="stable")[:2].tolist())

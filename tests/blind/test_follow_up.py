@@ -16,10 +16,10 @@ from elastocal.blind.follow_up import diagnosed_anew
 from elastocal.loop.proposed import proposed
 from elastocal.loop.whole import diagnosed
 folder, again, robots = sys.argv[1:]
-verdict = diagnosed(folder, robots, 200, 1)
+verdict = diagnosed(folder, robots, 1)
 effect = verdict["effects"][0]
-frame = proposed(folder, robots, verdict, 3, (0.0, 1.0), 1)
-anew = diagnosed_anew(again, lambda path: diagnosed(path, robots, 200, 1))
+frame = proposed(folder, robots, 3, (0.0, 1.0), 1)
+anew = diagnosed_anew(again, lambda path: diagnosed(path, robots, 1))
 modules = [name for name in sys.modules if name.startswith(("elastocal.plant", "elastocal.blind.cases", "mujoco"))]
 print(json.dumps({"opened": opened, "modules": modules, "states": len(frame), "said": effect, "anew": len(anew)}))
 """

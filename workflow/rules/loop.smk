@@ -89,12 +89,14 @@ rule diagnose_campaign:
         models="results/loop/{campaign}/models.parquet",
         confounding="results/loop/{campaign}/confounding.parquet",
         candidates="reports/loop/{campaign}/candidates.parquet",
+        experiment="reports/loop/{campaign}/next_experiment.csv",
     log:
         "results/logs/diagnose_campaign/{campaign}.log",
     benchmark:
         "results/timings/diagnose_campaign/{campaign}.tsv"
     params:
         seed=config["seed"],
+        states=config["loop"]["proposed_states"],
     script:
         "../scripts/diagnose_campaign.py"
 

@@ -1,14 +1,18 @@
 """What the training poses of a campaign say: faults, noise, declared model, missing mechanisms and the next experiment."""
 
 import sys
+from dataclasses import replace
 
 from elastocal.diagnosis import tables
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
 from elastocal.diagnosis.settings import Settings
+from elastocal.frames import write_csv
 from elastocal.json_files import write_json
 from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.provenance import provenance
+from elastocal.random_streams import stream
 from elastocal.storage import write_table
 
 from job import run
@@ -18,6 +22,10 @@ def diagnose_campaign(job):
     case = opened_case(job.input.descriptions, job.input.training)
     campaign = job.wildcards.campaign
     found = diagnose(case, Settings(), job.params.seed, lambda line: print(f"{campaign}: {line}", file=sys.stderr, flush=True))
+    robot, draws = case.campaign.robot, stream(job.params.seed, case.campaign.name, "next experiment", 0)
+    proposal = propose(found, robot.joint_limits, Settings(), draws, job.params.states)
+    write_csv(job.output.experiment, table_of(proposal, robot))
+    found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
     origin = provenance(job.params, **job.wildcards)
     write_json(job.output.diagnosis, tables.diagnosis_facts(found))
     write_table(job.output.steps, tables.STEPS, tables.step_blocks(found), origin)

@@ -4,6 +4,7 @@ import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
+from elastocal.diagnosis.words import part_of
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
@@ -26,8 +27,7 @@ def location_words(mechanism, location):
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
     places = [entry for entry in location if isinstance(entry, str)]
-    kind = "link" if mechanism in ("link_elasticity", "link_geometry") else "joint"
-    where = f"{kind}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
+    where = f"{part_of(mechanism)}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *places])) or ("base" if mechanism == OTHER else "")
 
 
@@ -155,6 +155,7 @@ def fault_entry(fault):
         "heldout_gain": None,
         "alternatives": list(fault["alternatives"]),
         "angle_to_nearest_deg": None,
+        "evidence": [float(value) if np.isfinite(value) else None for value in fault["evidence"]],
     }
 
 

@@ -1,6 +1,6 @@
 """From a fit of the declared model to the problem that is searched: columns of every unit, whitened, and their products."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -35,12 +35,17 @@ class Linearized:
         Size of declared geometry, in plausible sizes, that makes the readings most probable.
     untestable : dict of str to str
         Why a candidate is not tested.
+    about : Fit
+    candidates : frozenset of str
+        Keys of all candidates: parameters of the fit that they own are coefficients of units here.
     """
 
     problem: object
     products: object
     declared_size: float
     untestable: dict
+    about: object
+    candidates: frozenset
 
 
 def linearized(fitted, observations, candidates, settings):
@@ -72,7 +77,8 @@ def linearized(fitted, observations, candidates, settings):
     units = units_of(tested, [(place, len(laws)) for place, laws in zip(places, waves, strict=True)], settings)
     made *= np.concatenate([unit.sizes for unit in units])
     owners = np.array([owner for owner, _ in fitted.parameters])
-    found = np.isin(owners, [candidate.key for candidate in candidates])
+    keys = frozenset(candidate.key for candidate in candidates)
+    found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     residual = line.residual + line.sensitivities[..., found] @ values[found]
     root = np.sqrt(fitted.weights)
@@ -98,7 +104,8 @@ def linearized(fitted, observations, candidates, settings):
     small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
-    return Linearized(Problem(statistics, shown, prior_of(shown, settings), settings), products, size, untestable)
+    problem = Problem(statistics, shown, prior_of(shown, settings), settings)
+    return Linearized(problem, products, size, untestable, replace(fitted, circumstances=around), keys)
 
 
 def declared_geometry(model):

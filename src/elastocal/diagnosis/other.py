@@ -34,7 +34,7 @@ def locations(sites):
     return [*((joint + 1,) for joint in range(sites.joints)), ()]
 
 
-def displacements(around, location, features):
+def displacements(around, location, features, campaign=None):
     """Random displacements at one location, per unit of their coefficients in plausible sizes.
 
     Parameters
@@ -43,46 +43,58 @@ def displacements(around, location, features):
     location : tuple of int
     features : int
         At a joint.
+    campaign : Circumstances, optional
+        By whose inputs those are normalised; without, by their own. It makes the same function of other states.
 
     Returns
     -------
     list of dict of int to ndarray (S,)
         For each feature a displacement of one coordinate.
     """
-    inputs, load = _inputs(around), _relative_load(around, location)
+    campaign = around if campaign is None else campaign
+    inputs, load = _inputs(around, campaign), _relative_load(around, location, campaign)
+    loaded = bool(_load(campaign, location).any())
     draws = stream(_SEED, OTHER, "random Fourier features", location[0] if location else 0)
     if location:
-        return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws)]
+        return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws, loaded)]
     sizes = dict(zip(around.sites.base, (BASE_M,) * 3 + (BASE_RAD,) * 3, strict=True))
     return [
-        {coordinate: size * wave} for coordinate, size in sizes.items() for wave in _waves(inputs, load, _BASE_FEATURES, draws)
+        {coordinate: size * wave}
+        for coordinate, size in sizes.items()
+        for wave in _waves(inputs, load, _BASE_FEATURES, draws, loaded)
     ]
 
 
-def _waves(inputs, load, count, draws):
+def _waves(inputs, load, count, draws, loaded):
     """Features (count, S) whose squares sum to about one; the second half times the load."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, count))
     frequency = draws.standard_normal((inputs.shape[1], count)) / lengths
     waves = np.sqrt(2.0 / count) * np.cos(inputs @ frequency + draws.uniform(0, 2 * np.pi, count))
-    if load.any():
+    if loaded:
         waves[:, count // 2 :] *= load[:, None]
     return waves.T
 
 
-def _inputs(around):
+def _inputs(around, campaign):
     """Angles as points of a circle, load, sense of approach and time, each of size about one, ndarray (S, D)."""
     parts = [np.cos(around.joint_angles), np.sin(around.joint_angles)]
-    for values in (around.wrench, around.approach, around.time_s, around.temperature_c):
-        if values is not None:
-            values = np.reshape(values, (len(around.joint_angles), -1)).astype(float)
-            spread = np.abs(values - values.mean(axis=0)).max(axis=0)
-            parts.append(((values - values.mean(axis=0)) / np.where(spread > 0, spread, 1.0))[:, spread > 0])
+    for name in ("wrench", "approach", "time_s", "temperature_c"):
+        known = getattr(campaign, name)
+        if known is not None:
+            known = np.reshape(known, (len(campaign.joint_angles), -1)).astype(float)
+            values = np.reshape(getattr(around, name), (len(around.joint_angles), -1)).astype(float)
+            spread = np.abs(known - known.mean(axis=0)).max(axis=0)
+            parts.append(((values - known.mean(axis=0)) / np.where(spread > 0, spread, 1.0))[:, spread > 0])
     return np.concatenate(parts, axis=1)
 
 
-def _relative_load(around, location):
-    """Torque on the joint, or force on the base, relative to the largest, ndarray (S,)."""
-    load = around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)
-    largest = np.abs(load).max(initial=0.0)
+def _relative_load(around, location, campaign):
+    """The load relative to the largest of the campaign, ndarray (S,)."""
+    load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
     return load / largest if largest else np.zeros(len(load))
+
+
+def _load(around, location):
+    """Torque on the joint, or force on the base, ndarray (S,)."""
+    return around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)

@@ -21,6 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
+# Of a variance of one: what is less is rounding, what is added is not seen.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -93,6 +96,26 @@ class Products:
     white_gram: np.ndarray
     rows: int
     freedom: int
+    into_basis: np.ndarray
+    projected: np.ndarray
+
+    def alike(self, declared, candidates, columns):
+        """Whitened rows at other states in the parameters of these products.
+
+        Parameters
+        ----------
+        declared : ndarray (..., P)
+        candidates : ndarray (..., U)
+            Sensitivities to some of the candidates, in units of their plausible sizes.
+        columns : ndarray of int (U,)
+            Which of them.
+
+        Returns
+        -------
+        ndarray (..., P + U)
+        """
+        basis = declared @ self.into_basis
+        return np.concatenate([basis, candidates - basis @ self.projected[:, columns]], axis=-1)
 
 
 def products_of(declared, candidates, residual, jacobian, pose, prior_std, present, joint_rad):
@@ -127,11 +150,14 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
     rest = np.zeros((len(scaled), candidates.shape[1] + 1))
     rest[: len(declared), :-1], rest[: len(declared), -1] = candidates, residual
     rest[len(declared) :, -1] = -present / prior_std
-    scaled = scaled / np.linalg.norm(scaled, axis=0)
-    basis = np.linalg.qr(scaled)[0]
-    rest -= basis @ (basis.T @ rest)
+    norms = np.linalg.norm(scaled, axis=0)
+    basis, triangle = np.linalg.qr(scaled / norms)
+    projected = np.zeros((count, rest.shape[1]))
     # Twice is enough: the second pass removes the rounding of the first.
-    rest -= basis @ (basis.T @ rest)
+    for _ in range(2):
+        taken = basis.T @ rest
+        rest -= basis @ taken
+        projected += taken
     every = np.concatenate([basis, rest], axis=1)
     rows = every[: len(declared)]
     order = np.argsort(pose, kind="stable")
@@ -147,7 +173,19 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
     white = rows[:, :-1]
     freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)
-    return Products(count, every.T @ every, pose_rows, pose_gram, joint_rad, white.T @ white, len(rows), freedom)
+    into_basis = np.linalg.inv(triangle) / norms[:, None]
+    return Products(
+        count,
+        every.T @ every,
+        pose_rows,
+        pose_gram,
+        joint_rad,
+        white.T @ white,
+        len(rows),
+        freedom,
+        into_basis,
+        projected[:, :-1],
+    )
 
 
 def pose_error_unit(products):
@@ -170,8 +208,7 @@ def statistics_of(products, pose_error_rad):
     """
     grams, alongs, squares, logs = [], [], [], []
     for tau in pose_error_rad:
-        rows, log_det = _pose_factor(products, tau)
-        total = products.gram - rows.T @ rows
+        total, log_det = normal_equations(products, tau)
         gram, along, rest, log_declared = _marginal(total, products.declared)
         grams.append(gram)
         alongs.append(along)
@@ -180,6 +217,23 @@ def statistics_of(products, pose_error_rad):
     return Statistics(
         np.asarray(pose_error_rad), np.array(grams), np.array(alongs), np.array(squares), np.array(logs), products.freedom
     )
+
+
+def normal_equations(products, tau):
+    """Z'Sigma(tau)^-1 Z, and ln |Sigma| beyond that of white noise.
+
+    Parameters
+    ----------
+    products : Products
+    tau : float
+        rad.
+
+    Returns
+    -------
+    ndarray (P + K + 1, P + K + 1), float
+    """
+    rows, log_det = _pose_factor(products, tau)
+    return products.gram - rows.T @ rows, log_det
 
 
 def null_draws(products, tau, pose_error_rad, count, stream):
@@ -213,9 +267,7 @@ def null_draws(products, tau, pose_error_rad, count, stream):
         mine = slice(size + pose * joints, size + (pose + 1) * joints)
         covariance[mine, mine] = products.pose_gram[pose]
     scale = np.sqrt(np.clip(np.diag(covariance), 1e-300, None))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = values > 1e-9 * values[-1]
-    root = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
+    root = scale[:, None] * _root(covariance / np.outer(scale, scale), products.rows)
     white = stream.standard_normal((root.shape[1], count))
     drawn = root @ white
     squares = (white**2).sum(axis=0) + stream.chisquare(max(products.rows - root.shape[1], 1), count)
@@ -232,8 +284,7 @@ def null_draws(products, tau, pose_error_rad, count, stream):
         solved = inverse @ seen
         these = along - flat.T @ solved.reshape(-1, count)
         left = squares - (seen * solved).sum(axis=(0, 1))
-        rows, _ = _pose_factor(products, size_rad)
-        total = products.gram - rows.T @ rows
+        total, _ = normal_equations(products, size_rad)
         declared = slice(0, products.declared)
         factor = np.linalg.cholesky(total[declared, declared])
         fitted = solve_triangular(factor, these[declared], lower=True)
@@ -241,6 +292,20 @@ def null_draws(products, tau, pose_error_rad, count, stream):
         found_along.append(these[products.declared :] - cross.T @ fitted)
         found_squares.append(left - (fitted**2).sum(axis=0))
     return np.array(found_along), np.array(found_squares)
+
+
+def _root(correlation, rows):
+    """A matrix whose product with its transpose is a correlation matrix of products of so many white rows.
+
+    The Cholesky factor where there are more rows than products, which is nine times as fast; else by eigenvectors, since the
+    matrix has no more rank than there are rows.
+    """
+    size = len(correlation)
+    if rows > 2 * size:
+        return np.linalg.cholesky(correlation + _ROUNDING * np.eye(size))
+    values, vectors = np.linalg.eigh(correlation)
+    kept = values > _ROUNDING * values[-1]
+    return vectors[:, kept] * np.sqrt(values[kept])
 
 
 def _joint_deviations(products, tau):

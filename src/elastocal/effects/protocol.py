@@ -3,6 +3,9 @@
 An effect is a module of this package with
 
 - ``NAME`` and ``FAMILY``, as in the design's table;
+- ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
+  ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
+  behind them;
 - ``candidates(sites)``, which lists where on this robot the effect can act.
 
 Nothing else knows the effects by name: a new module is a new effect.
@@ -445,7 +448,9 @@ def lever_m(sites, joint):
 
 
 def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
-    """Torque of a kilonewton at the end of the outstretched arm, by which laws of gears are scaled.
+    """Torque of the rated payload, or of a kilonewton, at the end of the outstretched arm and of the weight of its links.
+
+    By it laws of gears are scaled.
 
     Parameters
     ----------
@@ -457,4 +462,5 @@ def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
     -------
     float
     """
-    return _PULL_N * lever_m(sites, joint)
+    pull = _PULL_N if sites.payload_kg is None else sites.payload_kg * float(np.linalg.norm(sites.gravity_m_s2))
+    return pull * lever_m(sites, joint) + sites.longest_weight_torque_Nm(joint)

@@ -1,0 +1,433 @@
+"""What could be measured next on a robot, and what it would tell: poses with loads, and the information in each.
+
+An entry is one pose, read at all targets without its load, under it and under the opposite one, or under given shares of it.
+Loads are those of the campaign: as large, at the same lever or none, in any direction where the campaign has loads in all of
+them; up to the weight of the rated payload where the robot file has it. A weight hung at the flange is known without a load
+cell: readings of its force have no errors. A repeat is another entry: it costs as much as another pose, and tells no more than
+a pose close by.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaign import Target
+from elastocal.diagnosis import other
+from elastocal.model import circumstances, effect_columns, linearize, parameters
+from elastocal.observations import Observations, States
+from elastocal.robot import STANDARD_GRAVITY
+from elastocal.whitening import whitening
+
+# Without a ladder of loads: each pose without its load and under it, and under the opposite one where the campaign has such.
+WITHOUT_AND_WITH, BOTH_SENSES = (0.0, 1.0), (0.0, 1.0, -1.0)
+# Directions of force whose smallest principal mean square reaches this (a third where they are uniform) are free.
+_FREE_DIRECTIONS = 0.02
+# Share of entries under a reference weight, where there can be one.
+_WEIGHTS = 0.25
+# Least share of the largest load that is drawn: laws of gears differ in small loads.
+_SMALLEST_LOAD = 0.2
+# Entries whose sensitivities are in memory at once.
+_BLOCK = 250
+# Chance that a neighbour of an entry approaches a joint from the other side.
+_OTHER_SIDE = 0.15
+
+
+@dataclass(frozen=True)
+class Entries:
+    """E poses with their loads.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (E, n)
+        rad.
+    wrench : ndarray (E, 6)
+        N, N m, at the last measuring point, base axes.
+    approach : ndarray (E, L, n) or None
+        Sense in which each joint is approached at each of L shares of the load.
+    weighed : ndarray of bool (E,)
+        Whether the load is a known weight instead of what a load cell shows.
+    """
+
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    approach: np.ndarray | None
+    weighed: np.ndarray
+
+    def __len__(self):
+        return len(self.joint_angles)
+
+    def at(self, chosen):
+        """Some of the entries."""
+        return Entries(**{name: None if value is None else value[chosen] for name, value in vars(self).items()})
+
+    def then(self, others):
+        """These entries and others."""
+        pairs = zip(vars(self).items(), vars(others).values(), strict=True)
+        return Entries(**{name: None if mine is None else np.concatenate([mine, more]) for (name, mine), more in pairs})
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What robot and campaign can do.
+
+    Attributes
+    ----------
+    limits : ndarray (n, 2)
+        rad.
+    wrenches : ndarray (W, 6)
+        Loads of the campaign, none or more.
+    largest_N : float
+    any_direction, either_sense : bool
+        Whether loads can have any direction, or at least the opposite one.
+    down : ndarray (3,)
+        Direction of weights.
+    weights : bool
+        Whether a reference weight is worth considering.
+    shares : tuple of float
+        Shares of its load at which each pose is read.
+    free : bool
+        Whether size and lever of the load and the side of the approach are chosen for each pose; with a given ladder loads are
+        as large as they can be, and the side is drawn anew for each share.
+    approach_noted : bool
+    """
+
+    limits: np.ndarray
+    wrenches: np.ndarray
+    largest_N: float
+    any_direction: bool
+    either_sense: bool
+    down: np.ndarray
+    weights: bool
+    shares: tuple
+    free: bool
+    approach_noted: bool
+
+
+def reach_of(states, robot, joint_limits, ladder, weights):
+    """What a robot can be asked to do after a campaign.
+
+    Parameters
+    ----------
+    states : States
+        Of the campaign.
+    robot : Robot
+    joint_limits : ndarray (n, 2)
+        rad.
+    ladder : tuple of float or None
+        As in `next_experiment.propose`.
+    weights : bool
+        Whether a reference weight would tell anything, were it within reach.
+
+    Returns
+    -------
+    Reach
+    """
+    force = states.wrench[:, :3]
+    size = np.linalg.norm(force, axis=1)
+    loaded = size > 0
+    heavy = size >= np.median(size[loaded]) if loaded.any() else loaded
+    along = force[loaded] / size[loaded, None]
+    cosines = along @ along.T
+    free = bool(loaded.any()) and np.linalg.eigvalsh(along.T @ along / len(along))[0] > _FREE_DIRECTIONS
+    rated = (robot.payload_kg or 0.0) * STANDARD_GRAVITY
+    gravity = np.asarray(robot.gravity_m_s2, float)
+    either = bool(cosines.min(initial=0.0) < -0.5)
+    shares = ladder if ladder is not None else BOTH_SENSES if either else WITHOUT_AND_WITH
+    return Reach(
+        np.clip(joint_limits, -np.pi, np.pi),
+        states.wrench[heavy],
+        max(size.max(initial=0.0), rated) if loaded.any() else 0.0,
+        free,
+        either,
+        gravity / max(np.linalg.norm(gravity), np.finfo(float).tiny),
+        weights and ladder is None and bool(loaded.any()) and bool(gravity.any()),
+        shares if loaded.any() else (1.0,),
+        ladder is None,
+        states.approach is not None,
+    )
+
+
+def drawn(reach, count, stream):
+    """Random entries within reach.
+
+    Parameters
+    ----------
+    reach : Reach
+    count : int
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    Entries
+    """
+    low, high = reach.limits.T
+    angles = low + (high - low) * stream.random((count, len(low)))
+    wrench, weighed = np.zeros((count, 6)), np.zeros(count, bool)
+    if len(reach.wrenches):
+        wrench = reach.wrenches[stream.integers(0, len(reach.wrenches), count)]
+        share = np.where(stream.random(count) < 0.5, 1.0, stream.uniform(_SMALLEST_LOAD, 1.0, count))
+        # A ladder has its own shares of the largest load.
+        share = share if reach.free else np.ones(count)
+        wrench = wrench * (reach.largest_N * share / np.linalg.norm(wrench[:, :3], axis=1))[:, None]
+        if reach.any_direction:
+            wrench = _turned(wrench, Rotation.random(count, rng=stream))
+        elif reach.either_sense:
+            wrench = wrench * stream.choice([-1.0, 1.0], (count, 1))
+        if reach.free:
+            wrench[:, 3:] *= stream.choice([0.0, 1.0], (count, 1))
+        if reach.weights:
+            weighed = stream.random(count) < _WEIGHTS
+            wrench[weighed] = 0.0
+            wrench[weighed, :3] = reach.largest_N * share[weighed, None] * reach.down
+    return Entries(angles, wrench, approaches(reach, count, stream), weighed)
+
+
+def near(reach, entries, count, radius, stream):
+    """Neighbours of entries: other angles, for half of them another direction of the load, now and then the other side.
+
+    Parameters
+    ----------
+    reach : Reach
+    entries : Entries
+    count : int
+        For each.
+    radius : float
+        rad.
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    Entries
+        `count` of the first, then of the second, ...
+    """
+    found = entries.at(np.repeat(np.arange(len(entries)), count))
+    angles = found.joint_angles + radius * stream.standard_normal(found.joint_angles.shape)
+    wrench, approach = found.wrench, found.approach
+    if reach.any_direction:
+        turn = radius * stream.standard_normal((len(found), 3)) * (stream.random((len(found), 1)) < 0.5)
+        turn[found.weighed] = 0.0
+        wrench = _turned(wrench, Rotation.from_rotvec(turn))
+    if reach.free and reach.approach_noted:
+        approach = approach * np.where(stream.random(angles.shape) < _OTHER_SIDE, -1.0, 1.0)[:, None]
+    return Entries(np.clip(angles, *reach.limits.T), wrench, approach, found.weighed)
+
+
+def _turned(wrench, rotation):
+    return np.concatenate([rotation.apply(wrench[:, :3]), rotation.apply(wrench[:, 3:])], axis=1)
+
+
+def approaches(reach, count, stream):
+    """Random senses of approach: one for each entry where it is chosen, else one for each share of its load.
+
+    Returns
+    -------
+    ndarray (count, L, n) or None
+        None where the campaign does not note them.
+    """
+    if not reach.approach_noted:
+        return None
+    shape = (count, len(reach.shares), len(reach.limits))
+    sides = stream.choice([-1.0, 1.0], shape)
+    return np.broadcast_to(sides[:, :1], shape).copy() if reach.free else sides
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """Turns entries into information on declared parameters and units.
+
+    Attributes
+    ----------
+    model, estimate : Model, Estimate
+        About which sensitivities are taken, with a target at each measuring point that has none yet.
+    own : int
+        Number of the campaign's own targets, which come first.
+    linearized : Linearized
+        In the parameters of whose products information is stated.
+    laws : list of (Candidate, tuple)
+        In the order of the columns, but for features of the competitor, which follow.
+    features : list of (tuple, ndarray of int)
+        Location of each unit of the competitor, and its columns.
+    columns : ndarray of int (U,)
+        Of the statistics, in the order of laws and features.
+    sizes : ndarray (U,)
+    of_load_cell : ndarray of bool (U,)
+        Columns of effects that a reference weight does not have.
+    declared, added : ndarray of bool
+        Which of the model's parameters are those of the products, and which belong to targets that are not there yet.
+    noise : Noise
+        With the error common to the readings of a pose.
+    states : States
+        Of the campaign, whose last session, time and usual temperature go on.
+    reach : Reach
+    """
+
+    model: object
+    estimate: object
+    own: int
+    linearized: object
+    laws: list
+    features: list
+    columns: np.ndarray
+    sizes: np.ndarray
+    of_load_cell: np.ndarray
+    declared: np.ndarray
+    added: np.ndarray
+    noise: object
+    states: States
+    reach: Reach
+
+    @property
+    def extra_points(self):
+        """Measuring points without a target of the campaign, as numbers of targets."""
+        return range(self.own, len(self.model.targets))
+
+    @property
+    def unknowns(self):
+        """Number of columns: declared parameters, units, offsets of further targets."""
+        return int(self.declared.sum()) + len(self.columns) + int(self.added.sum())
+
+    def information(self, entries, targets):
+        """Information on all unknowns in each entry, ndarray (E, U, U).
+
+        Parameters
+        ----------
+        entries : Entries
+        targets : sequence of int
+            Which targets are read.
+        """
+        parts = [np.zeros((0, self.unknowns, self.unknowns))]
+        for start in range(0, len(entries), _BLOCK):
+            rows = self.rows(entries.at(np.arange(start, min(start + _BLOCK, len(entries)))), targets)
+            parts.append(rows.transpose(0, 2, 1) @ rows)
+        return np.concatenate(parts)
+
+    def rows(self, entries, targets):
+        """Whitened sensitivities of the readings of each entry, ndarray (E, rows, U)."""
+        observations = self.observations(entries, targets)
+        around = circumstances(self.model, self.estimate, observations.states)
+        # Nothing comes after the last row of the campaign but these.
+        around = replace(around, progress=np.ones(len(observations.states)))
+        line = linearize(self.model, self.estimate, observations, around)
+        jacobian, state, around = line.coordinate_jacobian, observations.state, line.circumstances
+        campaign = self.linearized.about.circumstances
+        count = sum(len(columns) for _, columns in self.features)
+        waves = [
+            law
+            for place, columns in self.features
+            for law in other.displacements(around, place, self.linearized.problem.settings.other_features, campaign)
+        ]
+        made = effect_columns([*self.laws, (_Known(waves), ())] if count else self.laws, around, jacobian, state) * self.sizes
+        weighed = np.repeat(entries.weighed, len(observations) // len(entries))
+        made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
+        every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
+        white = whitening(observations, jacobian[..., : self.model.sites.joints], self.noise).apply(every)
+        mine = np.flatnonzero(self.declared | self.added)
+        declared, added = white[..., np.flatnonzero(self.declared[mine])], white[..., np.flatnonzero(self.added[mine])]
+        rows = self.linearized.products.alike(declared, white[..., len(mine) :], self.columns)
+        rows = np.concatenate([rows, added], axis=-1)
+        return rows.reshape(len(entries), -1, rows.shape[-1])
+
+    def observations(self, entries, targets):
+        """Entries as observations, those of an entry together; what is measured stays zero."""
+        # A weight only hangs.
+        shares = np.where(entries.weighed[:, None], np.abs(self.reach.shares), self.reach.shares)
+        each = shares.shape[1]
+        count = shares.size
+        usual = None if self.states.temperature_c is None else np.full(count, self.states.temperature_c.mean())
+        states = States(
+            np.full(count, self.estimate.sessions[-1]),
+            np.repeat(np.arange(len(entries)), each),
+            np.tile(np.arange(each), len(entries)),
+            np.repeat(entries.joint_angles, each, axis=0),
+            (entries.wrench[:, None] * shares[..., None]).reshape(count, 6),
+            np.ones(count, int),
+            None if entries.approach is None else entries.approach.reshape(count, -1),
+            None if self.states.time_s is None else np.full(count, self.states.time_s.max()),
+            usual,
+        )
+        targets = np.asarray(targets, int)
+        state, target = np.repeat(np.arange(count), len(targets)), np.tile(targets, count)
+        rotation = np.tile(np.eye(3), (len(target), 1, 1)) if self.model.rows == 6 else None
+        return Observations(states, state, target, np.zeros((len(target), 3)), rotation)
+
+
+@dataclass(frozen=True)
+class _Known:
+    """Displacements that are known already, in the shape of a candidate."""
+
+    laws: list
+
+    def displacement(self, _):
+        return self.laws
+
+
+def instrument_of(linearized, fitted, numbers, noise, states, reach, further_targets):
+    """What tells the information in entries.
+
+    Parameters
+    ----------
+    linearized : Linearized
+    fitted : Fit
+        About which new states are linear: the model found.
+    numbers : sequence of int
+        Units of the problem whose columns matter.
+    noise : Noise
+        Of one reading, with the error common to the readings of a pose.
+    states : States
+        Of the campaign.
+    reach : Reach
+    further_targets : bool
+        Whether a target can be put on measuring points that have none: at a known place where the campaign's targets are.
+
+    Returns
+    -------
+    Instrument
+    """
+    model, estimate, own = fitted.model, fitted.estimate, len(fitted.model.targets)
+    if further_targets:
+        model, estimate = _with_targets_everywhere(model, estimate)
+    owners = [owner for owner, _ in parameters(model, estimate)]
+    new = {f"target {target.name}" for target in model.targets[own:]}
+    added = np.array([owner in new for owner in owners], bool)
+    declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
+    laws, features, columns, sizes, cell = [], [], [], [], []
+    problem = linearized.problem
+    for number in sorted(numbers, key=lambda number: problem.units[number].candidate is None):
+        unit = problem.units[number]
+        if unit.candidate is None:
+            features.append((unit.location, unit.columns))
+        else:
+            laws.append((unit.candidate, unit.shapes))
+        columns.append(unit.columns)
+        sizes.append(unit.sizes)
+        cell.append(np.full(len(unit.columns), unit.candidate is not None and unit.candidate.family == "load"))
+    empty = [np.zeros(0, int)]
+    return Instrument(
+        model,
+        estimate,
+        own,
+        linearized,
+        laws,
+        features,
+        np.concatenate(empty + columns),
+        np.concatenate(empty + sizes),
+        np.concatenate([np.zeros(0, bool), *cell]),
+        declared,
+        added,
+        noise,
+        states,
+        reach,
+    )
+
+
+def _with_targets_everywhere(model, estimate):
+    """One more target on each measuring point without, at an unknown place where all of the campaign's own are unknown."""
+    taken = {target.point for target in model.targets}
+    bare = [point.name for point in model.sites.chain.points if point.name not in taken]
+    place = None if all(target.offset_m is None for target in model.targets) else (0.0, 0.0, 0.0)
+    added = tuple(Target(f"further target on {name}", name, place) for name in bare)
+    offsets = np.concatenate([estimate.target_offset, np.zeros((len(added), 3))])
+    turns = np.concatenate([estimate.target_rotation, np.tile(np.eye(3), (len(added), 1, 1))])
+    estimate = replace(estimate, target_offset=offsets, target_rotation=turns)
+    return replace(model, targets=(*model.targets, *added)), estimate
