@@ -5,11 +5,13 @@ import sys
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "workflow" / "scripts"
-PARAMS = {"seed": 1}
-STEPS = ("read_campaign", "diagnose_campaign", "judge_campaign", "draw_residuals", "draw_arrows")
+PARAMS = {"seed": 1, "states": 4}
+ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
+FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
+STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
-SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv")
+SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf"}
 
 
 class Files:
@@ -17,6 +19,11 @@ class Files:
 
     def __init__(self, folder):
         self.folder = folder
+
+    @property
+    def figures(self):
+        """Those of the report."""
+        return [(self.folder / f"{figure}.pdf").as_posix() for figure in FIGURES]
 
     def __getattr__(self, name):
         return (self.folder / f"{name}{SUFFIXES.get(name, '.parquet')}").as_posix()
@@ -32,7 +39,7 @@ class _Job:
 
 
 def run_loop(folder, robots, out, steps=STEPS):
-    """Run every step from a campaign's folder to its verdict and figures; results stand in `out`.
+    """Run every step from a campaign's folder to its report; results stand in `out`.
 
     Parameters
     ----------
@@ -41,7 +48,7 @@ def run_loop(folder, robots, out, steps=STEPS):
     Returns
     -------
     Path
-        `out`, with ``verdict.json``.
+        `out`, with ``verdict.json`` and ``report.pdf``.
     """
     out.mkdir(parents=True, exist_ok=True)
     for script in steps:
@@ -54,7 +61,7 @@ def run_loop(folder, robots, out, steps=STEPS):
         )
         if script.startswith("draw_"):
             figure = script.removeprefix("draw_")
-            job.output = _Named({kind: (out / f"{figure}_figure.{kind}").as_posix() for kind in ("pdf", "png")})
+            job.output = _Named({kind: (out / f"{figure}.{kind}").as_posix() for kind in ("pdf", "png")})
         run_script(script, job)
     return out
 

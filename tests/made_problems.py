@@ -84,11 +84,8 @@ def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=No
     return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior)
 
 
-def made_problem(rows, units, base=(), settings=None, tau=None):
-    """The problem of some rows: units, then those of the base; at the engine's own sizes of the pose error unless told."""
-    settings = settings or Settings()
-    products = rows.products
+def made_problem(rows, units, settings=None, tau=None):
+    """The problem of some rows, at the engine's own sizes of the pose error unless told, and its products."""
+    settings, products = settings or Settings(), rows.products
     tau = pose_error_unit(products) * np.array(settings.pose_steps) if tau is None else np.asarray(tau, float)
-    everything = (*units, *base)
-    free = tuple(range(len(units), len(everything)))
-    return Problem(statistics_of(products, tau), everything, free, prior_of(units, settings), settings), products
+    return Problem(statistics_of(products, tau), tuple(units), prior_of(units, settings), settings), products

@@ -54,21 +54,20 @@ def deviations_of(units, scales):
     return found
 
 
-def brute_log_bayes_factor(rows, units, grids):
+def brute_log_bayes_factor(rows, units, grid=GRID):
     """Sum over all combinations of sizes and of the pose error."""
     total = []
-    for numbers in np.ndindex(*(len(grid.scales) for grid in grids)):
-        weight = sum(grid.log_weights[n] for grid, n in zip(grids, numbers, strict=True))
-        deviations = deviations_of(units, [grid.scales[n] for grid, n in zip(grids, numbers, strict=True)])
+    for numbers in np.ndindex(*[len(grid.scales)] * len(units)):
+        weight, deviations = grid.log_weights[list(numbers)].sum(), deviations_of(units, grid.scales[list(numbers)])
         total += [weight + pose + log_density(rows, tau, deviations) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
     nothing = [pose + log_density(rows, tau, np.zeros(6)) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
     return logsumexp(total) - logsumexp(nothing)
 
 
-def evaluated(rows, units, start=None, grids=None):
+def evaluated(rows, units, start=None):
     statistics = statistics_of(rows.products, TAU)
     start = [SETTINGS.scale_center] * len(units) if start is None else start
-    return evaluate(statistics, units, grids or [GRID] * len(units), LOG_POSE, start)
+    return evaluate(statistics, units, GRID, LOG_POSE, start)
 
 
 def log_bayes_factor(rows, units):
@@ -84,7 +83,7 @@ def test_evidence_of_one_unit_is_exact(signal, number):
     rows = quiet(1, SIGNALS[signal])
     statistics = statistics_of(rows.products, TAU)
     assert (statistics.squares < statistics.freedom).all(), "the case must be quiet for the reference to be normal"
-    expected = brute_log_bayes_factor(rows, UNITS[number : number + 1], [GRID])
+    expected = brute_log_bayes_factor(rows, UNITS[number : number + 1])
     assert log_bayes_factor(rows, UNITS[number : number + 1]) == pytest.approx(expected, abs=1e-8)
 
 
@@ -100,7 +99,7 @@ def test_evidence_does_not_depend_on_where_the_search_for_the_sizes_starts(numbe
 def test_evidence_of_several_units_is_that_of_all_combinations_of_sizes(signal, chosen):
     """To 0.03 nats: sizes of different units are not quite independent given the readings."""
     rows, units = quiet(3, SIGNALS[signal]), [UNITS[number] for number in chosen]
-    expected = brute_log_bayes_factor(rows, units, [GRID] * len(units))
+    expected = brute_log_bayes_factor(rows, units)
     assert log_bayes_factor(rows, units) == pytest.approx(expected, abs=0.03)
 
 
@@ -112,7 +111,7 @@ def test_evidence_of_two_units_that_contribute_the_same_is_at_most_a_little_too_
     candidates[:, 2] = 0.99 * candidates[:, 0] + np.sqrt(1 - 0.99**2) * candidates[:, 2]
     rows = replace(rows, candidates=candidates, residual=rows.residual + size * candidates[:, 0])
     units = [made_unit("a", (1,), 0), made_unit("b", (1,), 2)]
-    short = log_bayes_factor(rows, units) - brute_log_bayes_factor(rows, units, [GRID] * 2)
+    short = log_bayes_factor(rows, units) - brute_log_bayes_factor(rows, units)
     assert -1.6 < short < 0.1
 
 
@@ -123,8 +122,8 @@ def test_evidence_of_units_that_do_not_overlap_is_exact():
     basis = np.linalg.qr(np.column_stack([rows.declared, rows.candidates]))[0][:, 4:]
     rows = replace(rows, candidates=6.0 * basis, residual=0.3 * rows.residual + basis @ [3.0, -1.0, 2.0, 0.0, 1.0, 0.0])
     one_tau = statistics_of(rows.products, TAU[:1])
-    found = [evaluate(one_tau, units, [GRID] * len(units), np.zeros(1), [0.1] * len(units)) for units in (UNITS, ())]
-    singles = [evaluate(one_tau, [unit], [GRID], np.zeros(1), [0.1]).log_evidence - found[1].log_evidence for unit in UNITS]
+    found = [evaluate(one_tau, units, GRID, np.zeros(1), [0.1] * len(units)) for units in (UNITS, ())]
+    singles = [evaluate(one_tau, [unit], GRID, np.zeros(1), [0.1]).log_evidence - found[1].log_evidence for unit in UNITS]
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(sum(singles), abs=1e-6)
 
 
@@ -166,7 +165,7 @@ def test_loud_residuals_are_not_evidence_for_everything():
     rows = quiet(7)
     loud = replace(rows, residual=rows.expected + 3 / QUIET * (rows.residual - rows.expected))
     assert all(log_bayes_factor(loud, [unit]) < 2.0 for unit in UNITS)
-    assert max(brute_log_bayes_factor(loud, [unit], [GRID]) for unit in UNITS) > 3.0
+    assert max(brute_log_bayes_factor(loud, [unit]) for unit in UNITS) > 3.0
 
 
 def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size():
@@ -226,7 +225,7 @@ def test_half_normal_prior_of_one_coefficient_is_exact(sign, size):
     unit, scale = made_unit("b", (1,), 2, sign), 0.3
     one = statistics_of(rows.products, [0.3])
     grid = Grid(np.array([scale]), np.zeros(1))
-    found = [evaluate(one, units, [grid] * len(units), np.zeros(1), [scale] * len(units)) for units in ([unit], [])]
+    found = [evaluate(one, units, grid, np.zeros(1), [scale] * len(units)) for units in ([unit], [])]
     expected = half_normal_evidence(rows, 0.3, [2], [sign], scale)
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=1e-5)
 
@@ -240,7 +239,7 @@ def test_half_normal_priors_of_two_coefficients_are_taken_one_by_one():
     correlation = one.gram[0][0, 1] / np.sqrt(np.prod(np.diag(one.gram[0])))
     assert 0.02 < abs(correlation) < 0.4
     grid = Grid(np.array([0.1]), np.zeros(1))
-    found = [evaluate(one, units, [grid] * len(units), np.zeros(1), [0.1] * len(units)) for units in ([unit], [])]
+    found = [evaluate(one, units, grid, np.zeros(1), [0.1] * len(units)) for units in ([unit], [])]
     expected = half_normal_evidence(rows, 0.0, [0, 1], [1, -1], 0.1)
     assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=0.05)
 
@@ -275,10 +274,7 @@ def test_log_sum_exp_is_scipys():
 
 
 def test_the_problem_has_the_sizes_of_the_settings():
-    base = made_unit("declared", (), [4, 5])
-    problem, _ = made_problem(made_rows(15), UNITS[:2], (base,))
-    assert problem.base == (2,) and problem.candidates == [0, 1]
-    np.testing.assert_array_equal(problem.grid(2).scales, SETTINGS.declared_scales)
-    np.testing.assert_array_equal(problem.grid(0).scales, problem.grid().scales)
-    np.testing.assert_array_equal(problem.grid().scales, SETTINGS.scales)
+    problem, _ = made_problem(made_rows(15), UNITS)
+    np.testing.assert_array_equal(problem.grid.scales, SETTINGS.scales)
+    np.testing.assert_array_equal(problem.grid.log_weights, GRID.log_weights)
     assert np.exp(problem.log_pose).sum() == pytest.approx(1.0)

@@ -97,9 +97,9 @@ def test_more_than_the_rated_payload_is_named(found):
 
 def test_a_fault_of_the_data_is_an_entry_without_probability():
     fault = {"name": "wrong_unit", "joints": [], "detail": "millimetres", "parameters": [{"name": "factor", "value": 1e-3}]}
-    fault["alternatives"] = ("another frame",)
+    fault |= {"alternatives": ("another frame",), "evidence": (1.0, np.nan)}
     entry = fault_entry(fault)
     assert (entry["name"], entry["family"], entry["detail"]) == ("wrong_unit", "data", "millimetres")
     assert entry["parameters"] == [{"name": "factor", "value": 1e-3, "std_error": None}]
     assert entry["probability"] is None and entry["heldout_gain"] is None
-    assert entry["alternatives"] == ["another frame"]
+    assert entry["alternatives"] == ["another frame"] and entry["evidence"] == [1.0, None]

@@ -97,13 +97,10 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
     tried = [(c, values if c.shapes else ()) for c, values in tried]
     tried += [(c, (0.5,)) for c in catalogue if c.shapes]
     features = [((1,), 40), ((), 48)]
-    declared = [c for c in catalogue if c.effect == "joint_offset"]
-    units, base = units_of(tried, features, declared, SETTINGS)
-    columns = np.concatenate([unit.columns for unit in (*units, *base)])
+    units = units_of(tried, features, SETTINGS)
+    columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
     assert [unit.location for unit in units if unit.mechanism == OTHER] == [(1,), ()]
-    # Declared offsets make one unit, whatever the number of joints.
-    assert [(unit.mechanism, len(unit.columns)) for unit in base] == [("joint_offset", len(declared))]
     # Laws and shapes at one location share its probability.
     for mechanism in {unit.mechanism for unit in units} - {OTHER}:
         for place in {unit.location for unit in units if unit.mechanism == mechanism}:
@@ -114,7 +111,7 @@ def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(cat
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):
     chosen = [c for c in catalogue if c.effect in ("transmission_harmonic", "stiffening", "base_compliance")]
-    units, _ = units_of([(c, tuple(shape.start for shape in c.shapes)) for c in chosen], [], [], SETTINGS)
+    units = units_of([(c, tuple(shape.start for shape in c.shapes)) for c in chosen], [], SETTINGS)
     for unit, candidate in zip(units, chosen, strict=True):
         orders = np.array([parameter.order for parameter in candidate.parameters])
         expected = [parameter.plausible for parameter in candidate.parameters] * orders**-SETTINGS.harmonic_decay

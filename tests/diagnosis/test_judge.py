@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from elastocal.loop.judge import Step, judged, residual_blocks, split_table
 from made_folders import made_folder, made_table
 from scipy.spatial.transform import Rotation
 

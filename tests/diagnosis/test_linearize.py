@@ -8,9 +8,8 @@ from planted import HAND, planted, two_loads_a_pose
 from scipy.stats import chi2, ncx2
 from synthetic import NOISE, made_states
 
-from elastocal.diagnosis.diagnose import declared_sizes
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.linearize import lacking, linearized, shapes_tried
+from elastocal.diagnosis.linearize import declared_geometry, lacking, linearized, shapes_tried
 from elastocal.diagnosis.linearize import testable as which_are_testable
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting import fit
@@ -29,7 +28,7 @@ def campaign(kuka):
 def problem_of(campaign, fitted=None, keys=KEYS, settings=SETTINGS):
     fitted = fitted or campaign.declared
     candidates = [campaign.candidates[key] for key in keys]
-    return linearized(fitted, campaign.observations, candidates, declared_sizes(campaign.declared.model), settings)
+    return linearized(fitted, campaign.observations, candidates, settings)
 
 
 def with_effect(campaign, key, values):
@@ -56,7 +55,7 @@ def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(ca
     # Robust weights of the fit stay as they are.
     pushed = replace(fitted, estimate=fitted.estimate)
     observations = replace(campaign.observations, position=campaign.observations.position + (fitted.residual - off))
-    after = linearized(pushed, observations, [campaign.candidates[k] for k in KEYS], [], SETTINGS)
+    after = linearized(pushed, observations, [campaign.candidates[k] for k in KEYS], SETTINGS)
     change = after.problem.statistics.along[0] - found.problem.statistics.along[0]
     expected = found.problem.statistics.gram[0][:, unit.columns] @ step
     np.testing.assert_allclose(change, expected, atol=2e-3 * np.abs(expected).max())
@@ -84,20 +83,21 @@ def test_an_effect_is_found_at_its_true_size(campaign):
     assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
 
 
-def test_declared_effects_with_sizes_of_their_own_are_in_every_model(kuka):
-    campaign = planted(kuka, {}, seed=2)
-    declared = campaign.declared.model.with_effects([campaign.candidates["joint_offset@2"]])
-    start = campaign.declared.estimate.with_effects([campaign.candidates["joint_offset@2"]])
-    fitted = fit(declared, campaign.observations, campaign.declared.noise, start)
-    averaged = declared_sizes(declared)
-    assert [effect.key for effect in averaged] == ["joint_offset@2"]
-    found = linearized(fitted, campaign.observations, [campaign.candidates["joint_offset@3"]], averaged, SETTINGS)
-    assert [found.problem.units[number].mechanism for number in found.problem.base] == ["joint_offset"]
-    # Springs of the joints keep their wide priors: their columns are projected off.
-    without = fit(campaign.declared.model, campaign.observations, campaign.declared.noise)
-    alone = linearized(without, campaign.observations, [campaign.candidates["joint_offset@3"]], [], SETTINGS)
-    assert found.problem.statistics.freedom == alone.problem.statistics.freedom
-    assert alone.problem.base == ()
+@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
+def test_declared_geometry_has_the_size_that_the_readings_make_most_probable(offset, size, kuka):
+    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
+    signs = np.array([1.0, -1.0, 1.0, -1.0])
+    campaign = planted(kuka, {key: [sign * offset] for key, sign in zip(keys, signs, strict=True)}, seed=2)
+    known = [campaign.candidates[key] for key in keys]
+    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
+    fitted = fit(model, campaign.observations, campaign.declared.noise, start)
+    # Springs of the joints have no size: they keep their wide priors.
+    assert declared_geometry(model) == {"joint_offset"}
+    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
+    assert found.declared_size == size
+    assert size in SETTINGS.declared_sizes
+    alone = linearized(campaign.declared, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
+    assert alone.declared_size == 1.0 and declared_geometry(campaign.declared.model) == set()
 
 
 def test_the_competitor_is_at_every_joint_and_at_the_base_always(campaign):
@@ -168,6 +168,6 @@ def test_the_prior_of_a_declared_parameter_is_kept(kuka):
     model = campaign.declared.model.with_effects([stiff])
     fitted = fit(model, campaign.observations, campaign.declared.noise, campaign.declared.estimate.with_effects([stiff]))
     other = [campaign.candidates["joint_offset@2"]]
-    held = linearized(fitted, campaign.observations, other, [], SETTINGS).problem.statistics
-    free = linearized(campaign.declared, campaign.observations, other, [], SETTINGS).problem.statistics
+    held = linearized(fitted, campaign.observations, other, SETTINGS).problem.statistics
+    free = linearized(campaign.declared, campaign.observations, other, SETTINGS).problem.statistics
     np.testing.assert_allclose(held.gram[0][0, 0], free.gram[0][0, 0], rtol=1e-3)

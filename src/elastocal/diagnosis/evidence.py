@@ -110,8 +110,8 @@ class Conditioned:
     Attributes
     ----------
     gram : ndarray (T, K, K)
-    along : ndarray (T, K) or (T, K, N)
-    squares : ndarray (T,) or (T, N)
+    along : ndarray (T, K)
+    squares : ndarray (T,)
     log_occam : ndarray (T,)
         -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau contributes alone and its prior.
     """
@@ -128,7 +128,6 @@ def condition(statistics, columns, deviations, log_pose):
     Parameters
     ----------
     statistics : Statistics
-        Of one set of readings, or ``along`` and ``squares`` of N sets.
     columns : ndarray of int (D,)
     deviations : ndarray (D,)
         Prior standard deviation of each, in plausible sizes.
@@ -144,12 +143,11 @@ def condition(statistics, columns, deviations, log_pose):
     inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
     factor = np.linalg.cholesky(inner)
     cross = np.linalg.solve(factor, deviations[:, None] * statistics.gram[:, columns])
-    along = statistics.along.reshape(*statistics.along.shape[:2], -1)
-    fitted = np.linalg.solve(factor, deviations[:, None] * along[:, columns])
+    fitted = np.linalg.solve(factor, (deviations * statistics.along[:, columns])[..., None])[..., 0]
     return Conditioned(
         statistics.gram - cross.transpose(0, 2, 1) @ cross,
-        (along - cross.transpose(0, 2, 1) @ fitted).reshape(statistics.along.shape),
-        statistics.squares - (fitted**2).sum(axis=1).reshape(statistics.squares.shape),
+        statistics.along - (fitted[:, None] @ cross)[:, 0],
+        statistics.squares - (fitted**2).sum(axis=1),
         start - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1),
     )
 

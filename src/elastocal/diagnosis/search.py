@@ -185,7 +185,7 @@ class _Searcher:
 
     def keep_likely_pose_errors(self, by_pose_error, total):
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
-        good = np.argsort(-total)[: min(_TELLING_UNITS, len(total))]
+        good = np.argsort(-total)[:_TELLING_UNITS]
         weights = log_sum_exp(by_pose_error[:, good], axis=2)
         weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
         kept = np.flatnonzero((weights > _UNLIKELY).any(axis=1))

@@ -210,7 +210,10 @@ def _with_priors(effect, columns):
     """An effect with the priors under which it was fitted."""
     mine = columns["owner"] == effect.key
     prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
+    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
+    # A prior that the catalogue does not have is one whose size was estimated.
     parameters = tuple(
-        replace(p, prior_std=None if np.isnan(prior[p.name]) else float(prior[p.name])) for p in effect.parameters
+        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
+        for p, deviation in zip(effect.parameters, priors, strict=True)
     )
     return replace(effect, parameters=parameters)

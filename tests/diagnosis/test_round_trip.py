@@ -121,7 +121,7 @@ def test_confounding_has_every_pair_of_tested_candidates_once(found, tmp_path):
     diagnosis, _ = found
     table = there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])
     problem = diagnosis.evidence.linearized.problem
-    numbers = [n for n in problem.candidates if problem.units[n].candidate]
+    numbers = [n for n, unit in enumerate(problem.units) if unit.candidate]
     assert len(table["one"]) == len(numbers) * (len(numbers) - 1) // 2
     angles, keys = angles_between(problem, numbers), [problem.units[n].key for n in numbers]
     for place in range(0, len(table["one"]), 997):
