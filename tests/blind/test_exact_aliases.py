@@ -7,6 +7,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
+from elastocal.screening import directions
+
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
 from elastocal.fitting import fit
@@ -15,7 +17,6 @@ from elastocal.loop.declared import noise_of
 from elastocal.loop.intake import taken_in
 from elastocal.loop.reading_columns import reading_columns
 from elastocal.model import circumstances
-from elastocal.screening import directions
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE = 1e-6
