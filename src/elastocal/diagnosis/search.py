@@ -17,7 +17,6 @@ import numpy as np
 from elastocal.diagnosis.evidence import (
     Grid,
     added_evidence,
-    blocks_of,
     condition,
     evaluate,
     log_likelihood,
@@ -164,7 +163,7 @@ class _Searcher:
         columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in model)])
         deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
         conditioned = condition(self.statistics, columns, deviations, self.log_pose)
-        blocks = blocks_of(conditioned.gram, units, open_units)
+        blocks = conditioned.blocks_of(units, open_units)
         by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, len(units))
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)

@@ -21,6 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
+# Eigenvalues below this share of the largest are rounding.
+_ROUNDING = 1e-9
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -253,24 +256,21 @@ def null_draws(products, tau, pose_error_rad, count, stream):
         As in `Statistics`, for N draws of unit variance.
     """
     poses, joints, width = products.pose_rows.shape
-    # Covariance of [Z' e, J' e] for white e, from which all that is needed of the readings is drawn without drawing them.
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
-    size = width - 1
-    covariance = np.zeros((size + poses * joints,) * 2)
-    covariance[:size, :size] = products.white_gram
-    covariance[size:, :size] = flat
-    covariance[:size, size:] = flat.T
-    for pose in range(poses):
-        mine = slice(size + pose * joints, size + (pose + 1) * joints)
-        covariance[mine, mine] = products.pose_gram[pose]
-    scale = np.sqrt(np.clip(np.diag(covariance), 1e-300, None))
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    kept = values > 1e-9 * values[-1]
-    root = scale[:, None] * vectors[:, kept] * np.sqrt(values[kept])
-    white = stream.standard_normal((root.shape[1], count))
-    drawn = root @ white
-    squares = (white**2).sum(axis=0) + stream.chisquare(max(products.rows - root.shape[1], 1), count)
-    along, seen = drawn[:size], drawn[size:].reshape(poses, joints, count)
+    # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
+    kept, inverse, root = _pseudo_inverse(products.pose_gram)
+    white = stream.standard_normal((poses, joints, count)) * kept[..., None]
+    seen = root @ white
+    known = inverse @ products.pose_rows[..., :-1]
+    scale = np.sqrt(np.clip(np.diag(products.white_gram), 1e-300, None))
+    left = (products.white_gram - flat.T @ known.reshape(flat.shape)) / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(left)
+    told = values > _ROUNDING * len(scale)
+    rest = stream.standard_normal((int(told.sum()), count))
+    along = known.reshape(flat.shape).T @ seen.reshape(-1, count)
+    along += scale[:, None] * (vectors[:, told] @ (np.sqrt(values[told])[:, None] * rest))
+    freedom = max(products.rows - int(kept.sum()) - len(rest), 1)
+    squares = (white**2).sum(axis=(0, 1)) + (rest**2).sum(axis=0) + stream.chisquare(freedom, count)
     common = _joint_deviations(products, tau)[None, :, None] * stream.standard_normal((poses, joints, count))
     squares = squares + 2 * (common * seen).sum(axis=(0, 1))
     moved = products.pose_gram @ common
@@ -291,6 +291,15 @@ def null_draws(products, tau, pose_error_rad, count, stream):
         found_along.append(these[products.declared :] - cross.T @ fitted)
         found_squares.append(left - (fitted**2).sum(axis=0))
     return np.array(found_along), np.array(found_squares)
+
+
+def _pseudo_inverse(grams):
+    """Directions that are not rounding (G, n), pseudo-inverse and square root (G, n, n), of symmetric positive matrices."""
+    values, vectors = np.linalg.eigh(grams)
+    kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    values = np.where(kept, values, 1.0)
+    inverse = (vectors * (kept / values)[:, None]) @ vectors.transpose(0, 2, 1)
+    return kept, inverse, vectors * (kept * np.sqrt(values))[:, None]
 
 
 def _joint_deviations(products, tau):
