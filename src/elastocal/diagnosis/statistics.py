@@ -21,6 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
+
 # Eigenvalues below this share of the largest are rounding.
 _ROUNDING = 1e-9
 
@@ -114,8 +116,7 @@ class Products:
         -------
         ndarray (..., P + U)
         """
-        basis = declared @ self.into_basis
-        return np.concatenate([basis, candidates - basis @ self.projected[:, columns]], axis=-1)
+        return rows_alike(self, declared, candidates, columns)
 
 
 def products_of(declared, candidates, residual, jacobian, pose, prior_std, present, joint_rad):
@@ -184,7 +185,7 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
         len(rows),
         freedom,
         into_basis,
-        projected[:, :-1],
+        projected,
     )
 
 
@@ -199,7 +200,7 @@ def statistics_of(products, pose_error_rad):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     pose_error_rad : ndarray (T,)
 
     Returns
@@ -224,14 +225,17 @@ def normal_equations(products, tau):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     tau : float
-        rad.
+        rad; of sums, the nearest of their sizes counts.
 
     Returns
     -------
     ndarray (P + K + 1, P + K + 1), float
     """
+    if isinstance(products, Sums):
+        place = int(np.argmin(np.abs(products.pose_error_rad - tau)))
+        return products.totals[place], products.log_dets[place]
     rows, log_det = _pose_factor(products, tau)
     return products.gram - rows.T @ rows, log_det
 
@@ -241,11 +245,11 @@ def null_draws(products, tau, pose_error_rad, count, stream):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     tau : float
         Pose error with which to simulate, rad.
     pose_error_rad : ndarray (T,)
-        At which the statistics are wanted.
+        At which the statistics are wanted; of sums, that with which they are simulated alone.
     count : int
     stream : numpy.random.Generator
 
@@ -255,6 +259,9 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     squares : ndarray (T, N)
         As in `Statistics`, for N draws of unit variance.
     """
+    if isinstance(products, Sums):
+        gram = _marginal(normal_equations(products, tau)[0], products.declared)[0]
+        return tuple(drawn[None] for drawn in null_draws_of(products, gram, count, stream))
     poses, joints, width = products.pose_rows.shape
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
     # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
