@@ -254,7 +254,7 @@ class _Source:
             yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_readings), root)
 
     def declared_part(self, parts):
-        """Triangular factor of declared sensitivities and residual, and the standard error with which one pose tells a joint."""
+        """Triangular factor of declared sensitivities and residual; standard error with which one pose tells a joint."""
         information = []
 
         def rows():
