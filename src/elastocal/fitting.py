@@ -260,7 +260,7 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
 
 
 def observations_at_once(rows, columns):
-    """How many observations are linearised at once, for so many parameters; what else a linearisation makes is as 60 of them."""
+    """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
     return max(_MOST_HELD // (rows * max(columns, 60)), 1)
 
 

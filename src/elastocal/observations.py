@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.groups import groups_of
+
 # Readings this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
 
@@ -92,27 +94,6 @@ def state_clusters(states):
     ndarray (S,)
     """
     return groups_of(np.column_stack([states.session, states.pose]))[1]
-
-
-def groups_of(keys):
-    """Which rows of an array are alike: `numpy.unique` along its first axis, many times as fast.
-
-    Parameters
-    ----------
-    keys : ndarray (N, k)
-
-    Returns
-    -------
-    first : ndarray (G,)
-        First row of each group; groups in lexicographic order.
-    group : ndarray (N,)
-    """
-    order = np.lexsort(keys.T[::-1])
-    rising = keys[order]
-    new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
-    group = np.empty(len(keys), int)
-    group[order] = np.cumsum(new) - 1
-    return order[new], group
 
 
 def averaged(readings):
