@@ -67,6 +67,11 @@ class Settings:
         100.0,
         "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
     )
+    searched_observations: int = _setting(
+        50_000,
+        "averaged readings at poses spread over the campaign that the search looks at; so many show what is a hundredth of the"
+        " noise, and the fit takes all",
+    )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")
     largest_model: int = _setting(100, "most units of one model; UR10 series use some 40 bands of gear harmonics")
