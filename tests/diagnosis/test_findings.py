@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from planted import planted
 
+from elastocal.diagnosis.averaging import Averaged
 from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries
 from elastocal.diagnosis.hypotheses import OTHER
 
@@ -53,7 +54,7 @@ def with_value(fitted, key, value, error):
 def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
-    (entry,) = parameter_entries(next(e for e in fitted.model.effects if e.key == "joint_offset@3"), fitted)
+    (entry,) = parameter_entries(next(e for e in fitted.model.effects if e.key == "joint_offset@3"), fitted, Averaged({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
