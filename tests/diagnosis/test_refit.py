@@ -94,7 +94,7 @@ def test_remaining_noise_is_at_least_the_noise(found, factor):
     )
     problem = replace(problem, statistics=scaled)
     model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
-    left = remaining_noise(problem, model, declared.noise)
+    left = remaining_noise(problem, model, declared.noise, declared.noise)
     expected = np.sqrt(max(mean_square_left(problem, model), 1.0))
     assert left.position_m == pytest.approx(expected * declared.noise.position_m)
     assert left.position_m >= declared.noise.position_m
