@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
+from elastocal.selection import search
 
 from elastocal.campaign import read_campaign, split, write_campaign
 from elastocal.campaign_simulation import Plan, simulated_measurements
@@ -19,7 +20,6 @@ from elastocal.loop.declared import noise_of
 from elastocal.model import declared_model
 from elastocal.observations import averaged
 from elastocal.public_data import FOLDER_VARIABLE
-from elastocal.selection import search
 from elastocal.sites import sites_of
 
 POSES, POINTS = 60, ("2DoF", "3DoF", "4DoF", "6DoF")

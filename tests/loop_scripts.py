@@ -1,22 +1,32 @@
 """The scripts of the loop's rules, run one after the other in this process as Snakemake would run them."""
 
 import runpy
+import sys
 from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[1] / "workflow" / "scripts"
-PARAMS = {"seed": 1}
-STEPS = (
-    ("read_campaign", "", "training held_out descriptions"),
-    (
-        "diagnose_campaign",
-        "descriptions training",
-        "diagnosis steps correlations models confounding candidates",
-    ),
-    ("judge_campaign", "descriptions training held_out diagnosis steps", "verdict before_after splits residuals"),
-    ("draw_residuals", "descriptions residuals", "residuals_figure"),
-    ("draw_arrows", "descriptions residuals", "arrows_figure"),
-)
-SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json") | dict.fromkeys(("before_after", "splits"), ".csv")
+PARAMS = {"seed": 1, "states": 4}
+ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
+FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
+STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
+# Names of the rules' files by which others know them; what is not listed is a Parquet table.
+SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
+SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf"}
+
+
+class Files:
+    """Files of a folder by the names that rules give them: what one script writes the next finds."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    @property
+    def figures(self):
+        """Those of the report."""
+        return [(self.folder / f"{figure}.pdf").as_posix() for figure in FIGURES]
+
+    def __getattr__(self, name):
+        return (self.folder / f"{name}{SUFFIXES.get(name, '.parquet')}").as_posix()
 
 
 class _Named(dict):
@@ -29,7 +39,7 @@ class _Job:
 
 
 def run_loop(folder, robots, out, steps=STEPS):
-    """Run every step from a campaign's folder to its verdict and figures; results stand in `out`.
+    """Run every step from a campaign's folder to its report; results stand in `out`.
 
     Parameters
     ----------
@@ -38,32 +48,26 @@ def run_loop(folder, robots, out, steps=STEPS):
     Returns
     -------
     Path
-        `out`, with ``verdict.json``.
+        `out`, with ``verdict.json`` and ``report.pdf``.
     """
     out.mkdir(parents=True, exist_ok=True)
-
-    def files(words):
-        pairs = [word.split(":") for word in words.split()]
-        return _Named({pair[-1]: (out / f"{pair[0]}{SUFFIXES.get(pair[0], '.parquet')}").as_posix() for pair in pairs})
-
-    for script, inputs, outputs in steps:
+    for script in steps:
         job = _Job(
-            input=files(inputs),
-            output=files(outputs),
+            input=Files(out),
+            output=Files(out),
             params=_Named(PARAMS | {"folder": folder.as_posix(), "robots": robots.as_posix()}),
             wildcards=_Named(campaign=folder.name),
             log=[(out / f"{script}.log").as_posix()],
         )
         if script.startswith("draw_"):
-            job.output = _Named({kind: (out / f"{outputs}.{kind}").as_posix() for kind in ("pdf", "png")})
+            figure = script.removeprefix("draw_")
+            job.output = _Named({kind: (out / f"{figure}.{kind}").as_posix() for kind in ("pdf", "png")})
         run_script(script, job)
     return out
 
 
 def run_script(script, job):
     """Run one script of the workflow with a job in the place of Snakemake's."""
-    import sys
-
     sys.path.insert(0, SCRIPTS.as_posix())
     try:
         runpy.run_path((SCRIPTS / f"{script}.py").as_posix(), {"snakemake": job}, "__main__")

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from elastocal.diagnosis.settings import Settings
+
 FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
 
 
@@ -36,8 +38,8 @@ def residual_table(poses=30, targets=2, loaded=True, timed=True, found=True, rep
     return table
 
 
-def candidate_table(count=30, untestable=5, chosen=1, beyond=2):
-    """Columns of a candidates table: the first ones stand out most, the last cannot be tested."""
+def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"):
+    """Columns of a candidates table: by falling Bayes factor, the last cannot be tested."""
     total = count + untestable
     names = [f"effect_{number}@{number % 6 + 1}" for number in range(total)]
     tested = np.arange(total) < count
@@ -52,13 +54,13 @@ def candidate_table(count=30, untestable=5, chosen=1, beyond=2):
         "family": np.array([FAMILIES[number % len(FAMILIES)] for number in range(total)], object),
         "joints": np.array([name.split("@")[1] for name in names], object),
         "shape": np.where(rank == 1, 44.7213, np.nan),
-        "p_value": where_tested(10.0 ** -(40.0 - rank)),
-        "p_family": where_tested(np.where(rank < beyond, 0.0005, 0.9)),
-        "statistic": where_tested(200 - 4 * rank),
-        "bic_gain": where_tested(180 - 4 * rank),
-        "chosen": rank < chosen,
+        "parameters": np.ones(total, int),
+        "log_bayes_factor": where_tested(100.0 - 7 * rank),
+        "probability": where_tested(np.where(rank < chosen, 0.94, 0.01)),
+        "noncentrality": where_tested(200.0),
         "angle_deg": where_tested(50.0),
-        "note": np.where(tested, "", "no time in the data").astype(object),
+        "chosen": rank < chosen,
+        "note": np.where(tested, "", note).astype(object),
     }
 
 
@@ -66,13 +68,25 @@ def confounding_table(candidates):
     """Angles of all pairs of the tested candidates of a table."""
     shapes = [f" {shape:.3g}" if np.isfinite(shape) else "" for shape in candidates["shape"]]
     named = candidates["candidate"] + np.array(shapes, object)
-    names = named[np.isfinite(candidates["p_value"])]
+    names = named[np.isfinite(candidates["log_bayes_factor"])]
     pairs = [(one, other) for number, one in enumerate(names) for other in names[:number]]
     return {
         "one": np.array([one for one, _ in pairs], object),
         "other": np.array([other for _, other in pairs], object),
         "angle_deg": np.linspace(0, 90, len(pairs)),
     }
+
+
+def probabilities(sets=None, alarm_p_value=0.002):
+    """Probabilities of verdict.json; `sets` of mechanisms with their locations, each with its probability."""
+    sets = sets or [({"lost_motion": ["joint 3"]}, 0.94), ({"joint_tilt": ["joint 2"]}, 0.05), ({}, 0.004)]
+    listed = [{"mechanisms": list(where), "probability": value, "locations": where} for where, value in sets]
+    mechanisms = {}
+    for where, value in sets:
+        for name in where:
+            mechanisms[name] = mechanisms.get(name, 0.0) + value
+    nothing = sum(value for where, value in sets if not where)
+    return {"nothing": nothing, "alarm_p_value": alarm_p_value, "mechanisms": mechanisms, "sets": listed}
 
 
 def step_rows(effects=("lost_motion",), controls=("joint_offset@4",), largest_m=3e-4):
@@ -93,6 +107,19 @@ def step_rows(effects=("lost_motion",), controls=("joint_offset@4",), largest_m=
     return rows
 
 
+def split_rows(changed=True, blocks=4):
+    """Rows of splits.csv: the held-out poses, and blocks of joint space."""
+    rows = []
+    for split, block in [("held out", "all"), ("joint space", "all"), *(("joint space", k + 1) for k in range(blocks))]:
+        row = {"split": split, "block": block, "poses": 10}
+        for stage, size in (("before", 1.2e-4), ("after", 0.8e-4 if changed else 1.2e-4)):
+            row |= {f"{stage}_rms_m": size, f"{stage}_rms_m_low": 0.8 * size, f"{stage}_rms_m_high": 1.3 * size}
+        fall = 1 - row["after_rms_m"] / row["before_rms_m"]
+        row |= {"reduction": fall, "reduction_low": fall - 0.1, "reduction_high": fall + 0.1, "reduction_std_error": 0.05}
+        rows.append(row)
+    return rows
+
+
 def experiment_rows(effect="link_elasticity", count=10):
     """Rows of next_experiment.csv."""
     rows = []
@@ -101,29 +128,38 @@ def experiment_rows(effect="link_elasticity", count=10):
             f"q{joint}": -0.1 * joint for joint in range(1, 7)
         }
         row |= {"fx": 910.1, "fy": -0.2, "fz": -411.8, "mx": -205.9, "my": 0.0, "mz": 455.1}
-        rows.append(row | {"separation": 110.0 + 10 * number, "separation_without": 100.0})
+        rows.append(row | {"separation": 10.0 + number, "separation_without": 6.0})
     return rows
 
 
 def effect_entry(
-    name="lost_motion", members=("lost_motion@3",), joints=(3,), parameters=("half_play",), alternatives=(), doubted=()
+    name="lost_motion", members=("lost_motion@3",), joints=(3,), parameters=("half_play",), alternatives=(), locations=None
 ):
-    """An entry of the effects of verdict.json; its first member goes with what is `doubted`."""
+    """An entry of the effects of verdict.json."""
     named = [
-        {"name": f"{member} {parameter}", "value": 1.2e-4 * (1 + number), "std_error": 3e-6, "unit": "rad", "held": False}
+        {
+            "name": f"{member} {parameter}",
+            "value": 1.2e-4 * (1 + number),
+            "std_error": 3e-6,
+            "unit": "rad",
+            "prior_std": 1e-5,
+            "held": False,
+        }
         for number, (member, parameter) in enumerate((m, p) for m in members for p in parameters)
     ]
+    locations = locations or [(f"joint {joint}", 1.0) for joint in joints] or [("", 1.0)]
     return {
         "name": name,
         "family": "gearbox",
         "joints": list(joints),
         "members": list(members),
+        "probability": 0.94,
+        "locations": [{"location": where, "probability": value} for where, value in locations],
         "parameters": named,
-        "p_value": 0.0005,
+        "p_value": 0.002,
         "heldout_gain": 0.24,
         "alternatives": list(alternatives),
-        "doubts": [{"effect": members[0], "departure": departure, "p_value": 0.001} for departure in doubted],
-        "angle_to_nearest_deg": 49.0,
+        "angle_to_nearest_deg": None,
     }
 
 
@@ -133,57 +169,84 @@ def fault_entry():
         "name": "wrong_unit",
         "family": "data",
         "joints": [],
-        "detail": "the loads look as if they were written in kilonewtons",
-        "parameters": [{"name": "newtons for each unit of force written", "value": 1000.0, "std_error": None, "unit": "N"}],
+        "detail": "the loads fit as if they were written in kilonewtons",
+        "members": [],
+        "probability": None,
+        "locations": [],
+        "parameters": [
+            {"name": "newtons for each unit of force written", "value": 1000.0, "std_error": None, "unit": "N"},
+            {"name": "poses compared", "value": 12.0, "std_error": None, "unit": "–"},
+        ],
         "p_value": None,
         "heldout_gain": None,
-        "alternatives": [],
-        "doubts": [],
+        "alternatives": ["a load that is 1000 times larger"],
         "angle_to_nearest_deg": None,
+        "evidence": [0.5, 1e-4],
     }
 
 
-def verdict_document(word, effects=(), warnings=(), rejected_after=False, noise="repeats", campaign="made_up", held=()):
+def verdict_document(
+    word,
+    effects=(),
+    warnings=(),
+    noise="repeats",
+    campaign="made_up",
+    held=(),
+    sets=None,
+    outside=0,
+    reduction=(0.15, 0.32),
+    next_experiment=None,
+):
     """Contents of verdict.json."""
-    known = noise != "residual"
-    before = {
-        "mean_square_over_noise": 1.5 if known else None,
-        "p_value": 1e-6 if known else None,
-        "rejected": bool(effects) and known,
-    }
-    after = {"mean_square_over_noise": 1.01 if known else None, "p_value": 0.4 if known else None, "rejected": rejected_after}
+    known, faulty = noise != "residual", any(effect["family"] == "data" for effect in effects)
     errors = {"mean_m": 1.1e-4, "rms_m": 1.2e-4, "p95_m": 2.0e-4, "max_m": 3.0e-4}
+    after = {name: (0.7 if effects and not faulty else 1.0) * value for name, value in errors.items()}
     return {
         "campaign": campaign,
         "verdict": word,
         "effects": list(effects),
+        "probabilities": None if faulty else probabilities(sets),
         "noise": {
             "source": noise,
             "position_m": 6e-5,
             "orientation_rad": 6e-5,
             "joint_rad": [0.0] * 5 + [2e-5],
             "degrees_of_freedom": 1008 if noise == "repeats" else 0,
+            "pose_rad": 1.5e-5,
+            "factor": 1.0,
         },
-        "lack_of_fit": {"before": before, "after": after, "explained_share": 0.3},
+        "misfit": None if faulty else {"before": 5.2, "after": 1.02},
         "heldout": {
             "before": errors,
-            "after": {name: 0.7 * value for name, value in errors.items()},
+            "after": after,
             "noise_floor_rms_m": 5e-5 if known else None,
-            "reduction_ci95": [0.15, 0.32],
+            "reduction_ci95": list(reduction),
             "reduction_std_error": 0.04,
             "poses": 10,
+            "share_below_max": 0.74,
+            "outside_range": {
+                "poses": outside,
+                "inside": {"before": errors, "after": after},
+                "outside": {"before": errors, "after": after} if outside else None,
+            },
         },
         "compliance_urad_per_Nm": {"before": [0.5] * 6, "after": [0.48] * 6, "std_error": [0.01] * 5 + [0.0]},
         "held": list(held),
-        "candidates_tested": 30,
+        "candidates_tested": 0 if faulty else 30,
+        "untestable": {
+            "frame_drift": "no time in the data",
+            **{f"hysteresis@{k}": "no approach in the data" for k in (1, 2, 3)},
+        },
+        "converged": {"declared": True, "final": True},
         "warnings": list(warnings),
-    }
+        "settings": Settings().document(),
+    } | ({"next_experiment": next_experiment} if next_experiment else {})
 
 
-def parameter_table(declared=("joint_offset@2 offset",), held=()):
-    """Columns of a parameters table: a frame, the compliances, those named, and the discrepancy."""
+def parameter_table(declared=("joint_offset@2 offset",), held=(), by_prior=()):
+    """Columns of a parameters table: a frame, the compliances and those named, some of which only their priors determine."""
     named = [f"frame 0 {axis}" for axis in ("dx", "dy", "dz")] + [f"joint_compliance c{joint}" for joint in range(1, 7)]
-    named += [*declared, "fit discrepancy"]
+    named += declared
     count = len(named)
     return {
         "owner": np.array([name.rsplit(" ", 1)[0] for name in named], object),
@@ -192,7 +255,7 @@ def parameter_table(declared=("joint_offset@2 offset",), held=()):
         "value": np.full(count, 3e-4),
         "std_error": np.full(count, 2e-5),
         "held": np.isin(named, held),
-        "prior_std": np.full(count, np.nan),
+        "prior_std": np.where(np.isin(named, by_prior), 2.1e-5, np.nan),
     }
 
 

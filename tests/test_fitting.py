@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
+from planted import two_loads_a_pose
 from scipy.linalg import block_diag
 from scipy.stats import chi2, kstest
 from support import OTHER_CHAINS, chain_of
@@ -57,7 +58,7 @@ def test_noiseless_readings_give_back_every_parameter(fanuc, keys, rows):
     ]
     # The last step is a thousandth of a standard error at most; the next one would be its square.
     assert (np.abs(values[0] - values[1]) <= 1e-4 * deviation[order] + 1e-12 * np.abs(values[1])).all()
-    assert found.discrepancy_m == 0.0 and (found.weights == 1.0).all()
+    assert (found.weights == 1.0).all()
 
 
 def test_compliances_are_identified(fanuc):
@@ -106,7 +107,7 @@ def noisy(fanuc):
 def test_estimate_and_covariance_are_those_of_statsmodels_gls(noisy):
     model, _, noise, _, drawn = noisy
     seen = drawn(np.random.default_rng(10))
-    found = fit(model, seen, noise, discrepancy_m=0.0)
+    found = fit(model, seen, noise)
     line = linearize(model, found.estimate, seen, circumstances(model, found.estimate, seen.states))
     blocks = reading_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
     sigma = block_diag(*(blocks / seen.states.repeats[:, None, None]))
@@ -121,7 +122,7 @@ def test_estimate_and_covariance_are_those_of_statsmodels_gls(noisy):
     )
     # At the estimate nothing is left to step.
     assert (np.abs(reference.params * scale) < 5e-3 * deviation).all()
-    assert not found.held.any() and found.degrees_of_freedom == reference.df_resid
+    assert not found.held.any()
 
 
 def test_spread_over_data_sets_is_the_standard_error(noisy):
@@ -131,7 +132,7 @@ def test_spread_over_data_sets_is_the_standard_error(noisy):
     own = [i for i, (owner, _) in enumerate(listed) if not owner.startswith(("frame ", "target "))]
     deviations, squares = np.empty((sets, len(own))), np.empty(sets)
     for number in range(sets):
-        found = fit(model, drawn(np.random.default_rng((11, number))), noise, start=true, discrepancy_m=0.0)
+        found = fit(model, drawn(np.random.default_rng((11, number))), noise, start=true)
         error = np.concatenate(found.estimate.coefficients) - np.concatenate(true.coefficients)
         covariance = found.covariance[np.ix_(own, own)]
         deviations[number] = error / np.sqrt(np.diag(covariance))
@@ -147,9 +148,10 @@ def test_spread_over_data_sets_is_the_standard_error(noisy):
 def test_weighted_residual_has_unit_mean_square(noisy):
     model, _, noise, _, drawn = noisy
     seen = drawn(np.random.default_rng(12))
-    found = fit(model, seen, noise, discrepancy_m=0.0)
-    mean_square = (found.whitened(found.residual) ** 2).sum() / found.degrees_of_freedom
-    low, high = chi2.ppf([1e-3, 1 - 1e-3], found.degrees_of_freedom) / found.degrees_of_freedom
+    found = fit(model, seen, noise)
+    freedom = found.residual.size - (~found.held).sum()
+    mean_square = (found.whitened(found.residual) ** 2).sum() / freedom
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], freedom) / freedom
     assert 0.95 * low < mean_square < high
 
 
@@ -174,7 +176,6 @@ def test_what_the_frame_or_the_target_makes_as_well_is_held_and_named(fanuc, key
     without = fit(model_of(fanuc, "joint_offset@3"), seen, NOISE)
     np.testing.assert_allclose(found.estimate.coefficients[1], without.estimate.coefficients[0], rtol=1e-9)
     np.testing.assert_allclose(found.covariance[~found.held][:, ~found.held], without.covariance, rtol=1e-6, atol=1e-22)
-    assert found.degrees_of_freedom == without.degrees_of_freedom == 120 - 10
 
 
 def test_what_the_data_can_tell_is_not_shrunk(fanuc):
@@ -205,7 +206,7 @@ def test_outliers_get_little_weight_and_do_little_harm(fanuc):
     clean = with_noise(seen_exactly(model, true, made_states(6, 60, seed=25)), np.random.default_rng(26))
     moved = clean.position.copy()
     moved[[3, 20, 41]] += [[0.02, 0, 0], [0, -0.02, 0], [0.01, 0.01, 0.01]]
-    found = fit(model, replace(clean, position=moved), NOISE, discrepancy_m=0.0)
+    found = fit(model, replace(clean, position=moved), NOISE)
     before = fit(model, clean, NOISE)
     assert (found.weights[[3, 20, 41]] < 0.02).all()
     assert np.median(np.delete(found.weights, [3, 20, 41])) == 1.0
@@ -218,39 +219,11 @@ def test_outliers_get_little_weight_and_do_little_harm(fanuc):
     assert np.abs(pulled[-1]) > 3 * shift
 
 
-def test_residuals_above_the_noise_are_taken_as_a_discrepancy(fanuc):
-    model = model_of(fanuc)
-    true = made_estimate(model, seed=27)
-    states = made_states(6, 150, seed=28)
-    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(29), position_m=np.hypot(60e-6, 200e-6))
-    found = fit(model, seen, NOISE)
-    np.testing.assert_allclose(found.discrepancy_m, 200e-6, rtol=0.15)
-    mean_square = (found.whitened(found.residual) ** 2).sum() / found.degrees_of_freedom
-    np.testing.assert_allclose(mean_square, 1.0, rtol=0.03)
-    given = fit(model, seen, NOISE, discrepancy_m=1e-3)
-    assert given.discrepancy_m == 1e-3
-
-
-def test_no_discrepancy_where_the_noise_explains_the_residual(fanuc):
-    model = model_of(fanuc)
-    seen = seen_exactly(model, made_estimate(model, seed=30), made_states(6, 60, seed=31))
-    # A little less noise than declared, so that the draw cannot matter.
-    assert fit(model, with_noise(seen, np.random.default_rng(32), position_m=54e-6), NOISE).discrepancy_m == 0.0
-
-
-def test_orientations_far_above_their_noise_are_taken_as_a_discrepancy_too(fanuc):
-    model = model_of(fanuc, rows=6, targets=(Target("A", "6DoF", (0.0, 0.0, 0.0)),), fitted_frames=False)
-    seen = seen_exactly(model, made_estimate(model, seed=33), made_states(6, 40, seed=34))
-    found = fit(model, with_noise(seen, np.random.default_rng(35), orientation_rad=3e-3), NOISE)
-    mean_square = (found.whitened(found.residual) ** 2).sum() / found.degrees_of_freedom
-    np.testing.assert_allclose(mean_square, 1.0, rtol=0.03)
-
-
 def test_series_with_a_prior_is_at_its_most_probable_values(fanuc):
     model = model_of(fanuc, "transmission_harmonic@3[orders 3-6]", "joint_offset@2")
     true = made_estimate(model, seed=42)
     seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=43)), np.random.default_rng(44))
-    found = fit(model, seen, NOISE, discrepancy_m=0.0)
+    found = fit(model, seen, NOISE)
     line = linearize(model, found.estimate, seen, circumstances(model, found.estimate, seen.states))
     left = found.whitened(line.sensitivities).reshape(180, -1)
     precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in found.parameters])
@@ -355,32 +328,6 @@ def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_
     assert abs(value / torque - half_play / taken_up) < 4 * deviation / torque
 
 
-def test_wild_observations_are_those_of_little_weight_and_do_not_count(fanuc):
-    model = model_of(fanuc, "joint_offset@3")
-    true = made_estimate(model, seed=49)
-    seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=50)), np.random.default_rng(51))
-    moved = seen.position.copy()
-    moved[[3, 20, 41]] += 40 * 60e-6 * np.eye(3)
-    found, clean = (fit(model, replace(seen, position=position), NOISE) for position in (moved, seen.position))
-    np.testing.assert_array_equal(np.flatnonzero(~found.tame), [3, 20, 41])
-    assert clean.tame.all() and clean.tame_freedom == clean.degrees_of_freedom == 180 - 10
-    assert found.tame_freedom == found.degrees_of_freedom - 9 == 180 - 10 - 9
-    # Nor are they taken for something that the model lacks.
-    assert found.discrepancy_m == pytest.approx(clean.discrepancy_m, abs=10e-6)
-
-
-def test_a_discrepancy_is_found_beside_wild_observations(fanuc):
-    model = model_of(fanuc)
-    seen = seen_exactly(model, made_estimate(model, seed=52), made_states(6, 150, seed=53))
-    seen = with_noise(seen, np.random.default_rng(54), position_m=np.hypot(60e-6, 200e-6))
-    moved = seen.position.copy()
-    moved[::30] += 0.02
-    found = fit(model, replace(seen, position=moved), NOISE)
-    assert found.discrepancy_m == pytest.approx(200e-6, rel=0.15)
-    tame = found.residual * found.tame[:, None]
-    assert (found.whitened(tame) ** 2).sum() == pytest.approx(found.tame_freedom, rel=5e-3)
-
-
 def bent(fanuc, seed, shape, key="thermal_growth[time]"):
     """Noisy readings of a law with a shape somewhere in its range, and the model that made them."""
     model = model_of(fanuc, key)
@@ -445,3 +392,30 @@ def test_ordinary_fits_converge(fanuc):
         seen_exactly(model, made_estimate(model, seed=61), made_states(6, 30, seed=62)), np.random.default_rng(63)
     )
     assert fit(model, seen, NOISE).converged
+
+
+def test_an_error_of_the_pose_counts_once_for_all_its_readings(fanuc):
+    """Two loads and two targets a pose: estimate and covariance are those of statsmodels with the covariance written out."""
+    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
+    states = two_loads_a_pose(6, 15, seed=60)
+    seen = seen_exactly(model, made_estimate(model, seed=61), states)
+    noise = replace(NOISE, joint_rad=1e-6 * np.array([20.0, 20, 20, 30, 30, 30]), pose_rad=1e-4)
+    found = fit(model, with_noise(seen, np.random.default_rng(62)), noise)
+    line = linearize(model, found.estimate, seen, found.circumstances)
+    jacobian = line.coordinate_jacobian[..., :6].reshape(-1, 6)
+    state, pose = np.repeat(seen.state, 3), np.repeat(seen.cluster, 3)
+    sigma = (jacobian * noise.joint_rad**2) @ jacobian.T * (state[:, None] == state)
+    sigma += noise.position_m**2 * np.eye(len(sigma)) + noise.pose_rad**2 * (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    root = np.repeat(1 / np.sqrt(found.weights), 3)
+    scale = np.array([p.plausible for _, p in found.parameters])
+    left = line.sensitivities.reshape(len(sigma), -1) * scale
+    reference = sm.GLS(found.residual.ravel(), left, sigma=root[:, None] * sigma * root).fit()
+    expected = reference.normalized_cov_params * np.outer(scale, scale)
+    deviation = np.sqrt(np.diag(expected))
+    np.testing.assert_allclose(
+        found.covariance / np.outer(deviation, deviation), expected / np.outer(deviation, deviation), atol=5e-3
+    )
+    assert found.converged and (np.abs(reference.params * scale) / deviation).max() < 5e-3
+    # The offset is known by the poses alone, so much worse than their many readings would tell.
+    without = fit(model, replace(seen), replace(noise, pose_rad=0.0))
+    assert found.covariance[-1, -1] > 2 * without.covariance[-1, -1]

@@ -47,7 +47,7 @@ def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
     found = cross_validated(fitted, seen, part)
     for number in range(4):
         rest, left = (select_states(seen, mask) for mask in (part != number, part == number))
-        refit = fit(fitted.model, rest, fitted.noise, None, fitted.discrepancy_m)
+        refit = fit(fitted.model, rest, fitted.noise)
         expected = position_errors(fitted.model, refit.estimate, left).distance
         np.testing.assert_allclose(found.distance[part[seen.state] == number], expected, rtol=1e-9)
     np.testing.assert_array_equal(found.cluster, seen.cluster)
@@ -60,7 +60,7 @@ def test_readings_of_a_part_do_not_reach_its_prediction(fanuc):
     part = np.arange(16).repeat(2) // 4
     mask = part[seen.state] == 2
     moved = replace(seen, position=seen.position + mask[:, None] * [0.0, 0.0, 1.0])
-    whole = fit(fitted.model, moved, fitted.noise, None, fitted.discrepancy_m)
+    whole = fit(fitted.model, moved, fitted.noise)
     before, after = (cross_validated(replace(fitted, estimate=whole.estimate), of, part).distance for of in (seen, moved))
     np.testing.assert_allclose(after[mask], 1.0, atol=5 * before[mask].max())
     # The others are predicted from them, and do change.

@@ -10,7 +10,7 @@ from elastocal.campaign import Target
 from elastocal.model import circumstances, linearize
 from elastocal.noise import Noise
 from elastocal.observations import Observations
-from elastocal.whitening import spectrum, whitening
+from elastocal.whitening import whitening
 
 TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
 NOISE = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))
@@ -31,27 +31,51 @@ def case(request, fanuc):
     return seen, jacobian
 
 
-def dense_covariance(seen, jacobian, noise, discrepancy):
+def dense_covariance(seen, jacobian, noise):
     """Covariance of all rows, written out from what the noise means."""
     rows = seen.rows
-    joints = jacobian.reshape(-1, 6) * noise.joint_rad
-    state = np.repeat(seen.state, rows)
-    together = state[:, None] == state
-    share = noise.orientation_rad / noise.position_m
+    joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
+    state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
     sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
-    lacking = np.tile(([discrepancy] * 3 + [discrepancy * share] * 3)[:rows], len(seen))
-    one = (joints @ joints.T) * together + np.diag(sensor**2)
-    return one / seen.states.repeats[state] + np.diag(lacking**2)
+    one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
+    # What a pose has in common no repeat averages.
+    return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
 
 
-@pytest.mark.parametrize("discrepancy", [0.0, 2e-4])
-def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, discrepancy):
+@pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
+    """Poses of one state and of three, which share an error of the joints where there is one."""
     seen, jacobian = case
-    factor = np.linalg.cholesky(dense_covariance(seen, jacobian, NOISE, discrepancy))
+    seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
+    noise = replace(NOISE, pose_rad=pose_rad)
+    covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
-    found = whitening(seen, jacobian, NOISE, discrepancy).apply(values)
+    found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
+    # A factor of a covariance is unique but for the order of its rows: what is whitened has the same products.
+    expected = values.reshape(-1, 5).T @ np.linalg.solve(covariance, values.reshape(-1, 5))
+    np.testing.assert_allclose(found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
+    factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
+    np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
+
+
+def test_without_an_error_of_the_pose_rows_are_those_of_the_cholesky_factor_itself(case):
+    seen, jacobian = case
+    factor = np.linalg.cholesky(dense_covariance(seen, jacobian, NOISE))
+    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
+    found = whitening(seen, jacobian, NOISE).apply(values)
     expected = np.linalg.solve(factor, values.reshape(-1, 5)).reshape(values.shape)
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+
+
+def test_noise_of_readings_is_the_noise_without_what_a_pose_has_in_common(case):
+    seen, jacobian = case
+    values = np.random.default_rng(6).standard_normal((len(seen), seen.rows))
+    noise = replace(NOISE, pose_rad=1e-3)
+    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_readings, NOISE)]
+    np.testing.assert_array_equal(*found)
+    # A factor on the noise of readings leaves what a pose has in common.
+    assert (noise.scaled(2.0).pose_rad, noise.scaled(2.0).position_m) == (1e-3, 2 * NOISE.position_m)
 
 
 def test_rows_of_one_and_of_many_columns_are_whitened_alike(case):
@@ -88,16 +112,12 @@ def test_sensor_alone_only_divides(case):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
-def test_discrepancy_is_not_averaged_by_repeats(case):
+def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
+    """All of a pose moves together: as many times as it is read, its whitened size is that of one reading."""
     seen, jacobian = case
-    by = whitening(seen, jacobian, replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6)), 1e-4)
-    np.testing.assert_allclose(by.apply(np.full((len(seen), seen.rows), 1e-4)), 1.0, rtol=1e-6)
-
-
-@pytest.mark.parametrize("discrepancy", [0.0, 30e-6, 2e-3])
-def test_spectrum_gives_the_whitened_square_for_every_discrepancy(case, discrepancy):
-    seen, jacobian = case
-    values = np.random.default_rng(8).normal(0, 1e-4, (len(seen), seen.rows))
-    variances, squares = spectrum(seen, jacobian, NOISE, values)
-    whitened = whitening(seen, jacobian, NOISE, discrepancy).apply(values)
-    np.testing.assert_allclose((squares / (variances + discrepancy**2)).sum(), (whitened**2).sum(), rtol=1e-10)
+    tiny = replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6), pose_rad=1e-4)
+    moved = jacobian @ np.array([1e-4, 0, 0, 0, 0, 0])
+    squares = (whitening(seen, jacobian, tiny).apply(moved) ** 2).sum(axis=1)
+    # Rows of a pose tell one joint's share of a common error of six, however many repeats stand behind them.
+    by_pose = np.bincount(seen.cluster, squares)
+    assert (by_pose <= 1.0 + 1e-6).all() and by_pose.max() > 0.5

@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
+
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
 from elastocal.fitting import fit
@@ -14,13 +15,29 @@ from elastocal.loop.case import case_from, noise_from
 from elastocal.loop.declared import noise_of
 from elastocal.loop.intake import taken_in
 from elastocal.loop.reading_columns import reading_columns
-from elastocal.model import circumstances
-from elastocal.screening import directions
+from elastocal.model import circumstances, effect_columns, linearize
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
-_SINE = 1e-6
+_SINE, _ROUNDING = 1e-6, 1e-7
 # Weight acts on the arm as it is bent: of a non-centrality of 200 a share of this, squared, leaves a thousandth.
 _BENT = 2e-3
+
+
+def directions(declared, observations, candidates):
+    """Orthonormal bases of what each candidate contributes beyond the declared model, whitened; without a column, nothing."""
+    line = linearize(declared.model, declared.estimate, observations, declared.circumstances)
+    left = declared.whitened(line.sensitivities).reshape(line.residual.size, -1)
+    basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
+    found = []
+    for candidate in candidates:
+        made = effect_columns([(candidate, ())], line.circumstances, line.coordinate_jacobian, observations.state)
+        columns = declared.whitened(made).reshape(line.residual.size, -1)
+        columns = columns / np.linalg.norm(columns, axis=0)
+        for _ in range(2):
+            columns = columns - basis @ (basis.T @ columns)
+        turned, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        found.append((candidate, turned[:, sizes > _ROUNDING]))
+    return found
 
 
 @pytest.fixture(scope="module", params=["fanuc", "abb"])
@@ -34,14 +51,14 @@ def seen(request, tmp_path_factory):
     case = case_from(descriptions, reading_columns(training))
     declared = fit(case.model, case.observations, noise_from(noise_of(case)))
     candidates = [c for c in case.candidates.values() if not c.shapes]
-    return declared, case.observations, directions(declared, case.observations, candidates, 0.0, 0.0)
+    return declared, case.observations, directions(declared, case.observations, candidates)
 
 
 def test_effects_with_the_same_span_are_those_set_aside(seen):
     _, _, found = seen
     same = set()
-    for (one, _), columns in zip(found.candidates, found.columns, strict=True):
-        for (other, _), others in zip(found.candidates, found.columns, strict=True):
+    for one, columns in found:
+        for other, others in found:
             within = columns.shape[1] and np.linalg.norm(columns - others @ (others.T @ columns), 2) < _SINE
             if one.effect != other.effect and within and columns.shape == others.shape:
                 same.add(((one.effect, one.joints), other.effect))
@@ -51,10 +68,8 @@ def test_effects_with_the_same_span_are_those_set_aside(seen):
 
 def test_nothing_of_a_wrong_force_scale_is_left_off_the_compliances(seen):
     _, _, found = seen
-    columns = [
-        c for (candidate, _), c in zip(found.candidates, found.columns, strict=True) if candidate.effect == "force_scale"
-    ]
-    assert not sum(part.shape[1] for part in columns)
+    columns = [part for candidate, part in found if candidate.effect == "force_scale"]
+    assert columns and not sum(part.shape[1] for part in columns)
 
 
 def test_the_weight_of_the_upper_arm_turns_joint_2_as_a_compensator_does(seen):

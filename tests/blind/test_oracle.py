@@ -45,7 +45,7 @@ def made(folder, *effects, level=200.0, setting="weight_compensated"):
 @pytest.fixture(scope="module")
 def offset(tmp_path_factory):
     truth, folder = made(tmp_path_factory.mktemp("offset"), "joint_offset")
-    return truth, folder, diagnosed(folder, ROBOTS.as_posix(), 200, 1)
+    return truth, folder, diagnosed(folder, ROBOTS.as_posix(), 1)
 
 
 def test_what_the_engine_names_rightly_the_oracle_fits_the_same(offset):
@@ -54,7 +54,8 @@ def test_what_the_engine_names_rightly_the_oracle_fits_the_same(offset):
     found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     assert found["candidates"] == [f"joint_offset@{truth['defects'][0]['joints'][0]}"]
     assert found["detected"] and found["p_value"] < 1e-6
-    assert found["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=1e-4)
+    # The engine has a prior on the size and a size of the pose error: both cost next to nothing here.
+    assert found["heldout"] == pytest.approx(verdict["heldout"]["after"], rel=2e-3)
 
 
 def test_without_an_effect_it_is_the_declared_model(offset):
@@ -77,7 +78,7 @@ def test_outside_of_the_catalogue_there_is_none(offset):
 
 def test_without_its_covariate_not_even_the_oracle_sees_it(offset, tmp_path):
     truth, folder = made(tmp_path, "hysteresis", setting="without_approach")
-    verdict = diagnosed(folder, ROBOTS.as_posix(), 200, 1)
+    verdict = diagnosed(folder, ROBOTS.as_posix(), 1)
     found = oracle(truth, verdict, folder, ROBOTS.as_posix(), 1)
     assert (found["candidates"], found["p_value"]) == ([], 1.0)
     assert found["heldout"]["rms_m"] == pytest.approx(verdict["heldout"]["before"]["rms_m"], rel=1e-6)

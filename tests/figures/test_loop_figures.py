@@ -1,18 +1,31 @@
 """Figures of the loop show what their tables hold, with units, and nothing where there is nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
-from made_loop_tables import FAMILIES, candidate_table, confounding_table, residual_table, step_rows
+from made_loop_tables import (
+    FAMILIES,
+    candidate_table,
+    confounding_table,
+    residual_table,
+    step_rows,
+)
+from made_loop_tables import (
+    probabilities as stated,
+)
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PathCollection
 from matplotlib.colors import to_rgba
 from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
+from synthetic import equipped
 
-from elastocal import selection
+from elastocal.diagnosis.tables import candidate_columns
+from elastocal.effects.catalogue import candidates_on
 from elastocal.figures import candidates as drawn
 from elastocal.figures.before_after import before_after, step_name
-from elastocal.figures.candidates import confounding, family_wise_mark, leading, scree, shortlist
+from elastocal.figures.candidates import confounding, leading, probabilities, shortlist
 from elastocal.figures.residuals import (
     arrows,
     bins_of,
@@ -23,6 +36,20 @@ from elastocal.figures.residuals import (
     share_explained,
 )
 from elastocal.figures.style import save
+
+LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
+LONG_SETS = [
+    ({"link_elasticity": ["links 1 and 2 and 3 and 6 one section"]}, 0.7),
+    ({"joint_dependent_stiffness": ["joint 5"], "transmission_harmonic": ["joint 1 orders 1-2", "joint 1 orders 3-6"]}, 0.2),
+    ({"other": ["base"]}, 0.1),
+]
+
+
+def of_the_catalogue():
+    """A candidates table with the longest names that there are."""
+    table = candidate_table()
+    table["candidate"][: len(LONG)] = LONG
+    return table
 
 
 def texts(figure):
@@ -152,43 +179,58 @@ def test_the_middle_of_each_cell_is_taken():
     assert sorted(middle_of_cells(at, np.array([3.0, 1.0, 2.0, 9.0]), 1.0)) == [2, 3]
 
 
-def test_scree_shows_the_leading_candidates_by_family():
+def test_each_hypothesis_has_a_bar_as_long_as_its_probability():
+    figure = probabilities(stated(), candidate_table())
+    axis = figure.axes[0]
+    assert axis.get_xlabel() == "posterior probability (%)"
+    named = [label.get_text().replace("\n", " ") for label in axis.get_yticklabels()]
+    assert named == [
+        "Lost motion (backlash) of joint 3",
+        "Bearing tilt of joint 2",
+        "Nothing is missing",
+        "Everything else",
+    ]
+    assert [bar.get_width() for bar in axis.patches] == pytest.approx([94, 5, 0.4, 0.6])
+    assert [text.get_text() for text in axis.texts] == ["94 %", "5 %", "<1 %", "1 %"]
+
+
+def test_of_many_hypotheses_the_leading_have_bars_and_the_rest_has_one():
+    sets = [({f"effect_{number}": []}, 0.1) for number in range(10)]
+    axis = probabilities(stated(sets), candidate_table()).axes[0]
+    assert [bar.get_width() for bar in axis.patches] == pytest.approx([10] * 8 + [20])
+
+
+def test_leading_candidates_have_their_bayes_factor_in_the_colour_of_their_family():
     table = candidate_table()
-    figure = scree(table)
-    names = [label.get_text() for label in figure.axes[0].get_yticklabels()]
-    assert names[:2] == ["effect 0 1", "effect 1 2"]
-    assert any("30 candidates tested, 5 more cannot be tested" in text for text in texts(figure))
-    assert set(FAMILIES) <= set(texts(figure)) and {"taken by the search", "family-wise 3 %"} <= set(texts(figure))
-    first = figure.axes[0].patches[0]
-    assert first.get_facecolor() == to_rgba(drawn.FAMILIES[table["family"][0]])
+    table["log_bayes_factor"][:2] = [40.0, 90.0]
+    figure = probabilities(stated(), table)
+    axis = figure.axes[1]
+    assert [label.get_text() for label in axis.get_yticklabels()][:2] == ["Effect 1 of joint 2", "Effect 2 of joint 3"]
+    order = [1, 2, 3, 4, 5, 6, 7, 8, 0, 9, 10, 11, 12, 13, 14]
+    bars = [bar for bar in axis.patches if bar.get_gid() != "chosen"]
+    assert [bar.get_width() for bar in bars] == pytest.approx(table["log_bayes_factor"][order].tolist())
+    assert [bar.get_facecolor() for bar in bars] == [to_rgba(drawn.FAMILIES[table["family"][index]]) for index in order]
     assert len({*drawn.FAMILIES.values()}) == len(FAMILIES)
+    # The chosen one, which the smaller factor put on another row, is outlined there.
+    (outlined,) = [bar for bar in axis.patches if bar.get_gid() == "chosen"]
+    assert outlined.get_width() == 40.0
+    assert any("30 candidate causes tested; 5 more cannot be tested" in text for text in texts(figure))
+    assert {"in the most probable model", "geometry"} <= set(texts(figure))
 
 
-def test_the_family_wise_mark_lies_between_what_is_beyond_and_what_is_within():
-    assert 30 < family_wise_mark(np.array([40.0, 30.0, 29.0]), np.array([0.001, 0.02, 0.04])) + 1 < 31
-    assert family_wise_mark(np.array([1.0]), np.array([0.5])) is None
-
-
-def test_scree_without_anything_beyond_chance():
-    figure = scree(candidate_table(beyond=0, chosen=0))
-    assert any("none stands out" in text for text in texts(figure))
+def test_factors_below_and_above_one_stand_on_both_sides_of_zero():
+    table = candidate_table(count=15, chosen=0)
+    table["log_bayes_factor"][:15] = np.linspace(3, -6, 15)
+    axis = probabilities(stated([({}, 1.0)]), table).axes[1]
+    low, high = axis.get_xlim()
+    assert low < -6 and high > 3 and 0 in axis.get_xticks() and min(axis.get_xticks()) < 0
 
 
 def test_each_candidate_stands_once_at_its_best_shape():
     table = candidate_table()
     table["candidate"][3] = table["candidate"][1]
     assert 3 not in leading(table) and 1 in leading(table)
-
-
-def test_strength_beyond_the_smallest_double_still_has_an_order():
-    table = candidate_table()
-    table["p_value"][:2], table["bic_gain"][:2] = 0.0, [9000.0, 5000.0]
-    strength = drawn.strengths(table)
-    assert strength[0] > strength[1] > 308
-
-
-def test_the_level_is_that_of_the_search():
-    assert drawn.FAMILY_WISE_LEVEL == selection.FAMILY_WISE_LEVEL
+    assert leading(table)[0] == 0
 
 
 def test_confounding_annotates_every_pair_and_marks_what_was_found():
@@ -197,8 +239,8 @@ def test_confounding_annotates_every_pair_and_marks_what_was_found():
     numbers = [artist for artist in figure.axes[0].texts if artist.get_text().isdigit()]
     assert len(numbers) == 12 * 11
     bold = [label.get_text() for label in figure.axes[0].get_yticklabels() if label.get_fontweight() == "bold"]
-    assert bold == ["effect 0 1  1"]
-    assert figure.axes[1].get_ylabel() == "angle (°)"
+    assert bold == ["Effect 0 of joint 1  1"]
+    assert figure.axes[1].get_ylabel() == "angle between the contributions (°)"
 
 
 def test_what_was_found_is_on_the_shortlist_whatever_its_place():
@@ -235,11 +277,12 @@ def test_long_names_of_models_wrap():
     [
         lambda: residuals(residual_table()),
         lambda: arrows(residual_table()),
-        lambda: scree(candidate_table(count=60)),
+        lambda: probabilities(stated(LONG_SETS), of_the_catalogue()),
+        lambda: confounding(of_the_catalogue(), confounding_table(of_the_catalogue())),
         lambda: confounding(candidate_table(), confounding_table(candidate_table())),
         lambda: before_after(step_rows(controls=("transmission_harmonic@1[orders 31-36], transmission_ratio@2",)), 5e-6),
     ],
-    ids=["residuals", "arrows", "candidates", "confounding", "before_after"],
+    ids=["residuals", "arrows", "candidates", "confounding of the catalogue", "confounding", "before_after"],
 )
 def test_nothing_is_cut_off_and_a_rerun_gives_the_same_bytes(figure, tmp_path):
     assert_nothing_cut_off(figure())
@@ -251,13 +294,21 @@ def test_nothing_is_cut_off_and_a_rerun_gives_the_same_bytes(figure, tmp_path):
 
 def test_where_nothing_can_be_tested_the_figures_say_so():
     table = candidate_table(count=0, chosen=0)
-    for figure in (scree(table), confounding(table, confounding_table(table))):
-        assert texts(figure) == ["None of 5 candidates can be tested with these data."]
+    for figure in (probabilities(stated([({}, 1.0)]), table), confounding(table, confounding_table(table))):
+        assert texts(figure) == ["None of 5 candidate causes can be tested with these measurements."]
+
+
+def test_where_the_data_are_at_fault_the_figures_say_so(kuka):
+    case = SimpleNamespace(candidates=candidates_on(equipped(kuka.chain)))
+    table = candidate_columns(SimpleNamespace(evidence=None, case=case))
+    table = {name: np.array(values) for name, values in table.items()}
+    for figure in (probabilities(None, table), confounding(table, {"one": [], "other": [], "angle_deg": np.zeros(0)})):
+        assert texts(figure) == ["The data are at fault: no cause in the robot was looked for."]
 
 
 def test_a_single_candidate():
     table = candidate_table(count=1)
-    assert_nothing_cut_off(scree(table))
+    assert_nothing_cut_off(probabilities(stated(), table))
 
 
 def test_residuals_of_one_pose_are_a_note():

@@ -99,7 +99,7 @@ def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, config_
     folder = folder_of(tmp_path / "made", kuka, change, settings)
     out = run_loop(folder, config_folder / "robots", tmp_path / "out")
     check(json.loads((out / "verdict.json").read_text(encoding="utf-8")), name, words)
-    assert (out / "residuals_figure.pdf").read_bytes().startswith(b"%PDF")
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder, tmp_path):
@@ -147,7 +147,7 @@ def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tm
     out = run_loop(folder, config_folder / "robots", tmp_path / "out")
     verdict = json.loads((out / "verdict.json").read_text(encoding="utf-8"))
     assert verdict["verdict"] == "not_testable" and verdict["effects"] == []
-    assert (out / "residuals_figure.pdf").read_bytes().startswith(b"%PDF")
+    assert (out / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
 @pytest.mark.parametrize(("factor", "words"), [(-1.0, "negative"), (1 / 9.80665, "times nominal")])

@@ -47,7 +47,7 @@ def tables(folder, *entries, follow_up=(), sweep=()):
 
 
 def facts_of(folder, *entries, **options):
-    return blind_facts(tables(folder, *entries, **options), "aa  case_x.json\n", "quick", 7, 2000)
+    return blind_facts(tables(folder, *entries, **options), "aa  case_x.json\n", "quick", 7)
 
 
 PROOF = (

@@ -2,7 +2,17 @@
 
 import pytest
 
-from elastocal.report.wording import candidate_words, counted, length, listed, members_words, p_words, plain, scaled, step_words
+from elastocal.report.wording import (
+    counted,
+    length,
+    listed,
+    members_words,
+    p_words,
+    plain,
+    probability_words,
+    scaled,
+    step_words,
+)
 
 
 @pytest.mark.parametrize(
@@ -18,33 +28,34 @@ from elastocal.report.wording import candidate_words, counted, length, listed, m
         (0.02, 0.001, "1", ("0.0200 ± 0.0010", "")),
         (0.0, 0.0, "rad", ("0", "µrad")),
         (2e-4, 1e-5, "rad/rad", ("(2.00 ± 0.10) · 10⁻⁴", "rad/rad")),
+        (-4e-8, 1e-4, "m", ("0 ± 100", "µm")),
     ],
 )
 def test_values_come_in_units_that_suit_them(value, error, unit, expected):
     assert scaled(value, error, unit) == expected
 
 
-def test_candidates_are_named_in_words():
-    assert candidate_words("lost_motion@3") == "lost motion in joint 3"
-    assert candidate_words("link_elasticity@1+2[one section]") == "link elasticity in links 1 and 2, one section"
-    assert candidate_words("force_bias[base axes]") == "force bias, base axes"
-    assert members_words(["payload"]) == ""
-
-
-def test_joints_count_up():
+def test_joints_count_up_and_those_of_which_the_same_is_told_stand_together():
     keys = [
         "transmission_harmonic@10[orders 1-2]",
         "transmission_harmonic@2[orders 13-18]",
         "transmission_harmonic@2[orders 3-6]",
+        "transmission_harmonic@4[orders 1-2]",
     ]
-    assert members_words(keys) == "joint 2: orders 3-6, orders 13-18; joint 10: orders 1-2"
+    assert members_words(keys) == "joint 2: orders 3-6, orders 13-18; joints 4 and 10: orders 1-2"
+    assert members_words(["cross_compliance@1+2", "cross_compliance@2+3"]) == "joints 1 and 2; joints 2 and 3"
+    assert members_words([f"cross_compliance@{k}+{k + 1}" for k in range(1, 6)], 2) == "joints 1 and 2; joints 2 and 3; 3 more"
+    assert members_words(["payload"]) == ""
 
 
 def test_steps_are_named_in_words():
-    assert step_words("+ link_weight") == "+ link weight"
-    assert (
-        step_words("control: joint_offset@1, joint_offset@2") == "control: joint offset in joint 1 and joint offset in joint 2"
-    )
+    assert step_words("+ link_weight") == "+ gravity sag"
+    assert step_words("control: joint_offset@1, joint_offset@2") == "control: zero offset of joint 1 and zero offset of joint 2"
+
+
+def test_no_probability_is_zero_or_one():
+    said = [probability_words(value).replace("\u00a0", " ") for value in (0.0, 0.004, 0.02, 0.944, 0.996, 1.0)]
+    assert said == ["< 1 %", "< 1 %", "2 %", "94 %", "> 99 %", "> 99 %"]
 
 
 def test_lengths_and_counts():

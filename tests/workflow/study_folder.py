@@ -24,7 +24,7 @@ SMALL = {
     "evaluation": {"bootstrap_replicates": 10, "lengths": [5, 10, 20]},
     "tables": {"noise_um": 200, "length": 20, "classical_strategy": "6DoF"},
     # The loop has tests of its own.
-    "loop": {"replicates": 200, "proposed_states": 2, "campaigns": [], "measured": []},
+    "loop": {"proposed_states": 2, "campaigns": [], "measured": []},
 }
 _JOB = re.compile(r"^(?:local)?rule (\w+):\n(.*?)(?=^\[|^\S|\Z)", re.MULTILINE | re.DOTALL)
 

@@ -16,16 +16,7 @@ from elastocal.table_schemas import COMPONENTS
 CELL = "cells/made"
 OWN = ("diagnose", "--config", f"campaign={CELL}")
 OFFSET = 1e-3
-STEPS = [
-    "read_campaign",
-    "check_data",
-    "estimate_noise",
-    "fit_declared",
-    "trace_effects",
-    "weigh_rivals",
-    "judge_held_out",
-    "state_verdict",
-]
+STEPS = ["read_campaign", "diagnose_campaign", "judge_campaign"]
 OF_THE_STUDY = "data/simulated/kuka/200um/measured.parquet"
 
 
@@ -78,11 +69,16 @@ def test_verdict_has_every_key_of_the_contract(diagnosed):
         "p_value",
         "heldout_gain",
         "alternatives",
-        "doubts",
         "angle_to_nearest_deg",
+        "probability",
+        "locations",
     }
     assert (effect["name"], effect["family"], effect["joints"], effect["alternatives"]) == ("joint_offset", "geometry", [3], [])
-    assert effect["doubts"] == json.loads(diagnosed.path("results/loop/made/doubts.json").read_text(encoding="utf-8")) == []
+    assert effect["locations"][0]["location"] == "joint 3" and 0.9 < effect["probability"] < 1 + 1e-9
+    told = {"probabilities", "settings", "converged", "misfit", "untestable", "held", "candidates_tested", "next_experiment"}
+    assert told <= set(verdict) and verdict["converged"] == {"declared": True, "final": True}
+    assert verdict["settings"]["alarm_level"]["value"] == 0.02 and verdict["settings"]["alarm_level"]["reason"]
+    assert {"nothing", "alarm_p_value", "mechanisms", "sets"} <= set(verdict["probabilities"])
     (parameter,) = effect["parameters"]
     assert set(parameter) >= {"name", "value", "std_error", "unit"} and parameter["unit"] == "rad"
     assert abs(parameter["value"] - OFFSET) < 5 * parameter["std_error"]
@@ -103,7 +99,7 @@ def test_every_file_of_the_contract_is_there(diagnosed, kuka):
     assert len(residuals) == len(table) and sorted(residuals.row) == list(range(1, len(table) + 1))
     assert {f"{stage}_{name}" for stage in ("before", "after") for name, *_ in COMPONENTS} <= set(residuals.columns)
     candidates = pq.ParquetFile(report(diagnosed, "candidates.parquet")).read().to_pandas()
-    assert {"p_value", "p_family", "angle_deg", "noncentrality", "note"} <= set(candidates.columns)
+    assert {"log_bayes_factor", "probability", "angle_deg", "noncentrality", "note"} <= set(candidates.columns)
     assert candidates.candidate[candidates.chosen].tolist() == ["joint_offset@3"]
     # Nothing is confounded: there is nothing to measure.
     proposed = pd.read_csv(report(diagnosed, "next_experiment.csv"))
@@ -136,17 +132,13 @@ def test_no_step_before_the_judgement_reads_held_out_poses(diagnosed):
     inputs = inputs_by_rule(diagnosed, *OWN)
     assert set(STEPS) <= set(inputs)
     readers = {rule for rule, files in inputs.items() if any("held_out.parquet" in file for file in files)}
-    assert readers == {"judge_held_out"}
+    assert readers == {"judge_campaign"}
     # Nor the file in which they stand with all others.
     whole = {rule for rule, files in inputs.items() if any(file.startswith(CELL) for file in files)}
     assert whole == {"read_campaign"}
-    # What the judgement makes goes to reports and the verdict, to no step before it.
-    judged = {
-        "results/loop/made/held_out_errors.json",
-        "reports/loop/made/before_after.csv",
-        "reports/loop/made/residuals.parquet",
-    }
-    for rule in STEPS[: STEPS.index("judge_held_out")]:
+    # What the judgement makes goes to reports, to no step before it.
+    judged = {f"reports/loop/made/{name}" for name in ("verdict.json", "before_after.csv", "splits.csv", "residuals.parquet")}
+    for rule in STEPS[: STEPS.index("judge_campaign")]:
         assert not inputs[rule] & judged
 
 
@@ -167,18 +159,16 @@ def test_another_seed_of_the_held_out_poses_reruns_the_campaign_and_nothing_of_t
 EDITS = {
     "an effect": (
         "src/elastocal/effects/payload.py",
-        {"check_data", "trace_effects", "state_verdict"},
+        {"diagnose_campaign", "judge_campaign"},
         {"simulate", "measure"},
     ),
     "a fault": (
         "src/elastocal/faults/outliers.py",
-        {"check_data", "trace_effects"},
-        {"read_campaign", "estimate_noise", "fit_declared"},
+        {"diagnose_campaign", "judge_campaign"},
+        {"read_campaign"},
     ),
-    "the selection": ("src/elastocal/selection.py", set(STEPS[4:]), set(STEPS[:4])),
-    "the check of laws": ("src/elastocal/law_check.py", set(STEPS[5:]), set(STEPS[:5])),
-    "the judgement": ("src/elastocal/held_out.py", set(STEPS[6:]), set(STEPS[:6])),
-    "the verdict": ("src/elastocal/verdict.py", set(STEPS[7:]), set(STEPS[:7])),
+    "the search": ("src/elastocal/diagnosis/search.py", set(STEPS[1:]), set(STEPS[:1])),
+    "the judgement": ("src/elastocal/held_out.py", set(STEPS[2:]), set(STEPS[:2])),
     "figures of the study": ("src/elastocal/figures/strategies.py", set(), set(STEPS)),
     "style of all figures": ("src/elastocal/figures/style.py", set(), set(STEPS)),
 }
@@ -296,9 +286,9 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_is_a_file(cell):
     cell.path("src/elastocal/effects/sag.py").write_text(SAG, encoding="utf-8")
     cell.path("config/campaigns/tiny.yaml").write_text(yaml.safe_dump(TINY), encoding="utf-8")
     cell.configure({"loop": {"campaigns": ["tiny"]}})
-    looks, training = "results/loop/made/looks.parquet", "results/loop/tiny/training.parquet"
-    cell.run(looks, training, *OWN[1:])
-    assert "sag@2" in pq.ParquetFile(cell.path(looks)).read().column("candidate").to_pylist()
+    candidates, training = "reports/loop/made/candidates.parquet", "results/loop/tiny/training.parquet"
+    cell.run(candidates, training, *OWN[1:])
+    assert "sag@2" in pq.ParquetFile(cell.path(candidates)).read().column("candidate").to_pylist()
     readings = pq.ParquetFile(cell.path(training)).read()
     assert set(readings.column("pose").to_pylist()) < set(range(8))
     planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")

@@ -57,7 +57,6 @@ rule diagnose_cases:
     benchmark:
         "results/timings/diagnose_cases/{block}.tsv"
     params:
-        replicates=config["loop"]["replicates"],
         seed=config["seed"],
     script:
         "../scripts/diagnose_cases.py"

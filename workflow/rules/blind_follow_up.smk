@@ -53,7 +53,6 @@ rule diagnose_follow_ups:
     benchmark:
         "results/timings/diagnose_follow_ups/{block}.tsv"
     params:
-        replicates=config["loop"]["replicates"],
         seed=config["seed"],
     script:
         "../scripts/diagnose_follow_ups.py"

@@ -166,7 +166,6 @@ rule compile_blind_report:
     params:
         size=config["blind"],
         seed=config["seed"],
-        replicates=config["loop"]["replicates"],
     script:
         "../scripts/compile_blind_report.py"
 

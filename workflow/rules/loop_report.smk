@@ -8,7 +8,7 @@ reports/loop/{campaign}/report.pdf and, of the study too, the pictures of the RE
 rule draw_residuals:
     input:
         descriptions=rules.read_campaign.output.descriptions,
-        residuals=rules.judge_held_out.output.residuals,
+        residuals=rules.judge_campaign.output.residuals,
         sources=sources("draw_residuals.py"),
     output:
         pdf="reports/loop/{campaign}/figures/residuals.pdf",
@@ -24,7 +24,7 @@ rule draw_residuals:
 rule draw_arrows:
     input:
         descriptions=rules.read_campaign.output.descriptions,
-        residuals=rules.judge_held_out.output.residuals,
+        residuals=rules.judge_campaign.output.residuals,
         sources=sources("draw_arrows.py"),
     output:
         pdf="reports/loop/{campaign}/figures/arrows.pdf",
@@ -39,7 +39,8 @@ rule draw_arrows:
 
 rule draw_candidates:
     input:
-        candidates=rules.state_verdict.output.candidates,
+        diagnosis=rules.diagnose_campaign.output.diagnosis,
+        candidates=rules.diagnose_campaign.output.candidates,
         sources=sources("draw_candidates.py"),
     output:
         pdf="reports/loop/{campaign}/figures/candidates.pdf",
@@ -54,8 +55,8 @@ rule draw_candidates:
 
 rule draw_confounding:
     input:
-        candidates=rules.state_verdict.output.candidates,
-        confounding=rules.trace_effects.output.confounding,
+        candidates=rules.diagnose_campaign.output.candidates,
+        confounding=rules.diagnose_campaign.output.confounding,
         sources=sources("draw_confounding.py"),
     output:
         pdf="reports/loop/{campaign}/figures/confounding.pdf",
@@ -70,8 +71,8 @@ rule draw_confounding:
 
 rule draw_before_after:
     input:
-        before_after=rules.judge_held_out.output.before_after,
-        errors=rules.judge_held_out.output.errors,
+        verdict=rules.judge_campaign.output.verdict,
+        before_after=rules.judge_campaign.output.before_after,
         sources=sources("draw_before_after.py"),
     output:
         pdf="reports/loop/{campaign}/figures/before_after.pdf",
@@ -86,12 +87,13 @@ rule draw_before_after:
 
 rule compile_loop_report:
     input:
-        verdict=rules.state_verdict.output.verdict,
-        candidates=rules.state_verdict.output.candidates,
-        before_after=rules.judge_held_out.output.before_after,
-        residuals=rules.judge_held_out.output.residuals,
-        experiment=rules.weigh_rivals.output.experiment,
-        parameters=rules.trace_effects.output.parameters,
+        verdict=rules.judge_campaign.output.verdict,
+        before_after=rules.judge_campaign.output.before_after,
+        splits=rules.judge_campaign.output.splits,
+        residuals=rules.judge_campaign.output.residuals,
+        experiment="reports/loop/{campaign}/next_experiment.csv",
+        diagnosis=rules.diagnose_campaign.output.diagnosis,
+        steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
         pages="src/elastocal/report/loop.typ",
@@ -102,8 +104,6 @@ rule compile_loop_report:
         "results/logs/compile_loop_report/{campaign}.log",
     benchmark:
         "results/timings/compile_loop_report/{campaign}.tsv"
-    params:
-        replicates=config["loop"]["replicates"],
     script:
         "../scripts/compile_loop_report.py"
 

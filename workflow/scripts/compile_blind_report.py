@@ -16,7 +16,7 @@ def compile_blind_report(job):
     settings = job.params
     tables = {name: pd.read_csv(job.input[name]) for name in TABLES}
     manifest = Path(job.input.manifest).read_text(encoding="utf-8")
-    facts = blind_facts(tables, manifest, settings.size, settings.seed, settings.replicates)
+    facts = blind_facts(tables, manifest, settings.size, settings.seed)
     write_blind_report(job.output.report, facts, job.input.figures)
 
 

@@ -2,8 +2,9 @@
 
 import pandas as pd
 
+from elastocal.diagnosis.tables import STEPS, final_parameters
 from elastocal.json_files import read_json
-from elastocal.loop.schemas import CANDIDATES, PARAMETERS, residuals
+from elastocal.loop.schemas import residuals
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
 from elastocal.storage import read_table
@@ -14,15 +15,13 @@ from job import run
 def compile_loop_report(job):
     verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
     joints = len(descriptions["robot"]["compliance_urad_per_Nm"])
+    rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]
     facts = loop_facts(
         verdict,
-        pd.read_csv(job.input.before_after).to_dict("records"),
-        pd.read_csv(job.input.experiment).to_dict("records"),
+        *rows,
         read_table(job.input.residuals, residuals(joints)),
-        read_table(job.input.candidates, CANDIDATES),
         descriptions,
-        read_table(job.input.parameters, PARAMETERS),
-        job.params.replicates,
+        final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS)),
     )
     write_loop_report(job.output.report, facts, job.input.figures)
 

@@ -11,11 +11,9 @@ from job import run
 
 
 def diagnose_follow_ups(job):
-    settings = job.params
-
     def verdict_on(folder):
         print(f"{job.wildcards.block}: {Path(folder).parent.name}", file=sys.stderr, flush=True)
-        return diagnosed(folder, "config/robots", settings.replicates, settings.seed)
+        return diagnosed(folder, "config/robots", job.params.seed)
 
     write_json(job.output.verdicts, diagnosed_anew(job.input.campaigns, verdict_on), allow_nan=False)
 

@@ -10,7 +10,7 @@ from job import run
 
 
 def draw_before_after(job):
-    floor = read_json(job.input.errors)["heldout"]["noise_floor_rms_m"]
+    floor = read_json(job.input.verdict)["heldout"]["noise_floor_rms_m"]
     figure = before_after(pd.read_csv(job.input.before_after).to_dict("records"), floor)
     save(figure, job.output.pdf, job.output.png)
 

@@ -1,15 +1,17 @@
-"""Candidates of a search in the order in which they stand out."""
+"""What may be missing in the model of a campaign: probabilities of hypotheses, and candidates one by one."""
 
-from elastocal.figures.candidates import scree
+from elastocal.diagnosis.tables import CANDIDATES
+from elastocal.figures.candidates import probabilities
 from elastocal.figures.style import save
-from elastocal.loop.schemas import CANDIDATES
+from elastocal.json_files import read_json
 from elastocal.storage import read_table
 
 from job import run
 
 
 def draw_candidates(job):
-    save(scree(read_table(job.input.candidates, CANDIDATES)), job.output.pdf, job.output.png)
+    stated = read_json(job.input.diagnosis)["document"]["probabilities"]
+    save(probabilities(stated, read_table(job.input.candidates, CANDIDATES)), job.output.pdf, job.output.png)
 
 
 run(draw_candidates, snakemake)

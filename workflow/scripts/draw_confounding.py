@@ -1,8 +1,8 @@
-"""Angles between what the leading candidates of a search make."""
+"""Angles between the contributions of the leading candidates."""
 
+from elastocal.diagnosis.tables import CANDIDATES, CONFOUNDING
 from elastocal.figures.candidates import confounding
 from elastocal.figures.style import save
-from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
 from elastocal.storage import read_table
 
 from job import run

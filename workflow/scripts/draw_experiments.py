@@ -13,7 +13,7 @@ from job import run
 def draw_experiments(job):
     settings, robot = job.params, job.wildcards.robot
     chain = parse_chain(settings.chain, settings.lengths_m, robot)
-    limits = joint_limits(settings.joint_limits_deg, chain.coordinates, robot)
+    limits = joint_limits(settings.joint_limits_deg, chain, robot)
     loading = Loading(**settings.loading)
     blocks = experiment_blocks(
         chain, limits, robot, settings.seed, loading, settings.purpose, settings.data_sets, settings.configurations

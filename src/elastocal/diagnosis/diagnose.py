@@ -7,6 +7,7 @@ import numpy as np
 from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
+from elastocal.diagnosis.averaging import Averaged, averaged
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import posterior
@@ -164,6 +165,7 @@ def _effect_steps(case, declared, final, found):
 def _document(case, declared, final, found, known, settings, warnings):
     listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
     decisive = [fault for fault in listed if fault["decisive"]]
+    averages = _averages(declared, found) if found else Averaged({}, {})
     entries, probabilities, untestable, misfit = [findings.fault_entry(fault) for fault in decisive], None, {}, None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
     said = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
@@ -171,7 +173,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
-        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final)
+        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
     said += fitted_compliance_warnings(final)
@@ -187,7 +189,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         "noise": _noise_facts(declared.noise, final.noise),
         "misfit": misfit,
         "heldout": None,
-        "compliance_urad_per_Nm": _compliances(declared, final),
+        "compliance_urad_per_Nm": _compliances(declared, final, averages),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
@@ -221,14 +223,20 @@ def _noise_facts(measured, left):
     }
 
 
-def _compliances(declared, final):
-    deviations = np.zeros(final.model.sites.joints)
+def _averages(declared, found):
+    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.nothing
+    owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
+    return averaged(found.linearized, found.posterior, best, owners)
+
+
+def _compliances(declared, final, averages):
+    joints = final.model.sites.joints
+    after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
     if final.model.identifies_compliance:
         mine = np.flatnonzero([owner == "joint_compliance" for owner, _ in final.parameters])
-        deviations = np.sqrt(np.diag(final.covariance))[mine]
-    found = {
-        "before": joint_compliances(declared.model, declared.estimate),
-        "after": joint_compliances(final.model, final.estimate),
-        "std_error": deviations,
-    }
+        names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
+        alone = np.sqrt(np.diag(final.covariance))[mine]
+        after += [averages.shift.get(name, 0.0) for name in names]
+        deviations = np.array([averages.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
+    found = {"before": joint_compliances(declared.model, declared.estimate), "after": after, "std_error": deviations}
     return {name: (1e6 * values).tolist() for name, values in found.items()}

@@ -310,18 +310,18 @@ def evaluate(statistics, units, grid, log_pose, start):
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
     places = [int(np.argmin(np.abs(grid.scales - size))) for size in start]
-    present = _Joint(statistics, units, grid, base, np.array(places))
+    present = Joint(statistics, units, grid, base, np.array(places))
     for _ in range(_MOST_ASCENTS):
         profiles = present.profiles()
         best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
         gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
         if gains.max() <= _NO_GAIN:
             break
-        moved = _Joint(statistics, units, grid, base, np.where(gains > _NO_GAIN, best, present.places))
+        moved = Joint(statistics, units, grid, base, np.where(gains > _NO_GAIN, best, present.places))
         if moved.log_density <= present.log_density:
             places = present.places.copy()
             places[np.argmax(gains)] = best[np.argmax(gains)]
-            moved = _Joint(statistics, units, grid, base, places)
+            moved = Joint(statistics, units, grid, base, places)
             if moved.log_density <= present.log_density:
                 break
         present = moved
@@ -357,8 +357,19 @@ def _inverses(matrices):
     return inverses, log_dets
 
 
-class _Joint:
-    """Density of the readings under one model with one size for each unit."""
+class Joint:
+    """Density of the readings under one model with one size for each unit.
+
+    Parameters
+    ----------
+    statistics : Statistics
+    units : sequence of Unit
+    grid : Grid
+    base : ndarray (T,)
+        What each tau contributes alone, with its prior.
+    places : ndarray of int (m,)
+        Size of each unit in the grid.
+    """
 
     def __init__(self, statistics, units, grid, base, places):
         self.units, self.grid, self.base, self.places = units, grid, base, places
@@ -385,6 +396,29 @@ class _Joint:
     def profiles(self):
         """Log density over the sizes of each unit, the others as they are, for size zero first; list of ndarray (1 + S,)."""
         found = [None] * len(self.units)
+        for number, seen in self._given_the_others():
+            density, _, _ = self._profile(number, *seen)
+            found[number] = log_sum_exp(density, axis=1) + self._log_weights_of(number)
+        return found
+
+    def moments(self):
+        """Mean and variance of the coefficients of each unit, averaged over its sizes and tau; list of two ndarray (d,)."""
+        found = [None] * len(self.units)
+        for number, seen in self._given_the_others():
+            density, mean, variance = self._profile(number, *seen)
+            log_weights = density[1:] + self._log_weights_of(number)[1:, None]
+            weights = np.exp(log_weights - log_sum_exp(log_weights))[..., None]
+            center = (weights * mean).sum(axis=(0, 1))
+            found[number] = center, (weights * (variance + (mean - center) ** 2)).sum(axis=(0, 1))
+        return found
+
+    def _log_weights_of(self, number):
+        """Prior weights of all sizes as they are, but for those of one unit: none for size zero, and all of its grid."""
+        return np.concatenate([[0.0], self.grid.log_weights]) + self.log_weights.sum() - self.log_weights[number]
+
+    def _given_the_others(self):
+        """What each unit sees with the others integrated out: number, and eigenvalues and eigenvectors of its Gram matrix, its
+        products with the readings along these, squares and ln |I + D^1/2 G D^1/2| without it."""
         widths = np.diff(self.starts)
         for width in np.unique(widths):
             numbers = np.flatnonzero(widths == width)
@@ -399,22 +433,21 @@ class _Joint:
             turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0]
             for place, number in enumerate(numbers):
                 seen = np.clip(values[:, place], 0.0, None), vectors[:, place], turned[:, place]
-                found[number] = self._profile(number, *seen, squares[:, place], log_det[:, place])
-        return found
+                yield number, (*seen, squares[:, place], log_det[:, place])
 
     def _profile(self, number, values, vectors, turned, squares, log_det):
-        unit, grid = self.units[number], self.grid
-        variances = np.concatenate([[0.0], grid.scales**2])[:, None, None]
+        """Log density (1 + S, T) over the sizes of a unit, zero first; mean and variance (S, T, d) of its coefficients."""
+        unit = self.units[number]
+        variances = np.concatenate([[0.0], self.grid.scales**2])[:, None, None]
         widened = 1.0 + variances * values
         left = squares - (variances * turned**2 / widened).sum(axis=-1)
         density = self.base - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
         density = density + self.sign_factors.sum(axis=0) - self.sign_factors[number]
+        mean = (vectors @ (variances * turned / widened)[1:, ..., None])[..., 0]
+        variance = (vectors**2 @ (variances / widened)[1:, ..., None])[..., 0]
         if unit.signs.any():
-            mean = (vectors @ (variances * turned / widened)[..., None])[1:, ..., 0]
-            variance = (vectors**2 @ (variances / widened)[..., None])[1:, ..., 0]
             density[1:] += _log_sign_factor(mean, variance, unit.signs, left[1:], self.freedom)
-        log_weights = np.concatenate([[0.0], grid.log_weights]) + self.log_weights.sum() - self.log_weights[number]
-        return log_sum_exp(density, axis=1) + log_weights
+        return density, mean, variance * np.maximum(left[1:] / self.freedom, 1.0)[..., None]
 
 
 def _log_sign_factor(mean, variance, signs, squares, freedom):

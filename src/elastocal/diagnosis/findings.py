@@ -4,6 +4,7 @@ import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
+from elastocal.diagnosis.words import part_of
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
@@ -26,8 +27,7 @@ def location_words(mechanism, location):
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
     places = [entry for entry in location if isinstance(entry, str)]
-    kind = "link" if mechanism in ("link_elasticity", "link_geometry") else "joint"
-    where = f"{kind}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
+    where = f"{part_of(mechanism)}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
     return " ".join(filter(None, [where, *places])) or ("base" if mechanism == OTHER else "")
 
 
@@ -59,7 +59,7 @@ def probability_facts(problem, posterior, conclusion, alarm):
     }
 
 
-def effect_entries(problem, posterior, conclusion, alarm, final):
+def effect_entries(problem, posterior, conclusion, alarm, final, averages):
     """Entries of the effects found, those of the most probable mechanisms first.
 
     Parameters
@@ -70,6 +70,8 @@ def effect_entries(problem, posterior, conclusion, alarm, final):
     alarm : Alarm
     final : Fit
         Of the most probable model.
+    averages : Averaged
+        What the other models add to it.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def effect_entries(problem, posterior, conclusion, alarm, final):
                     for place, value in where.items()
                     if value >= _LEAST_LISTED
                 ],
-                "parameters": [entry for member in members for entry in parameter_entries(member, final)],
+                "parameters": [entry for member in members for entry in parameter_entries(member, final, averages)],
                 "p_value": alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
@@ -102,13 +104,14 @@ def effect_entries(problem, posterior, conclusion, alarm, final):
     return entries
 
 
-def parameter_entries(member, final):
+def parameter_entries(member, final, averages):
     """Parameters and shapes of one candidate in a fit.
 
     Parameters
     ----------
     member : Candidate
     final : Fit
+    averages : Averaged
 
     Returns
     -------
@@ -120,8 +123,8 @@ def parameter_entries(member, final):
     return [
         {
             "name": f"{member.key} {parameter.name}",
-            "value": float(value),
-            "std_error": float(np.sqrt(final.covariance[index, index])),
+            "value": float(value) + averages.shift.get((member.key, parameter.name), 0.0),
+            "std_error": averages.std_error.get((member.key, parameter.name), float(np.sqrt(final.covariance[index, index]))),
             "unit": parameter.unit,
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
@@ -155,6 +158,7 @@ def fault_entry(fault):
         "heldout_gain": None,
         "alternatives": list(fault["alternatives"]),
         "angle_to_nearest_deg": None,
+        "evidence": [float(value) if np.isfinite(value) else None for value in fault["evidence"]],
     }
 
 

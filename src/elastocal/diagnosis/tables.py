@@ -89,6 +89,25 @@ def diagnosis_facts(diagnosis):
     return {"document": diagnosis.document, "steps": steps}
 
 
+def final_parameters(facts, columns):
+    """Parameters of the final model.
+
+    Parameters
+    ----------
+    facts : dict
+        Of diagnosis.json.
+    columns : dict of str to ndarray
+        Of the steps table.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Columns of the steps table, of the last step that is no control.
+    """
+    last = [number for number, step in enumerate(facts["steps"]) if step["kind"] in ("declared", "effect")][-1]
+    return {name: values[columns["step"] == last] for name, values in columns.items()}
+
+
 def diagnosis_from(case, facts, columns):
     """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
 
@@ -191,7 +210,10 @@ def _with_priors(effect, columns):
     """An effect with the priors under which it was fitted."""
     mine = columns["owner"] == effect.key
     prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
+    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
+    # A prior that the catalogue does not have is one whose size was estimated.
     parameters = tuple(
-        replace(p, prior_std=None if np.isnan(prior[p.name]) else float(prior[p.name])) for p in effect.parameters
+        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
+        for p, deviation in zip(effect.parameters, priors, strict=True)
     )
     return replace(effect, parameters=parameters)

@@ -12,6 +12,8 @@ from elastocal.diagnosis.hypotheses import OTHER
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
+# Family of what any readings test, even of a single pose: that nothing of it shows says nothing of the robot.
+_OF_THE_SETUP = "drift"
 
 
 @dataclass(frozen=True)
@@ -35,6 +37,11 @@ class Hypothesis:
     def named(self):
         """Its mechanisms of the catalogue."""
         return tuple(name for name in self.mechanisms if name != OTHER)
+
+    @property
+    def kind(self):
+        """Verdict to which it belongs: nothing of the catalogue, one mechanism of some, or more than one."""
+        return (UNEXPLAINED, CLASS)[len(self.named)] if len(self.named) < 2 else SEVERAL
 
 
 @dataclass(frozen=True)
@@ -75,47 +82,40 @@ def concluded(problem, posterior, alarm):
     Conclusion
         adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for. class: one
         mechanism, but which of some, or whether a related one, remains ambiguous. several: more than one mechanism.
-        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism.
+        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism of
+        the robot, and nothing of the set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
     nothing = next(h for h in hypotheses if not h.mechanisms)
+    mechanisms = _marginal(hypotheses)
+    tested = [unit for unit in problem.units if unit.mechanism != OTHER]
+    of_the_robot = [unit for unit in tested if unit.candidate.family != _OF_THE_SETUP]
+    if not tested or not (of_the_robot or alarm.raised):
+        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
+    if not alarm.raised:
+        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
+    # The alarm has decided that something is missing; the posterior says what: nothing of the catalogue, one mechanism or more.
+    there = [h for h in hypotheses if h.mechanisms]
+    weights = [sum(h.probability for h in there if h.kind == kind) for kind in (UNEXPLAINED, CLASS, SEVERAL)]
+    kind = (UNEXPLAINED, CLASS, SEVERAL)[int(np.argmax(weights))]
+    best = next(h for h in there if h.kind == kind)
+    if kind == UNEXPLAINED:
+        return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
+    total = sum(weights)
+    if kind == CLASS and OTHER not in best.mechanisms and best.probability >= settings.named_probability * total:
+        return Conclusion(NAMED, hypotheses, best, dict.fromkeys(best.named, ()), mechanisms)
+    credible = _credible(there, settings.credible * total)
+    return Conclusion(kind, hypotheses, best, {name: _instead_of(name, best, credible) for name in best.named}, mechanisms)
+
+
+def _marginal(hypotheses):
+    """Probability of each mechanism, in falling order."""
     present = {}
     for hypothesis in hypotheses:
         for mechanism in hypothesis.mechanisms:
             present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
-    mechanisms = dict(sorted(present.items(), key=lambda entry: -entry[1]))
-    if all(unit.mechanism == OTHER for unit in problem.units):
-        return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
-    if not alarm.raised:
-        return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
-    # The alarm has decided that something is missing; the posterior says what.
-    there = [h for h in hypotheses if h.mechanisms]
-    total = sum(h.probability for h in there)
-    credible = _credible(there, settings.credible * total)
-    best = there[0]
-    single = sum(h.probability for h in there if len(h.named) <= 1)
-    foreign = sum(h.probability for h in there if not h.named)
-    if foreign > 0.5 * total:
-        best = next(h for h in there if not h.named)
-        return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
-    if not best.named:
-        best = next(h for h in there if h.named)
-    alternatives = {name: _instead_of(name, best, credible) for name in best.named}
-    if single > 0.5 * total:
-        if len(best.named) > 1:
-            best = next(h for h in there if len(h.named) == 1)
-            alternatives = {name: _instead_of(name, best, credible) for name in best.named}
-        sure = len(best.mechanisms) == 1 and best.probability >= settings.named_probability * total
-        verdict = NAMED if sure else CLASS
-    else:
-        if len(best.named) < 2:
-            best = next(h for h in there if len(h.named) > 1)
-            alternatives = {name: _instead_of(name, best, credible) for name in best.named}
-        verdict = SEVERAL
-    if verdict == NAMED:
-        alternatives = {name: () for name in best.named}
-    return Conclusion(verdict, hypotheses, best, alternatives, mechanisms)
+    return dict(sorted(present.items(), key=lambda entry: -entry[1]))
 
 
 def hypotheses_of(problem, posterior):

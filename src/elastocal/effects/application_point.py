@@ -7,6 +7,7 @@ from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import base_and_flange
 
 NAME, FAMILY = "application_point", "load"
+WORDS = "wrong load application point"
 _PARAMETERS = tuple(Parameter(f"shift_{axis}", "m", 0.02) for axis in "xyz")
 
 

@@ -6,6 +6,7 @@ Catalogue row 7: [I, -[p]x] C_b (F, p x F). Its compliance about the vertical is
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "base_compliance", "elastic"
+WORDS = "elasticity of the foundation"
 _PARAMETERS = (
     Parameter("horizontal", "m/N", 2e-8, sign=1),
     Parameter("vertical", "m/N", 2e-8, sign=1),

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "bearing_runout", "transmission"
+WORDS = "bearing runout"
 _ORDERS = (1, 2)
 _WAVES = (("cos", np.cos), ("sin", np.sin))
 _SAMPLES_PER_PERIOD = 4

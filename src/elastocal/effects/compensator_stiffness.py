@@ -8,6 +8,7 @@ from dataclasses import replace
 from elastocal.effects import joint_dependent_stiffness
 
 NAME, FAMILY = "compensator_stiffness", "elastic"
+WORDS = "stiffness of the gravity compensator"
 
 
 def candidates(sites):

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "compensator_torque", "gravity"
+WORDS = "torque of the gravity compensator"
 _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order in (1, 2) for wave in ("cos", "sin"))
 
 

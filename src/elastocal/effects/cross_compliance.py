@@ -8,6 +8,7 @@ from itertools import combinations
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "cross_compliance", "elastic"
+WORDS = "elastic coupling"
 _PARAMETERS = (Parameter("compliance", "rad/(N m)", 2e-7),)
 
 

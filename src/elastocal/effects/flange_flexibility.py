@@ -7,6 +7,7 @@ about the axis of the last joint is that of its compliance, and is held by the f
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "flange_flexibility", "elastic"
+WORDS = "flexibility of the flange"
 # A bolted joint of a tool gives some ten micrometres and a tenth of a milliradian under a kilonewton at half a metre.
 _SHIFTS = tuple(Parameter(f"shift_{axis}", "m/N", 2e-8, sign=1) for axis in "xyz")
 _TURNS = tuple(Parameter(f"turn_{axis}", "rad/(N m)", 2e-7, sign=1) for axis in "xyz")

@@ -7,6 +7,7 @@ from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import base_and_flange
 
 NAME, FAMILY = "force_bias", "load"
+WORDS = "zero error of the force sensor"
 _PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 
 

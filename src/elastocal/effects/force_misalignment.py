@@ -7,6 +7,7 @@ from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import base_and_flange
 
 NAME, FAMILY = "force_misalignment", "load"
+WORDS = "misalignment of the force sensor"
 _PARAMETERS = tuple(Parameter(f"about_{axis}", "rad", 0.02) for axis in "xyz")
 
 

@@ -6,6 +6,7 @@ Catalogue row 19: an exact alias of the compliances, so that where they are iden
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "force_scale", "load"
+WORDS = "scale error of the force sensor"
 _PARAMETERS = (Parameter("scale", "1", 0.02),)
 
 

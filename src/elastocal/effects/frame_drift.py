@@ -6,6 +6,7 @@ Catalogue row 23.
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "frame_drift", "drift"
+WORDS = "drift of the tracker or of the robot's foot"
 _PARAMETERS = (
     *(Parameter(f"d{axis}", "m/h", 2e-4) for axis in "xyz"),
     *(Parameter(f"r{axis}", "rad/h", 1e-4) for axis in "xyz"),

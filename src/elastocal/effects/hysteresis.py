@@ -6,6 +6,7 @@ Catalogue row 14. Where the approach is not recorded this is part of the repeata
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "hysteresis", "gearbox"
+WORDS = "hysteresis"
 # The nut of a spindle has some hundredths of a millimetre.
 _TURN, _SHIFT = Parameter("half_width", "rad", 1e-4), Parameter("half_width", "m", 2e-5)
 

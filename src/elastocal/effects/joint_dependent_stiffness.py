@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "joint_dependent_stiffness", "elastic"
+WORDS = "angle-dependent stiffness"
 _PARAMETERS = (Parameter("cos_q", "rad/(N m)", 2e-7), Parameter("sin_q", "rad/(N m)", 2e-7))
 
 

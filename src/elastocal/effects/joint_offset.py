@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "joint_offset", "geometry"
+WORDS = "zero offset"
 _TURN, _SHIFT = Parameter("offset", "rad", 1e-3), Parameter("offset", "m", 1e-3)
 
 

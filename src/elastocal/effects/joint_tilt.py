@@ -6,6 +6,7 @@ Catalogue row 6: a turn (e . M_i) / k about each of the two axes e across the jo
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "joint_tilt", "elastic"
+WORDS = "bearing tilt"
 
 
 def candidates(sites):

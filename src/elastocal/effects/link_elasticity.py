@@ -10,6 +10,9 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "link_elasticity", "elastic"
+WORDS = "elastic bending and torsion"
+PART = "link"
+DETAIL_WORDS = {"one section": "all of one cross-section"}
 # One per mille of the bending compliance of a solid steel rod of 0.1 m is 1e-9; thin-walled cast arms reach 1e-6.
 _PARAMETERS = tuple(Parameter(name, "1/(N m^2)", 3e-7, sign=1) for name in ("bending_1_over_EI", "torsion_1_over_GJ"))
 _SHORTEST_M = 0.05

@@ -9,6 +9,8 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
 
 NAME, FAMILY = "link_geometry", "geometry"
+WORDS = "geometric error"
+PART = "link"
 _PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(
     Parameter(f"r{axis}", "rad", 1e-3) for axis in "xyz"
 )

@@ -9,6 +9,8 @@ their lines too: centres of mass are seldom on them.
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "link_weight", "gravity"
+WORDS = "gravity sag"
+DETAIL_WORDS = {"off the line": "centre off the line"}
 _LINKS = 2
 # Some 200 kg on a joint of 1 urad/(N m), and their centre 0.2 m off the line of the link.
 _PRODUCT, _MOMENT = 2e-4, 4e-5

@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, Shape, full_torque_Nm, per_joint
 
 NAME, FAMILY = "lost_motion", "gearbox"
+WORDS = "lost motion (backlash)"
 _PARAMETERS = (Parameter("half_play", "rad", 1e-4, sign=1),)
 # Of the full torque.
 _START, _LOWEST, _HIGHEST = 0.03, 0.003, 0.1

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "motor_eccentricity", "transmission"
+WORDS = "motor eccentricity"
 _ORDERS = (1, 2)
 # An eccentric of some milliradians at the motor, over a ratio of a hundred.
 _AMPLITUDE_RAD = 5e-5

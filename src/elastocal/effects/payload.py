@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "payload", "gravity"
+WORDS = "weight of an undeclared payload"
 _PARAMETERS = (Parameter("mass", "kg", 10.0), *(Parameter(f"moment_{axis}", "kg m", 2.0) for axis in "xyz"))
 
 

@@ -3,6 +3,9 @@
 An effect is a module of this package with
 
 - ``NAME`` and ``FAMILY``, as in the design's table;
+- ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
+  ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
+  behind them;
 - ``candidates(sites)``, which lists where on this robot the effect can act.
 
 Nothing else knows the effects by name: a new module is a new effect.

@@ -7,6 +7,7 @@ their numbers. Where in the campaign it happens is a shape: 0 is its first row, 
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 
 NAME, FAMILY = "setup_step", "drift"
+WORDS = "shift of the set-up between rows"
 _PARAMETERS = (
     *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
     *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),

@@ -8,6 +8,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, Shape, full_torque_Nm, lever_m, per_joint
 
 NAME, FAMILY = "stiffening", "gearbox"
+WORDS = "gear stiffening"
 # The end of the robot moves by so much under the full torque.
 _MOVED_M = 5e-3
 # Slopes that meet at less of the full torque are those of play, see `lost_motion`.

@@ -11,6 +11,17 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, by_warmth
 
 NAME, FAMILY = "temperature_gradient", "drift"
+WORDS = "temperature gradient"
+PART = "link"
+DETAIL_WORDS = {
+    "along": "along the arm",
+    "along temperature": "along the arm, by temperature",
+    "along time": "along the arm, by time",
+    "temperature": "across it, by temperature",
+    "time": "across it, by time",
+    "column temperature": "across the column, by temperature",
+    "column time": "across the column, by time",
+}
 # Steel, half of the warmth across 0.3 m; by time some 8 K of it.
 _PLAUSIBLE = {"temperature": ("1/(K m)", 2e-5), "time": ("1/m", 1.5e-4)}
 _SHORTEST_M = 0.05

@@ -7,6 +7,7 @@ alone it is the rise of a first order lag since the campaign began, 1 - exp(-t /
 from elastocal.effects.protocol import Candidate, Parameter, by_warmth
 
 NAME, FAMILY = "thermal_growth", "drift"
+WORDS = "thermal growth of the links"
 _PARAMETERS = {
     "temperature": Parameter("expansion", "1/K", 3e-5, sign=1),
     "time": Parameter("final_growth", "m/m", 3e-4),

@@ -11,6 +11,7 @@ from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.effects.thermal_growth import longer
 
 NAME, FAMILY = "tracker_scale", "geometry"
+WORDS = "scale error of the tracker"
 # Twenty kelvins or 70 hPa of air that nobody told the tracker of.
 _PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
 

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "transmission_harmonic", "transmission"
+WORDS = "gear transmission error"
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 _SAMPLES_PER_PERIOD = 4
 # Gears of robots err by up to about an arc minute. Over the part of a turn that a joint uses, neighbouring orders are nearly

@@ -10,6 +10,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter, Shape
 
 NAME, FAMILY = "transmission_order", "transmission"
+WORDS = "non-integer gear transmission error"
 _HIGHEST = 18
 # Nearer to an integer than this an order cannot be told from it.
 _MARGIN = 0.25

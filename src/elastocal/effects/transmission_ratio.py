@@ -8,6 +8,7 @@ is coupled to the joint two before it.
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "transmission_ratio", "transmission"
+WORDS = "gear ratio or coupling error"
 _WRIST = 3
 
 

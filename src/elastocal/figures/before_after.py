@@ -7,6 +7,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter
 
+from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
 
@@ -44,7 +45,7 @@ def before_after(steps, noise_floor_m=None):
     heights = np.array([0.55 + 0.45 * count for count in lines])
     rows = np.cumsum(heights) - heights / 2
     values = np.array([[step[f"heldout_{metric}_m"] for metric in METRICS] for step in steps])
-    scale, unit = (MILLI, "mm") if values.max() > 3e-3 else (MICRO, "µm")
+    scale, unit = (MILLI, "mm") if values.max() >= 1e-3 else (MICRO, "µm")
     trained = np.array([[step[f"train_{metric}_m"] for metric in METRICS] for step in steps])
     known = [*values[values > 0], *([noise_floor_m] if noise_floor_m else [])]
     logarithmic = max(known) > _LARGEST_RATIO * min(known)
@@ -80,7 +81,7 @@ def _interval(axis, value, low, high, row):
 
 def step_name(name, most=3):
     """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
-    parts = name.replace("_", " ").replace("@", " ").split(", ")
+    parts = in_words(name).split(", ")
     rest = f" and {len(parts) - most} more" if len(parts) > most else ""
     return textwrap.fill(", ".join(parts[:most]) + rest, _LINE)
 
@@ -94,7 +95,7 @@ def _legend(kinds, noise_floor_m):
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
     handles.append(
         Line2D(
-            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on training poses"
+            [], [], linestyle="", marker="D", color="white", markeredgecolor="black", markersize=3.4, label="on fitted poses"
         )
     )
     if noise_floor_m:

@@ -1,75 +1,95 @@
-"""Candidates of a search for what is missing: how far each stands out, and which of them make the same residual."""
+"""What may be missing in a model: probabilities of hypotheses, candidates one by one, and which of them contribute alike."""
+
+import textwrap
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
-from matplotlib.ticker import MaxNLocator
 
+from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.figures.style import PALETTE, note, panels, styled
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
-# As in selection.FAMILY_WISE_LEVEL, which a drawing job should not have to import all of the search for; a test compares them.
-FAMILY_WISE_LEVEL = 0.03
-# Of the smallest p-value that a double holds.
-_FARTHEST = 308.0
-_NAMED = 15
-_LEADING = 20
+# Hypotheses and candidates with a bar of their own.
+_HYPOTHESES, _NAMED = 8, 15
+_LEADING = 16
+_LINE = 44
+_REST_COLOUR = "#d9d9d9"
+# Why nothing is tested where the data are at fault, as tables.candidate_columns notes it.
+_AT_FAULT = "the readings are at fault"
 
 
 @styled
-def scree(table):
-    """Candidates in the order in which they stand out at the first look.
+def probabilities(stated, table):
+    """Posterior probabilities of the leading hypotheses, and Bayes factors of the leading candidates alone.
 
     Parameters
     ----------
+    stated : dict or None
+        ``probabilities`` of a diagnosis; None where the data are at fault.
     table : dict of str to ndarray
         Columns of the candidates table.
 
     Returns
     -------
     matplotlib.figure.Figure
-        The leading ones by name, and all of them by rank.
     """
-    tested = np.isfinite(table["p_value"])
     order = leading(table)
     if not len(order):
         return _nothing_tested(table)
-    strength = strengths(table)
-    mark = family_wise_mark(strength[tested], table["p_family"][tested])
+    sets = stated["sets"][:_HYPOTHESES]
+    labels = [textwrap.fill(_capital(words), _LINE) for words in hypotheses_words(sets)]
+    values = [entry["probability"] for entry in sets]
+    rest = 1.0 - sum(values)
+    if rest > 0.001:
+        labels, values = [*labels, "Everything else"], [*values, rest]
     named = order[:_NAMED]
-    figure, axes = panels(1, 2, max(70, 34 + 4.1 * len(named)), width_ratios=(1.25, 1))
-    left, right = axes[0]
-    rows = np.arange(len(named))
-    left.barh(rows, strength[named], color=_colours(table, named), height=0.62, zorder=2)
-    for row, index in enumerate(named):
-        if table["chosen"][index]:
-            left.barh(row, strength[index], height=0.62, facecolor="none", edgecolor="black", linewidth=1.3, zorder=3)
-        if strength[index] >= _FARTHEST:
-            left.annotate(">", (strength[index], row), (2, 0), textcoords="offset points", va="center", fontsize=7.5)
-    left.set(yticks=rows, ylim=(len(named) - 0.4, -0.6), title="the leading candidates")
-    left.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7)
-    left.grid(visible=False, axis="y")
-    ranks = np.arange(1, len(order) + 1)
-    right.scatter(strength[order], ranks, s=14, c=_colours(table, order), zorder=3, linewidths=0)
-    chosen = table["chosen"][order].astype(bool)
-    right.scatter(strength[order][chosen], ranks[chosen], s=46, facecolors="none", edgecolors="black", linewidths=1.2, zorder=4)
-    right.set(ylabel="rank", title=f"all {len(order)} tested")
-    right.set_ylim(len(order) + 1, 0)
-    right.yaxis.set_major_locator(MaxNLocator(8, integer=True, steps=[1, 2, 5, 10]))
-    farthest = max(strength[order].max(initial=0.0), mark or 0.0, 2.0)
-    for axis, apart in ((left, 0.13), (right, 0.2)):
-        axis.set_xscale("function", functions=(lambda x: np.sqrt(np.clip(x, 0, None)), np.square))
-        axis.set(xlim=(0, 1.06 * farthest), xticks=_ticks(farthest, apart), xlabel=r"$-\log_{10}$ p of the candidate alone")
-        if mark is not None:
-            axis.axvline(mark, color="black", linestyle="--", linewidth=1, zorder=5, gid="family-wise")
-    _families_legend(figure, table, order, mark)
+    # Rows as high as their names are long.
+    heights = np.array([0.75 + 0.65 * (label.count("\n") + 1) for label in labels])
+    height_mm = 34 + 3.6 * heights.sum(), 22 + 4.3 * len(named)
+    figure, axes = panels(2, 1, sum(height_mm), height_ratios=height_mm)
+    _bars(axes[0, 0], np.cumsum(heights) - heights / 2, heights.sum(), labels, values)
+    _factors(axes[1, 0], table, named)
+    _families_legend(figure, table, order, named)
     return figure
+
+
+def _bars(axis, rows, end, labels, values):
+    """Probabilities of hypotheses in percent."""
+    colours = [_REST_COLOUR if label == "Everything else" else PALETTE[0] for label in labels]
+    axis.barh(rows, 100 * np.array(values), height=0.9, color=colours, zorder=2)
+    for row, value in zip(rows, values, strict=True):
+        text = "<1 %" if value < 0.005 else ">99 %" if value >= 0.995 else f"{100 * value:.0f} %"
+        axis.annotate(text, (100 * value, row), (3, 0), textcoords="offset points", va="center", fontsize=7.5)
+    axis.set(yticks=rows, ylim=(end, 0), xlim=(0, 112), xticks=range(0, 101, 20), xlabel="posterior probability (%)")
+    axis.set_yticklabels(labels, fontsize=7)
+    axis.set_title("What is missing in the declared model", loc="left")
+    axis.grid(visible=False, axis="y")
+
+
+def _factors(axis, table, named):
+    """Bayes factors of single candidates, coloured by family."""
+    factors, rows = table["log_bayes_factor"][named], np.arange(len(named))
+    axis.barh(rows, factors, color=_colours(table, named), height=0.62, zorder=2)
+    chosen = table["chosen"][named].astype(bool)
+    if chosen.any():
+        style = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
+        axis.barh(rows[chosen], factors[chosen], height=0.62, **style)
+    axis.set_xscale("function", functions=(_root, _square))
+    low, high = min(factors.min(), 0.0), max(factors.max(), 2.0)
+    axis.set(yticks=rows, ylim=(len(named) - 0.4, -0.6), xlim=(_square(1.04 * _root(low)), 1.06 * high))
+    axis.set_xticks(_ticks(low, high))
+    axis.set_xlabel("Bayes factor against the declared model\n(natural logarithm; above 0 it explains more)")
+    axis.axvline(0, color="black", linewidth=0.8, zorder=4)
+    axis.set_yticklabels([short_name(table["candidate"][index]) for index in named], fontsize=7)
+    _two_lines(axis)
+    axis.set_title("Each candidate cause alone", loc="left")
+    axis.grid(visible=False, axis="y")
 
 
 @styled
 def confounding(table, pairs):
-    """Angles between what the leading candidates make beyond the declared model.
+    """Angles between the contributions of the leading candidates beyond the declared model.
 
     Parameters
     ----------
@@ -100,11 +120,12 @@ def confounding(table, pairs):
         for column in range(count):
             if row != column and np.isfinite(angles[row, column]):
                 ink = "white" if angles[row, column] < 45 else "black"
-                axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=6.5, color=ink)
+                axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=6, color=ink)
     numbered = [f"{short_name(name)}  {number}" for number, name in enumerate(names, 1)]
     axis.set(xticks=range(count), yticks=range(count))
     axis.set_xticklabels(range(1, count + 1), fontsize=7)
     axis.set_yticklabels(numbered, fontsize=7)
+    _two_lines(axis)
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)
@@ -115,18 +136,17 @@ def confounding(table, pairs):
         if name in chosen:
             axis.add_patch(_frame(number, count))
     bar = figure.colorbar(image, ax=axis, ticks=[0, 20, 45, 70, 90])
-    bar.set_label("angle (°)")
+    bar.set_label("angle between the contributions (°)")
     if chosen & set(names):
-        handle = Patch(facecolor="none", edgecolor=PALETTE[1], linewidth=1.4, label="found in this campaign")
+        handle = Patch(facecolor="none", edgecolor=PALETTE[1], linewidth=1.4, label="in the most probable model")
         figure.legend(handles=[handle], loc="outside lower center")
     return figure
 
 
 def leading(table):
-    """Indices of the candidates that were tested, those that stand out most first; each at the best value of its shape."""
-    tested = np.flatnonzero(np.isfinite(table["p_value"]))
-    statistic, gain = table["statistic"][tested], table["bic_gain"][tested]
-    order = tested[np.lexsort((-statistic, -gain, table["p_value"][tested]))]
+    """Indices of the tested candidates by falling Bayes factor; each at the best value of its shape."""
+    tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
+    order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
     _, first = np.unique(table["candidate"][order].astype(str), return_index=True)
     return order[np.sort(first)]
 
@@ -137,33 +157,6 @@ def shortlist(order, chosen, count=_LEADING):
     others = [index for index in order if not chosen[index]][: count - len(wanted)]
     kept = {*wanted, *others}
     return [index for index in order if index in kept]
-
-
-def strengths(table):
-    """-log10 of the p-values; where a double cannot hold one, what the Bayesian criterion says that it is at least."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        strength = -np.log10(table["p_value"])
-    # The criterion is twice the logarithm of the likelihood ratio less a penalty that outweighs the tail's polynomial.
-    return np.where(strength < _FARTHEST, strength, np.maximum(table["bic_gain"] / (2 * np.log(10)), _FARTHEST))
-
-
-def family_wise_mark(strength, p_family, level=FAMILY_WISE_LEVEL):
-    """Strength that the strongest of all candidates reaches by chance in so many cases.
-
-    Parameters
-    ----------
-    strength, p_family : ndarray (K,)
-    level : float
-
-    Returns
-    -------
-    float or None
-        Half way between the last candidate beyond the level and the first within it; None where none lies on either side.
-    """
-    beyond, within = strength[p_family < level], strength[p_family >= level]
-    if not len(beyond) or not len(within):
-        return None
-    return float((np.sqrt(beyond.min()) + np.sqrt(within.max())) ** 2 / 4)
 
 
 def name_in_pairs(table, index):
@@ -183,44 +176,61 @@ def angle_matrix(names, pairs):
     return angles
 
 
-def short_name(key, longest=38):
-    """A candidate's key as words, cut in the middle where it is very long."""
-    words = key.replace("_", " ").replace("@", " ").replace("[", ", ").replace("]", "").replace(" ,", ",")
-    return words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
+def short_name(key, longest=80):
+    """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
+    words = _capital(candidate_words(key))
+    words = words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
+    return textwrap.fill(words, 48)
+
+
+def _two_lines(axis):
+    """Names of two lines in smaller letters, so that they do not touch their neighbours."""
+    for label in axis.get_yticklabels():
+        if "\n" in label.get_text():
+            label.set(fontsize=5.6, linespacing=0.95)
+
+
+def _capital(text):
+    return text[:1].upper() + text[1:]
 
 
 def _nothing_tested(table):
-    return note(f"None of {len(set(table['candidate']))} candidates can be tested with these data.")
+    count = len(set(table["candidate"]))
+    if count and set(table["note"]) == {_AT_FAULT}:
+        return note("The data are at fault: no cause in the robot was looked for.")
+    return note(f"None of {count} candidate causes can be tested with these measurements.")
 
 
 def _colours(table, indices):
     return [FAMILIES.get(table["family"][index], PALETTE[-1]) for index in indices]
 
 
-def _ticks(farthest, apart):
-    steps = [0, *(digit * 10**power for power in range(-1, 6) for digit in (1, 2, 5))]
-    shown = [step for step in steps if step <= 1.06 * farthest]
-    kept = []
-    for step in shown:
-        # So far apart that their numbers do not touch, on an axis of square roots.
-        if not kept or np.sqrt(step) - np.sqrt(kept[-1]) > apart * np.sqrt(farthest):
+def _root(value):
+    """Root that keeps the sign."""
+    return np.sign(value) * np.sqrt(np.abs(value))
+
+
+def _square(value):
+    return np.sign(value) * np.square(value)
+
+
+def _ticks(low, high):
+    """Round values, so far apart that their numbers do not touch on an axis of roots."""
+    steps = [0, *(digit * 10**power for power in range(6) for digit in (1, 2, 5))]
+    apart, kept = 0.07 * (_root(high) - _root(low)), []
+    for step in sorted({*steps, *(-step for step in steps)}, key=abs):
+        if low <= step <= high and all(abs(_root(step) - _root(other)) > apart for other in kept):
             kept.append(step)
-    return kept
+    return sorted(kept)
 
 
-def _families_legend(figure, table, order, mark):
-    present = [family for family in FAMILIES if family in set(table["family"][order])]
+def _families_legend(figure, table, order, named):
+    present = [family for family in FAMILIES if family in set(table["family"][named])]
     handles = [Patch(color=FAMILIES[family], label=family) for family in present]
     if table["chosen"].any():
-        handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="taken by the search"))
-    if mark is not None:
-        label = f"family-wise {100 * FAMILY_WISE_LEVEL:g} %"
-        handles.append(Line2D([], [], color="black", linestyle="--", linewidth=1, label=label))
+        handles.append(Patch(facecolor="none", edgecolor="black", linewidth=1.3, label="in the most probable model"))
     untestable = len(set(table["candidate"])) - len(order)
-    words = f"{len(order)} candidates tested, {untestable} more cannot be tested with these data"
-    if mark is None:
-        none = not len(order) or table["p_family"][order].min() >= FAMILY_WISE_LEVEL
-        words += f"; {'none stands' if none else 'all stand'} out at the family-wise {100 * FAMILY_WISE_LEVEL:g} % level"
+    words = f"{len(order)} candidate causes tested; {untestable} more cannot be tested with these measurements"
     figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4, title_fontsize=7.5)
 
 

@@ -284,9 +284,9 @@ def _stages(table):
 def _legend(stages, with_held_out):
     drawn = [STAGES[stage] for stage in stages]
     handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
-    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="training reading"))
+    handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
     if with_held_out:
-        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out reading"))
+        handles.append(Line2D([], [], color="#666666", linestyle="", marker="x", markersize=4, label="held-out measurement"))
     return handles
 
 
@@ -318,5 +318,5 @@ def _scale_arrow(axis, largest, length):
     scale, unit = (MILLI, "mm") if shown > 0.9995e-3 else (MICRO, "µm")
     key = axis.quiver([0], [0], [0], [0], angles="xy", scale_units="xy", scale=1, color="black", width=0.006, minlength=0)
     place = {"labelpos": "W", "coordinates": "axes", "fontproperties": {"size": 8}}
-    axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:.3g} {unit}", **place)
+    axis.quiverkey(key, 0.88, 1.035, shown * length / largest, f"{scale * shown:g} {unit}", **place)
     key.set_visible(False)

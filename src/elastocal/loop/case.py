@@ -1,6 +1,6 @@
 """What every step needs of a campaign, put together again from its tables."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
@@ -65,5 +65,6 @@ def noise_facts(noise):
 
 
 def noise_from(facts):
-    """Noise from its JSON document."""
-    return Noise(**facts["noise"] | {"joint_rad": np.array(facts["noise"]["joint_rad"])})
+    """Noise from its JSON document, or from a verdict, which tells more of it."""
+    known = {entry.name: facts["noise"][entry.name] for entry in fields(Noise)}
+    return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})

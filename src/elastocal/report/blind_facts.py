@@ -29,7 +29,7 @@ _SAID_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
 
 
-def blind_facts(tables, manifest, size, seed, replicates):
+def blind_facts(tables, manifest, size, seed):
     """Facts for the report of the blind proof.
 
     Parameters
@@ -41,8 +41,8 @@ def blind_facts(tables, manifest, size, seed, replicates):
         Contents of the manifest.
     size : str
         Of the benchmark.
-    seed, replicates : int
-        Of everything that is drawn, and of the bootstrap behind each look.
+    seed : int
+        Of everything that is drawn.
 
     Returns
     -------
@@ -61,7 +61,6 @@ def blind_facts(tables, manifest, size, seed, replicates):
             "cases": grouped(len(cases)),
             "size": size,
             "seed": str(seed),
-            "replicates": grouped(replicates),
             "truths": grouped(len(manifest.splitlines())),
             "digest": hashlib.sha256(manifest.encode()).hexdigest(),
             "levels": listed(f"{level:g}" for level in sorted(cases[cases.group == "single"].level.unique())),

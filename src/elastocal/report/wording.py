@@ -4,13 +4,13 @@ import re
 
 import numpy as np
 
+from elastocal.diagnosis.words import at_joints, candidate_words, detail_words, in_words, listed
+
 MICRO, MILLI = 1e6, 1e3
 # A blank at which no line ends.
 _TIED = "\u00a0"
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _KEY = re.compile(r"^(?P<effect>[^@\[]+)(?:@(?P<joints>[\d+]+))?(?:\[(?P<detail>.*)\])?$")
-# Effects whose numbers count links, which begin at the joint of the same number.
-_OF_LINKS = ("link_elasticity", "link_geometry")
 
 
 def words(name):
@@ -18,12 +18,20 @@ def words(name):
     return name.replace("_", " ")
 
 
-def listed(items, most=None, rest="more"):
-    """Items in a sentence, at most so many of them."""
-    items = list(items)
-    if most is not None and len(items) > most:
-        items = [*items[:most], f"{len(items) - most} {rest}"]
-    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + " and " + items[-1] if items else "none"
+def capital(text):
+    """A text with a capital at its beginning."""
+    return text[:1].upper() + text[1:]
+
+
+def as_sentence(text):
+    """A text with a capital and a full stop."""
+    text = text.strip()
+    return capital(text) + ("" if text.endswith(".") else ".")
+
+
+def minus(text):
+    """A number with a true minus sign."""
+    return text.replace("-", "−")
 
 
 def counted(number, one, many=None):
@@ -34,24 +42,6 @@ def counted(number, one, many=None):
 def grouped(number):
     """A whole number with a thin space between thousands."""
     return f"{number:,}".replace(",", "\u2009")
-
-
-def at_joints(effect, joints):
-    """Where an effect acts: " in joint 3", or nothing where it is no joint's."""
-    if not joints:
-        return ""
-    kind = "link" if effect in _OF_LINKS else "joint"
-    return f" in {kind}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
-
-
-def candidate_words(key):
-    """The key of a candidate as words: effect, joints, variant."""
-    found = _KEY.match(key)
-    if not found:
-        return words(key)
-    joints = found["joints"].split("+") if found["joints"] else []
-    detail = f", {found['detail']}" if found["detail"] else ""
-    return words(found["effect"]) + at_joints(found["effect"], joints) + detail
 
 
 def members_words(keys, most=12):
@@ -67,12 +57,20 @@ def members_words(keys, most=12):
     -------
     str
     """
-    grouped_keys = {}
+    details = {}
     for key in sorted(keys, key=_natural):
         found = _KEY.match(key)
-        where = at_joints(found["effect"], (found["joints"] or "").split("+")) if found["joints"] else ""
-        grouped_keys.setdefault(where.removeprefix(" in "), []).append(found["detail"] or "")
-    parts = [": ".join(filter(None, (where, ", ".join(filter(None, details))))) for where, details in grouped_keys.items()]
+        joints = tuple((found["joints"] or "").split("+")) if found["joints"] else ()
+        details.setdefault((found["effect"], joints), []).append(detail_words(found["effect"], found["detail"] or ""))
+    # Single joints of which the same is to be told stand together.
+    alike = {}
+    for (effect, joints), which in details.items():
+        group = (effect, joints if len(joints) != 1 else None, ", ".join(filter(None, which)))
+        alike.setdefault(group, []).extend(joints)
+    parts = [
+        ": ".join(filter(None, (at_joints(effect, joints).removeprefix(" of "), which)))
+        for (effect, _, which), joints in alike.items()
+    ]
     shown = [part for part in parts if part]
     return "; ".join(shown[:most]) + (f"; {len(shown) - most} more" if len(shown) > most else "")
 
@@ -84,7 +82,7 @@ def _natural(key):
 def step_words(step):
     """The name of a row of before_after.csv as words."""
     if not step.startswith("control: "):
-        return words(step)
+        return in_words(step)
     return "control: " + listed([candidate_words(key) for key in step.removeprefix("control: ").split(", ")], 3)
 
 
@@ -108,6 +106,15 @@ def plain(value, digits=3):
 def percent(share):
     """A share in percent."""
     return f"{100 * share:.0f}{_TIED}%"
+
+
+def probability_words(probability):
+    """A probability in whole percent; none is said to be 0 or 100 %."""
+    if probability < 0.005:
+        return f"<{_TIED}1{_TIED}%"
+    if probability >= 0.995:
+        return f">{_TIED}99{_TIED}%"
+    return percent(probability)
 
 
 def p_words(p_value):
@@ -142,7 +149,8 @@ def scaled(value, error, unit):
     number, error = number / 10.0**power, error / 10.0**power
     if error:
         decimals = max(0, 1 - int(np.floor(np.log10(error))))
-        text = f"{number:.{decimals}f} ± {error:.{decimals}f}"
+        # What is rounded to zero has no sign.
+        text = f"{round(number, decimals) + 0.0:.{decimals}f} ± {error:.{decimals}f}"
     else:
         text = plain(number, 4)
     if power:

@@ -1,0 +1,105 @@
+"""Parameters averaged over models, so that values and intervals are honest after selection.
+
+The exact fit is that of the most probable model at its most probable sizes. What the others say differently is taken from the
+linearised problem: the mean over models moves the estimate, and their spread widens its standard error (law of total variance).
+Parameters of the declared model are averaged over all models; those of an effect over its sizes and the models that have it, so
+that they answer how large it is if it is there.
+
+References
+----------
+.. [1] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.refit import mean_square_left
+from elastocal.diagnosis.statistics import normal_equations
+
+# Models that hold less than this move no digit that is reported.
+_LEAST_PROBABILITY = 0.002
+
+
+@dataclass(frozen=True)
+class Averaged:
+    """Corrections to the exact fit of the most probable model.
+
+    Attributes
+    ----------
+    shift : dict of (str, str) to float
+        By owner and name of a parameter: what the other models add to its estimate.
+    std_error : dict of (str, str) to float
+    """
+
+    shift: dict
+    std_error: dict
+
+
+def averaged(linearized, posterior, best, owners):
+    """Average over the models of a posterior.
+
+    Parameters
+    ----------
+    linearized : Linearized
+    posterior : Posterior
+    best : search.Model
+        Of which there is an exact fit.
+    owners : sequence of (str, str)
+        Owner and name of each parameter of the declared block.
+
+    Returns
+    -------
+    Averaged
+    """
+    likely = [
+        (m, p) for m, p in zip(posterior.models, posterior.probabilities, strict=True) if p >= _LEAST_PROBABILITY or m is best
+    ]
+    equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
+    moments, exact = {}, None
+    for model, probability in likely:
+        found = _moments(linearized, model, equations[model.pose_error_rad], owners)
+        exact = found if model is best else exact
+        for name, (mean, variance) in found.items():
+            moments.setdefault(name, []).append((probability, mean, variance))
+    shift, std_error = {}, {}
+    for name, entries in moments.items():
+        weight, mean, variance = np.array(entries).T
+        weight = weight / weight.sum()
+        center = weight @ mean
+        if name in exact:
+            shift[name] = float(center - exact[name][0])
+            std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
+    return Averaged(shift, std_error)
+
+
+def _moments(linearized, model, equations, owners):
+    """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
+    products, units = linearized.products, [linearized.problem.units[number] for number in model.units]
+    declared = products.declared
+    columns = np.concatenate([np.zeros(0, int), *(unit.columns for unit in units)])
+    deviations = np.repeat(model.scales, [len(unit.columns) for unit in units])
+    chosen = np.concatenate([np.arange(declared), declared + columns])
+    information = equations[np.ix_(chosen, chosen)].copy()
+    places = np.arange(declared, len(chosen))
+    information[places, places] += deviations**-2.0
+    covariance = np.linalg.inv(information) * max(mean_square_left(linearized.problem, model), 1.0)
+    mean = np.linalg.solve(information, equations[chosen, -1])
+    # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
+    back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
+    variance = ((back @ covariance) * back).sum(axis=1)
+    found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
+    for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model), strict=True):
+        for index, parameter in enumerate(unit.candidate.parameters if unit.candidate else ()):
+            found[unit.candidate.key, parameter.name] = unit.sizes[index] * value[index], unit.sizes[index] ** 2 * spread[index]
+    return found
+
+
+def _coefficients(problem, units, model):
+    """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
+    if not units:
+        return []
+    places = np.searchsorted(problem.grid.scales, model.scales)
+    base = problem.statistics.log_likelihood + problem.log_pose
+    return Joint(problem.statistics, units, problem.grid, base, places).moments()

@@ -1,0 +1,207 @@
+"""Mechanisms, locations and hypotheses in the words of a robot engineer: gravity sag of joint 2 or a related mechanism.
+
+Each effect of the catalogue brings its own words; nothing here knows one by name.
+"""
+
+import re
+
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.effects.catalogue import effects
+
+NOTHING = "nothing is missing"
+UNKNOWN = "something that the catalogue does not have"
+RELATED = "a related mechanism"
+_KEY = r"(?P<effect>{names})(?:@(?P<joints>\d+(?:\+\d+)*))?(?:\[(?P<detail>[^\]]*)\])?"
+_ANY_KEY = _KEY.format(names=r"[^@\[]+") + "$"
+_LOCATION = re.compile(r"^(?:(?P<kind>joint|link)s? (?P<numbers>\d+(?: and \d+)*))? ?(?P<detail>.*)$")
+# Locations that have no joint: what stands there in the place of one.
+_PARTS = ("column", "base")
+# Bands of orders, variants and the like are told of as many locations; of more only their joints.
+_MOST_DETAILED = 2
+
+
+def physical_name(effect):
+    """Physical name of an effect of the catalogue; its own name as words where its module has none.
+
+    Parameters
+    ----------
+    effect : str
+
+    Returns
+    -------
+    str
+    """
+    return getattr(effects().get(effect), "WORDS", effect.replace("_", " "))
+
+
+def detail_words(effect, detail):
+    """Which variant of an effect, in words where its module has some."""
+    return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
+
+
+def part_of(effect):
+    """What the numbers of an effect count: joints, or links, which begin at the joint of the same number."""
+    return getattr(effects().get(effect), "PART", "joint")
+
+
+def listed(items, most=None, rest="more", last="and"):
+    """Items in a sentence, at most so many of them."""
+    items = list(items)
+    if most is not None and len(items) > most:
+        items = [*items[:most], f"{len(items) - most} {rest}"]
+    return items[0] if len(items) == 1 else ", ".join(items[:-1]) + f" {last} " + items[-1] if items else "none"
+
+
+def at_joints(effect, joints):
+    """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
+    if not joints:
+        return ""
+    return f" of {part_of(effect)}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
+
+
+def effect_words(effect, locations=()):
+    """An effect and where it acts.
+
+    Parameters
+    ----------
+    effect : str
+    locations : sequence of str
+        As `findings.location_words` writes them: joint 2, links 1 and 2 one section, joint 4 orders 1-2, column.
+
+    Returns
+    -------
+    str
+        Such as: gravity sag of joints 2 and 3.
+    """
+    places = []
+    for location in filter(None, locations):
+        found = _LOCATION.match(location)
+        numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
+        places.append((numbers, found["detail"]))
+    return physical_name(effect) + _where(effect, places)
+
+
+def found_words(effect, keys):
+    """An effect and where it was found.
+
+    Parameters
+    ----------
+    effect : str
+    keys : sequence of str
+        Of its candidates.
+
+    Returns
+    -------
+    str
+        As `effect_words`.
+    """
+    places = []
+    for key in keys:
+        found = re.match(_ANY_KEY, key)
+        places.append((tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or ""))
+    return physical_name(effect) + _where(effect, places)
+
+
+def candidate_words(key):
+    """The key of a candidate in words: zero offset of joint 3, gear transmission error of joint 1 (orders 1-2).
+
+    Parameters
+    ----------
+    key : str
+
+    Returns
+    -------
+    str
+    """
+    found = re.match(_ANY_KEY, key)
+    return found_words(found["effect"], [key]) if found else key.replace("_", " ")
+
+
+def hypothesis_words(mechanisms, locations=None):
+    """A hypothesis, which is a set of mechanisms, in words.
+
+    Parameters
+    ----------
+    mechanisms : sequence of str
+        `OTHER` alone is something that the catalogue does not have; beside a mechanism, that a related one may act.
+    locations : dict of str to list of str, optional
+        Of each mechanism, see `effect_words`.
+
+    Returns
+    -------
+    str
+    """
+    named = [effect_words(name, (locations or {}).get(name, ())) for name in mechanisms if name != OTHER]
+    if not named:
+        return UNKNOWN if OTHER in mechanisms else NOTHING
+    return " with ".join(named) + (f" or {RELATED}" if OTHER in mechanisms else "")
+
+
+def hypotheses_words(sets):
+    """Hypotheses in words; those that hold all of the first and more by what they add to it.
+
+    Parameters
+    ----------
+    sets : sequence of dict
+        As in verdict.json, the most probable first.
+
+    Returns
+    -------
+    list of str
+    """
+    first, found = set(sets[0]["mechanisms"]) if sets else set(), []
+    for entry in sets:
+        names = set(entry["mechanisms"])
+        if not first or not first < names:
+            found.append(hypothesis_words(entry["mechanisms"], entry["locations"]))
+        elif names - first == {OTHER}:
+            found.append(f"the same or {RELATED}")
+        else:
+            found.append("the same with " + hypothesis_words(sorted(names - first), entry["locations"]))
+    return found
+
+
+def alternative_words(name):
+    """What may stand in the place of a mechanism: another, or a related one."""
+    return RELATED if name == OTHER else physical_name(name)
+
+
+def in_words(text):
+    """A text with every name of the catalogue and every key of a candidate in words.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+    """
+    names = "|".join(sorted(effects(), key=len, reverse=True))
+
+    def worded(found):
+        # Names that are common words, such as payload, are meant only as keys or where something is said of them.
+        plain = "_" not in found["effect"] and not (found["joints"] or found["detail"] or text[found.end() :].startswith(":"))
+        return found.group() if plain else candidate_words(found.group())
+
+    return re.sub(r"(?<![\w@])" + _KEY.format(names=names) + r"(?!\w)", worded, text)
+
+
+def _where(effect, places):
+    """Where an effect acts, by joints or links and details: " of joint 4 (orders 1-2)"."""
+    details = {}
+    for numbers, detail in places:
+        details.setdefault(numbers, []).append(detail)
+    singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
+    if singles and (len(details) > _MOST_DETAILED or not any(map(any, details.values()))):
+        return at_joints(effect, sorted(numbers[0] for numbers in details))
+    parts = [_located(effect, numbers, ", ".join(filter(None, which))) for numbers, which in details.items()]
+    return f" {listed(part.strip() for part in parts if part)}" if any(parts) else ""
+
+
+def _located(effect, numbers, detail):
+    detail = detail_words(effect, detail)
+    # Details without a joint stand alone, but for parts of the robot.
+    if not numbers:
+        return f" of the {detail}" if detail in _PARTS else f" ({detail})" if detail else ""
+    return at_joints(effect, numbers) + (f" ({detail})" if detail else "")

@@ -1,0 +1,233 @@
+"""The first page of a campaign's report: the verdict, its probabilities, what it is worth and what to do now, in words."""
+
+import numpy as np
+
+from elastocal.diagnosis.words import (
+    alternative_words,
+    effect_words,
+    found_words,
+    hypotheses_words,
+    listed,
+    physical_name,
+)
+from elastocal.report.wording import (
+    MICRO,
+    MILLI,
+    as_sentence,
+    capital,
+    counted,
+    length,
+    minus,
+    percent,
+    plain,
+    probability_words,
+    words,
+)
+
+TITLES = {
+    "adequate": "the declared model is adequate",
+    "named": "one mechanism is missing in the declared model",
+    "class": "one mechanism is missing in the declared model; which one is ambiguous",
+    "several": "several mechanisms are missing in the declared model",
+    "unexplained": "something is missing in the declared model that the catalogue does not have",
+    "not_testable": "these measurements can test no mechanism",
+}
+AT_FAULT = "the data are at fault"
+OF_DATA = "data"
+# Hypotheses below this stand together as "something else", and so do those beyond the first few.
+LEAST_SHOWN, _MOST_SHOWN = 0.01, 4
+# A location that has this probability goes without saying.
+_SURE = 0.95
+MOST_NAMES = 8
+
+
+def sentences(verdict):
+    """The verdict in plain words.
+
+    Parameters
+    ----------
+    verdict : dict
+        Contents of verdict.json.
+
+    Returns
+    -------
+    list of str
+    """
+    said, found = verdict["verdict"], verdict["effects"]
+    faults = [effect for effect in found if effect["family"] == OF_DATA]
+    if faults:
+        return [
+            *(as_sentence(fault["detail"]) for fault in faults),
+            "No mechanism was looked for, and the residuals below are those of the data as they are.",
+        ]
+    tested = counted(verdict["candidates_tested"], "candidate cause")
+    if said == "not_testable":
+        return [
+            "Whatever a mechanism of the catalogue would contribute at a plausible size is lost in the noise, or the declared "
+            "model absorbs it.",
+            "So these measurements show neither that something is missing nor that nothing is.",
+        ]
+    chance = f"{100 * verdict['probabilities']['alarm_p_value']:.2g} %"
+    level = f"the alarm is set to {percent(verdict['settings']['alarm_level']['value'])}"
+    if said == "adequate":
+        return [
+            f"The declared model explains these measurements: none of {tested} is needed. Where nothing is missing, {chance} "
+            f"of such campaigns speak as much for a missing mechanism as this one; {level}."
+        ]
+    alarm = f"If nothing were missing, {chance} of such campaigns would speak as much for a missing mechanism; {level}."
+    if said == "unexplained":
+        return [
+            "The residual of the declared model is more than noise, and a smooth error of unknown cause explains it better "
+            f"than any of {tested}.",
+            alarm,
+        ]
+    named = [_found(effect) for effect in found]
+    if said == "several":
+        each = listed(
+            (f"{name} ({probability_words(effect['probability'])})" for name, effect in zip(named, found, strict=True))
+        )
+        first = f"The declared model lacks {counted(len(found), 'mechanism')}, each with its probability: {each}."
+        return [first, *(_ambiguity(effect) for effect in found if effect["alternatives"]), alarm]
+    (effect,) = found
+    if said == "class":
+        return [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect), alarm]
+    return [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect), alarm]
+
+
+def probability_sentence(probabilities):
+    """The most probable hypotheses in words, with their probabilities: 94 % gravity sag of joint 2, 6 % something else.
+
+    Parameters
+    ----------
+    probabilities : dict
+        As in verdict.json.
+
+    Returns
+    -------
+    str
+    """
+    shown = [entry for entry in probabilities["sets"] if entry["probability"] >= LEAST_SHOWN][:_MOST_SHOWN]
+    named = zip(shown, hypotheses_words(shown), strict=True)
+    parts = [f"{probability_words(entry['probability'])} {words}" for entry, words in named]
+    rest = 1.0 - sum(entry["probability"] for entry in shown)
+    if rest >= 0.005:
+        parts.append(f"{probability_words(rest)} something else")
+    return ", ".join(parts)
+
+
+def what_to_do(verdict, experiment):
+    """What follows from the verdict for whoever runs the robot, list of str."""
+    said, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
+    if any(effect["family"] == OF_DATA for effect in found):
+        return ["Correct the data as stated, in the file or where they are exported, and diagnose again.", *_transforms(found)]
+    if said == "not_testable":
+        return [
+            "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The section on what "
+            "could not be tested says what each mechanism needs."
+        ]
+    if said == "adequate":
+        error = length(heldout["after"]["rms_m"])
+        return [
+            f"Use the declared model with the parameters fitted here; new poses like these will be off by {error} RMS.",
+            "Effects too small for these measurements may still be there. More poses, larger loads or repeats would show them.",
+        ]
+    advice = []
+    if found:
+        low, high = heldout["reduction_ci95"]
+        if low > 0:
+            advice.append(
+                "Use the corrected model: on poses that it was not fitted to it is more accurate. Its parameters stand in the "
+                "section on what is missing."
+            )
+        elif high < 0:
+            advice.append("Do not use the corrected model: on poses that it was not fitted to it is less accurate.")
+        else:
+            advice.append(
+                "The gain on poses that the corrected model was not fitted to is not certain: measure more validation poses "
+                "before it is used."
+            )
+    if said == "unexplained":
+        advice.append(
+            "Check first what no model of the robot can describe: a loose target, a tracker or robot foot that moved, warming "
+            "up, loads noted wrongly. Then measure again, with repeats, time and approach direction recorded."
+        )
+    elif experiment:
+        poses = len({(row["effect"], row["pose"]) for row in experiment})
+        advice.append(
+            f"To resolve what is ambiguous measure the {counted(poses, 'pose')} of the section on the next experiment."
+        )
+    elif said == "class":
+        advice.append(
+            "Until an experiment resolves which mechanism acts, trust the correction at poses and loads like these only."
+        )
+    if found and heldout["outside_range"]["poses"]:
+        advice.append("Beyond the range of the fitted poses the errors are extrapolated; see the section on errors.")
+    return advice
+
+
+def held_out_sentence(verdict, steps):
+    held_out = verdict["heldout"]
+    before, after = held_out["before"]["rms_m"], held_out["after"]["rms_m"]
+    poses = counted(held_out["poses"], "pose")
+    floor = held_out["noise_floor_rms_m"]
+    noise = f" Noise alone leaves {length(floor)}." if floor else ""
+    ends = [step for step in steps if step["kind"] in ("declared", "effect")]
+    if len(ends) < 2:
+        error = _with_interval(after, ends[-1])
+        return f"On {poses} that were not fitted the declared model leaves an RMS error of {error}.{noise}"
+    low, high = (100 * value for value in held_out["reduction_ci95"])
+    fall = 100 * (1 - after / before)
+    verb, by = ("falls", fall) if fall >= 0 else ("grows", -fall)
+    interval = f"95 % interval of the reduction: {minus(f'{low:.0f}')} to {minus(f'{high:.0f}')} %"
+    return (
+        f"On {poses} that were not fitted the RMS error {verb} from {_with_interval(before, ends[0])} to "
+        f"{_with_interval(after, ends[-1])}, by {by:.0f} % ({interval}).{noise}"
+    )
+
+
+def _found(effect):
+    return found_words(effect["name"], effect["members"])
+
+
+def _ambiguity(effect):
+    if not effect["alternatives"]:
+        return f"Its probability is {probability_words(effect['probability'])}."
+    others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES, last="or")
+    return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them."
+
+
+def _unsure_location(effect):
+    found = [entry for entry in effect["locations"] if entry["probability"] >= LEAST_SHOWN]
+    if len(effect["members"]) > 1 or not found or found[0]["probability"] >= _SURE:
+        return []
+    each = listed(
+        (f"{location_words(effect['name'], entry['location'])} ({probability_words(entry['probability'])})" for entry in found),
+        4,
+    )
+    return [f"Its location is less certain: {each}."]
+
+
+def _transforms(faults):
+    """What turns the data into data that fit, where a fault says so."""
+    return [
+        f"{capital(words(fault['name']))}: the data fit with "
+        + listed(f"{entry['name']} = {minus(plain(entry['value'], 4))} {entry['unit']}" for entry in known)
+        + "."
+        for fault in faults
+        if (known := [entry for entry in fault["parameters"] if entry["unit"] not in ("–", "1")])
+    ]
+
+
+def _with_interval(value, step):
+    """A length with its 95 % interval, in one unit."""
+    low, high = step["heldout_rms_m_low"], step["heldout_rms_m_high"]
+    if not np.isfinite([low, high]).all():
+        return length(value)
+    number, unit = length(value).split("\u00a0")
+    factor = MICRO if unit == "µm" else MILLI
+    return f"{number} [{plain(factor * low)}, {plain(factor * high)}]\u00a0{unit}"
+
+
+def location_words(effect, location):
+    """A location in words, without its effect: links 1, 2 and 3 (one section)."""
+    return effect_words(effect, [location]).removeprefix(physical_name(effect)).strip().removeprefix("of ") or "the whole robot"

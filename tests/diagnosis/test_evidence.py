@@ -1,0 +1,280 @@
+"""Bayes factors: marginal likelihoods of all readings, integrated by brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_problems import made_problem, made_rows, made_unit
+from scipy.integrate import dblquad, quad
+from scipy.optimize import minimize_scalar
+from scipy.special import logsumexp
+from scipy.stats import multivariate_normal, norm
+
+from elastocal.diagnosis.evidence import (
+    Grid,
+    added_evidence,
+    blocks_of,
+    condition,
+    evaluate,
+    log_likelihood,
+    log_sum_exp,
+    pose_weights,
+    scale_weights,
+)
+from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.statistics import statistics_of
+
+TAU = np.array([0.0, 0.3, 0.9])
+SETTINGS = Settings()
+GRID = Grid(np.array(SETTINGS.scales), scale_weights(SETTINGS.scales, SETTINGS))
+LOG_POSE = pose_weights(TAU, SETTINGS)
+# Residuals of a little less than the noise, so that its size is at its floor and everything is normal.
+QUIET = 0.5
+UNITS = (made_unit("a", (1,), [0, 1]), made_unit("b", (1,), 2), made_unit("c", (1,), [3, 4, 5]))
+
+
+def quiet(seed, signal=()):
+    """Rows with less noise than declared, and a signal of some candidates."""
+    rows = made_rows(seed, poses=12)
+    signal = np.array([*signal, *np.zeros(rows.candidates.shape[1] - len(signal))])
+    noise = QUIET * (rows.residual - rows.expected)
+    return replace(rows, residual=rows.expected + noise + rows.candidates @ signal)
+
+
+def log_density(rows, tau, deviations):
+    """ln N(y; X mu, V(tau) + W D W'), scipy's, with nothing left out."""
+    covariance = rows.marginal_covariance(tau) + (rows.candidates * deviations**2) @ rows.candidates.T
+    return multivariate_normal(rows.expected, covariance).logpdf(rows.residual)
+
+
+def deviations_of(units, scales):
+    found = np.zeros(6)
+    for unit, scale in zip(units, scales, strict=True):
+        found[unit.columns] = scale
+    return found
+
+
+def brute_log_bayes_factor(rows, units, grid=GRID):
+    """Sum over all combinations of sizes and of the pose error."""
+    total = []
+    for numbers in np.ndindex(*[len(grid.scales)] * len(units)):
+        weight, deviations = grid.log_weights[list(numbers)].sum(), deviations_of(units, grid.scales[list(numbers)])
+        total += [weight + pose + log_density(rows, tau, deviations) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
+    nothing = [pose + log_density(rows, tau, np.zeros(6)) for tau, pose in zip(TAU, LOG_POSE, strict=True)]
+    return logsumexp(total) - logsumexp(nothing)
+
+
+def evaluated(rows, units, start=None):
+    statistics = statistics_of(rows.products, TAU)
+    start = [SETTINGS.scale_center] * len(units) if start is None else start
+    return evaluate(statistics, units, GRID, LOG_POSE, start)
+
+
+def log_bayes_factor(rows, units):
+    return evaluated(rows, units).log_evidence - evaluated(rows, ()).log_evidence
+
+
+SIGNALS = {"nothing": (), "a": (0.4, -0.3), "b": (0, 0, 0.5), "a little of all": (0.1, 0.1, -0.1, 0.1, 0.0, 0.1)}
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+@pytest.mark.parametrize("number", range(3))
+def test_evidence_of_one_unit_is_exact(signal, number):
+    rows = quiet(1, SIGNALS[signal])
+    statistics = statistics_of(rows.products, TAU)
+    assert (statistics.squares < statistics.freedom).all(), "the case must be quiet for the reference to be normal"
+    expected = brute_log_bayes_factor(rows, UNITS[number : number + 1])
+    assert log_bayes_factor(rows, UNITS[number : number + 1]) == pytest.approx(expected, abs=1e-8)
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_evidence_does_not_depend_on_where_the_search_for_the_sizes_starts(number):
+    rows, units = quiet(2, SIGNALS["a"]), UNITS[number : number + 1]
+    found = {round(evaluated(rows, units, [scale]).log_evidence, 10) for scale in SETTINGS.scales}
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+@pytest.mark.parametrize("chosen", [(0, 1), (0, 2), (0, 1, 2)])
+def test_evidence_of_several_units_is_that_of_all_combinations_of_sizes(signal, chosen):
+    """To 0.03 nats: sizes of different units are not quite independent given the readings."""
+    rows, units = quiet(3, SIGNALS[signal]), [UNITS[number] for number in chosen]
+    expected = brute_log_bayes_factor(rows, units)
+    assert log_bayes_factor(rows, units) == pytest.approx(expected, abs=0.03)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.2, 0.5, 1.0])
+def test_evidence_of_two_units_that_contribute_the_same_is_at_most_a_little_too_low(size):
+    """Where either may be the large one, the sum about one mode misses the other: up to 1.5 nats, for the simpler model."""
+    rows = quiet(1)
+    candidates = rows.candidates.copy()
+    candidates[:, 2] = 0.99 * candidates[:, 0] + np.sqrt(1 - 0.99**2) * candidates[:, 2]
+    rows = replace(rows, candidates=candidates, residual=rows.residual + size * candidates[:, 0])
+    units = [made_unit("a", (1,), 0), made_unit("b", (1,), 2)]
+    short = log_bayes_factor(rows, units) - brute_log_bayes_factor(rows, units)
+    assert -1.6 < short < 0.1
+
+
+def test_evidence_of_units_that_do_not_overlap_is_exact():
+    """Orthogonal after projection: sizes are independent given the readings, and the product of sums is the sum of products."""
+    rows = quiet(4)
+    rows = replace(rows, jacobian=np.zeros_like(rows.jacobian), prior_std=np.full(4, 1e4))
+    basis = np.linalg.qr(np.column_stack([rows.declared, rows.candidates]))[0][:, 4:]
+    rows = replace(rows, candidates=6.0 * basis, residual=0.3 * rows.residual + basis @ [3.0, -1.0, 2.0, 0.0, 1.0, 0.0])
+    one_tau = statistics_of(rows.products, TAU[:1])
+    found = [evaluate(one_tau, units, GRID, np.zeros(1), [0.1] * len(units)) for units in (UNITS, ())]
+    singles = [evaluate(one_tau, [unit], GRID, np.zeros(1), [0.1]).log_evidence - found[1].log_evidence for unit in UNITS]
+    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(sum(singles), abs=1e-6)
+
+
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_evidence_without_each_unit_is_that_of_the_smaller_model(signal):
+    """Exact where nothing else is in the model; to 0.1 nats where the sizes of others stay as they were."""
+    rows = quiet(3, SIGNALS[signal])
+    (alone,) = evaluated(rows, UNITS[:1]).without
+    assert alone == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
+    found = evaluated(rows, UNITS).without
+    smaller = [evaluated(rows, UNITS[:n] + UNITS[n + 1 :]).log_evidence for n in range(3)]
+    np.testing.assert_allclose(found, smaller, atol=0.1)
+
+
+def test_weights_of_the_pose_error_are_its_posterior():
+    rows = made_rows(5, poses=12).drawn(np.random.default_rng(6), tau=1.8)
+    rows = replace(rows, residual=rows.expected + QUIET * (rows.residual - rows.expected))
+    statistics = statistics_of(rows.products, TAU)
+    found = evaluated(rows, ())
+    expected = LOG_POSE + [log_density(rows, tau, np.zeros(6)) for tau in TAU]
+    # Where white noise must account for the error of the pose as well, its size is above the floor.
+    floor = statistics.squares <= statistics.freedom
+    assert floor[2]
+    np.testing.assert_allclose(np.diff(found.log_pose[floor]), np.diff((expected - logsumexp(expected))[floor]), atol=1e-8)
+    assert np.argmax(found.log_pose) == 2 and np.exp(found.log_pose).sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("squares", [10.0, 49.9, 50.1, 80.0, 400.0])
+def test_the_size_of_the_noise_is_the_most_likely_one_of_at_least_one(squares):
+    def negative(log_variance):
+        return 25 * log_variance + 0.5 * squares / np.exp(log_variance)
+
+    best = minimize_scalar(negative, bounds=(0.0, 10.0), method="bounded", options={"xatol": 1e-10})
+    assert log_likelihood(squares, 50) == pytest.approx(-best.fun, abs=1e-6)
+
+
+def test_loud_residuals_are_not_evidence_for_everything():
+    """Three times the noise throughout: a Bayes factor with the noise as declared would take it for anything smooth."""
+    rows = quiet(7)
+    loud = replace(rows, residual=rows.expected + 3 / QUIET * (rows.residual - rows.expected))
+    assert all(log_bayes_factor(loud, [unit]) < 2.0 for unit in UNITS)
+    assert max(brute_log_bayes_factor(loud, [unit]) for unit in UNITS) > 3.0
+
+
+def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size():
+    rows = quiet(8, SIGNALS["a"])
+    statistics = statistics_of(rows.products, TAU)
+    conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
+    blocks = blocks_of(conditioned.gram, UNITS, [1, 2])
+    found = added_evidence(conditioned, blocks, GRID, statistics.freedom, len(UNITS))
+    assert found.shape == (3, 3, 5) and np.isneginf(found[:, 0]).all()
+    constant = None
+    for place, tau in enumerate(TAU):
+        for number in (1, 2):
+            for step, scale in enumerate(GRID.scales):
+                value = log_density(rows, tau, deviations_of([UNITS[0], UNITS[number]], [0.3, scale]))
+                value += LOG_POSE[place] + GRID.log_weights[step]
+                constant = found[place, number, step] - value if constant is None else constant
+                assert found[place, number, step] - value == pytest.approx(constant, abs=1e-8)
+
+
+def test_conditioning_twice_is_conditioning_on_both():
+    statistics = statistics_of(quiet(9, SIGNALS["b"]).products, TAU)
+    deviations = np.array([0.3, 1.0, 0.1])
+    both = condition(statistics, np.array([0, 3, 5]), deviations, LOG_POSE)
+    first = condition(statistics, np.array([0]), deviations[:1], LOG_POSE)
+    then = replace(statistics, gram=first.gram, along=first.along, squares=first.squares)
+    then = condition(replace(then, log_likelihood=first.log_occam), np.array([3, 5]), deviations[1:], np.zeros(3))
+    for name in ("gram", "along", "squares", "log_occam"):
+        np.testing.assert_allclose(getattr(then, name), getattr(both, name), rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_conditioning_on_nothing_changes_nothing():
+    statistics = statistics_of(quiet(10).products, TAU)
+    found = condition(statistics, np.zeros(0, int), np.zeros(0), LOG_POSE)
+    np.testing.assert_array_equal(found.gram, statistics.gram)
+    np.testing.assert_array_equal(found.log_occam, statistics.log_likelihood + LOG_POSE)
+
+
+def half_normal_evidence(rows, tau, columns, signs, scale):
+    """Integral of the likelihood over half-normal coefficients, by quadrature, relative to that without them."""
+    nothing = multivariate_normal(rows.expected, rows.marginal_covariance(tau))
+    zero = nothing.logpdf(rows.residual)
+
+    def density(*sizes):
+        moved = rows.candidates[:, columns] @ (np.array(sizes) * signs)
+        likelihood = np.exp(nothing.logpdf(rows.residual - moved) - zero)
+        return likelihood * np.prod([2 * norm.pdf(size, scale=scale) for size in sizes])
+
+    if len(columns) == 1:
+        return np.log(quad(density, 0, 8 * scale, limit=200, epsabs=1e-12)[0])
+    return np.log(dblquad(density, 0, 6 * scale, 0, 6 * scale, epsabs=1e-9, epsrel=1e-6)[0])
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize("size", [0.3, 0.0, -0.3])
+def test_half_normal_prior_of_one_coefficient_is_exact(sign, size):
+    rows = quiet(11, (0, 0, size))
+    unit, scale = made_unit("b", (1,), 2, sign), 0.3
+    one = statistics_of(rows.products, [0.3])
+    grid = Grid(np.array([scale]), np.zeros(1))
+    found = [evaluate(one, units, grid, np.zeros(1), [scale] * len(units)) for units in ([unit], [])]
+    expected = half_normal_evidence(rows, 0.3, [2], [sign], scale)
+    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=1e-5)
+
+
+def test_half_normal_priors_of_two_coefficients_are_taken_one_by_one():
+    """The probability of an orthant as the product of its sides: here, correlated by 0.2, right to 0.05 nats."""
+    rows = quiet(12, (0.05, -0.05))
+    rows = replace(rows, candidates=rows.candidates[:, :2])
+    unit = replace(made_unit("a", (1,), [0, 1]), signs=np.array([1, -1]))
+    one = statistics_of(rows.products, [0.0])
+    correlation = one.gram[0][0, 1] / np.sqrt(np.prod(np.diag(one.gram[0])))
+    assert 0.02 < abs(correlation) < 0.4
+    grid = Grid(np.array([0.1]), np.zeros(1))
+    found = [evaluate(one, units, grid, np.zeros(1), [0.1] * len(units)) for units in ([unit], [])]
+    expected = half_normal_evidence(rows, 0.0, [0, 1], [1, -1], 0.1)
+    assert found[0].log_evidence - found[1].log_evidence == pytest.approx(expected, abs=0.05)
+
+
+def test_the_wrong_sign_costs_and_the_right_one_pays_at_most_a_factor_of_two():
+    rows = quiet(13, (0, 0, 0.4))
+    free, right, wrong = (log_bayes_factor(rows, [made_unit("b", (1,), 2, sign)]) for sign in (0, 1, -1))
+    assert free < right < free + np.log(2) + 1e-9
+    assert wrong < free - 3.0
+
+
+def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
+    scales = np.array([0.01, 0.1, 1.0])
+    weights = np.exp(scale_weights(scales, replace(SETTINGS, scale_center=0.1, scale_spread=(3.0, 0.7))))
+    assert weights.sum() == pytest.approx(1.0)
+    ratio = np.log(10.0)
+    assert weights[0] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 3.0) ** 2))
+    assert weights[2] / weights[1] == pytest.approx(np.exp(-0.5 * (ratio / 0.7) ** 2))
+    assert np.exp(GRID.log_weights).sum() == pytest.approx(1.0) and GRID.scales[np.argmax(GRID.log_weights)] == 0.1
+
+
+def test_weights_of_the_pose_error_are_those_of_the_settings():
+    weights = np.exp(pose_weights(np.array([0.0, 1.0, 2.0, 3.0]), replace(SETTINGS, pose_error_probability=0.3)))
+    np.testing.assert_allclose(weights, [0.7, 0.1, 0.1, 0.1])
+
+
+def test_log_sum_exp_is_scipys():
+    values = np.random.default_rng(14).normal(0, 300, (3, 4, 5))
+    values[0, 0] = -np.inf
+    for axis in (None, 0, 1, 2):
+        np.testing.assert_allclose(log_sum_exp(values, axis), logsumexp(values, axis))
+
+
+def test_the_problem_has_the_sizes_of_the_settings():
+    problem, _ = made_problem(made_rows(15), UNITS)
+    np.testing.assert_array_equal(problem.grid.scales, SETTINGS.scales)
+    np.testing.assert_array_equal(problem.grid.log_weights, GRID.log_weights)
+    assert np.exp(problem.log_pose).sum() == pytest.approx(1.0)

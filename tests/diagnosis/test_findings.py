@@ -1,0 +1,106 @@
+"""What was found, in the words and numbers of verdict.json."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import planted
+
+from elastocal.diagnosis.averaging import Averaged
+from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries
+from elastocal.diagnosis.hypotheses import OTHER
+
+WORDS = {
+    ("joint_offset", (3,)): "joint 3",
+    ("cross_compliance", (1, 2)): "joints 1 and 2",
+    ("link_elasticity", (2,)): "link 2",
+    ("transmission_harmonic", (4, "orders 1-2")): "joint 4 orders 1-2",
+    ("payload", ()): "",
+    (OTHER, ()): "base",
+    (OTHER, (2,)): "joint 2",
+}
+
+
+@pytest.mark.parametrize(("mechanism", "location"), WORDS)
+def test_a_location_in_words_is(mechanism, location):
+    assert location_words(mechanism, location) == WORDS[mechanism, location]
+
+
+@pytest.fixture(scope="module")
+def found(kuka):
+    """A fit of some effects that the robot does not have."""
+    campaign = planted(kuka, {}, seed=1)
+    effects = [campaign.candidates[key] for key in ("joint_tilt@2", "payload", "joint_offset@3", "base_compliance")]
+    model, start = campaign.declared.model.with_effects(effects), campaign.declared.estimate.with_effects(effects)
+    count = len(campaign.declared.parameters) + sum(len(effect.parameters) for effect in effects)
+    deviation = np.full(count, 1e-12)
+    fitted = replace(
+        campaign.declared, model=model, estimate=start, covariance=np.diag(deviation**2), held=np.zeros(count, bool)
+    )
+    return fitted, [{"members": [effect.key]} for effect in effects]
+
+
+def with_value(fitted, key, value, error):
+    """The same fit with the first parameter of an effect at a value of a given standard error."""
+    number = [effect.key for effect in fitted.model.effects].index(key)
+    values = [part.copy() for part in fitted.estimate.coefficients]
+    values[number][0] = value
+    place = [owner for owner, _ in fitted.parameters].index(key)
+    covariance = fitted.covariance.copy()
+    covariance[place, place] = error**2
+    return replace(fitted, estimate=replace(fitted.estimate, coefficients=tuple(values)), covariance=covariance)
+
+
+def test_parameters_have_their_values_errors_and_priors(found):
+    fitted, _ = found
+    fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
+    (entry,) = parameter_entries(next(e for e in fitted.model.effects if e.key == "joint_offset@3"), fitted, Averaged({}, {}))
+    assert entry == {
+        "name": "joint_offset@3 offset",
+        "value": pytest.approx(3e-4),
+        "std_error": pytest.approx(2e-5),
+        "unit": "rad",
+        "prior_std": None,
+        "held": False,
+    }
+
+
+def test_nothing_is_implausible_about_values_within_their_limits(found):
+    fitted, entries = found
+    assert implausible(fitted, entries, rated_kg=165.0) == []
+    # A wrong sign within its error is no statement.
+    assert implausible(with_value(fitted, "joint_tilt@2", -1e-8, 1e-8), entries) == []
+
+
+def test_the_wrong_sign_is_named(found):
+    fitted, entries = found
+    (warning,) = implausible(with_value(fitted, "joint_tilt@2", -1e-7, 1e-8), entries)
+    assert warning.startswith("joint_tilt@2: tilt_about_") and "by its physics positive" in warning
+
+
+def test_a_size_beyond_what_such_an_effect_reaches_is_named(found):
+    fitted, entries = found
+    plausible = next(e for e in fitted.model.effects if e.key == "joint_offset@3").parameters[0].plausible
+    for sign in (1, -1):
+        (warning,) = implausible(with_value(fitted, "joint_offset@3", 3.5 * sign * plausible, 0.1 * plausible), entries)
+        assert warning.startswith("joint_offset@3: offset is") and "3 times what such an effect reaches" in warning
+    assert implausible(with_value(fitted, "joint_offset@3", 3.1 * plausible, 0.1 * plausible), entries) == []
+
+
+def test_more_than_the_rated_payload_is_named(found):
+    fitted, entries = found
+    heavy = with_value(fitted, "payload", 24.4, 0.9)
+    found_at = [warning for warning in implausible(heavy, entries, rated_kg=3.0) if "rated payload" in warning]
+    assert len(found_at) == 1 and "24.4 ± 0.9 kg" in found_at[0] and "3 kg" in found_at[0]
+    assert not any("rated payload" in warning for warning in implausible(heavy, entries, rated_kg=30.0))
+    assert not any("rated payload" in warning for warning in implausible(heavy, entries))
+
+
+def test_a_fault_of_the_data_is_an_entry_without_probability():
+    fault = {"name": "wrong_unit", "joints": [], "detail": "millimetres", "parameters": [{"name": "factor", "value": 1e-3}]}
+    fault |= {"alternatives": ("another frame",), "evidence": (1.0, np.nan)}
+    entry = fault_entry(fault)
+    assert (entry["name"], entry["family"], entry["detail"]) == ("wrong_unit", "data", "millimetres")
+    assert entry["parameters"] == [{"name": "factor", "value": 1e-3, "std_error": None}]
+    assert entry["probability"] is None and entry["heldout_gain"] is None
+    assert entry["alternatives"] == ["another frame"] and entry["evidence"] == [1.0, None]

@@ -1,0 +1,103 @@
+"""The exact fit of a selected model: its priors, its noise, and what is left of the residual."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import planted
+
+from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.search import Model, posterior
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting import fit
+from elastocal.model import linearize
+
+SETTINGS = Settings()
+
+
+@pytest.fixture(scope="module")
+def found(kuka):
+    """A robot with an offset of joint 3, offsets of joint 2 declared, and what the search makes of it."""
+    campaign = planted(kuka, {"joint_offset@3": [5e-4], "joint_offset@2": [3e-4]}, seed=1)
+    known = campaign.candidates["joint_offset@2"]
+    model = campaign.declared.model.with_effects([known])
+    start = campaign.declared.estimate.with_effects([known])
+    declared = fit(model, campaign.observations, campaign.declared.noise, start)
+    candidates = [candidate for candidate in campaign.all_candidates if candidate.effect != "joint_offset"]
+    candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
+    problem = linearized(declared, campaign.observations, candidates, SETTINGS)
+    models, _ = posterior(problem.problem)
+    return campaign, declared, problem, models
+
+
+def test_priors_arrive_in_the_fit(found):
+    campaign, declared, line, models = found
+    best = models.models[0]
+    assert [line.problem.units[number].key for number in best.units] == ["offset@3"]
+    chosen = selected(line, best)
+    (effect, shapes), *others = chosen.effects
+    assert not others and shapes.size == 0
+    final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
+    priors = {owner: parameter.prior_std for owner, parameter in final.parameters if "offset@" in owner}
+    plausible = effect.parameters[0].plausible
+    assert priors == pytest.approx(
+        {"joint_offset@2": line.declared_size * plausible, "offset@3": best.scales[0] * plausible}, rel=1e-12
+    )
+    assert line.declared_size in SETTINGS.declared_sizes and best.scales[0] in SETTINGS.scales
+    # And do what a prior does: information of the readings and of the prior add up.
+    about = linearize(final.model, final.estimate, campaign.observations, final.circumstances)
+    left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
+    precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters])
+    expected = np.linalg.inv(left.T @ left + np.diag(precision))
+    np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
+
+
+def test_the_fit_finds_what_was_planted_and_converges(found):
+    campaign, declared, line, models = found
+    final = fit_with_sizes(declared, campaign.observations, declared.noise, selected(line, models.models[0]))
+    assert final.converged
+    for key, true in (("joint_offset@2", 3e-4), ("offset@3", 5e-4)):
+        number = [owner for owner, _ in final.parameters].index(key)
+        assert final.values_of(key)[0][0] == pytest.approx(true, abs=4 * np.sqrt(final.covariance[number, number]))
+
+
+def test_the_competitor_and_the_base_are_no_effects_of_the_fit(found):
+    _, _, line, _ = found
+    other = next(number for number, unit in enumerate(line.problem.units) if unit.candidate is None)
+    chosen = selected(line, Model((other,), 0.0, np.array([0.1]), 0.0))
+    assert chosen.effects == () and chosen.declared_size == line.declared_size
+
+
+def test_mean_square_left_is_that_of_the_penalised_fit(found):
+    """Least squares with the prior's rows beneath: their squares count, as they do in the evidence."""
+    _, _, line, models = found
+    problem, model = line.problem, models.models[0]
+    statistics = problem.statistics
+    place = int(np.argmin(np.abs(statistics.pose_error_rad - model.pose_error_rad)))
+    columns = np.concatenate([problem.units[number].columns for number in model.units])
+    deviations = np.repeat(model.scales, [len(problem.units[number].columns) for number in model.units])
+    gram, along = statistics.gram[place][np.ix_(columns, columns)], statistics.along[place][columns]
+    values = np.linalg.solve(gram + np.diag(deviations**-2.0), along)
+    squares = statistics.squares[place] - 2 * values @ along + values @ gram @ values + (values**2 / deviations**2).sum()
+    assert mean_square_left(problem, model) == pytest.approx(squares / statistics.freedom, rel=1e-9)
+    # With everything that was planted in the model, noise is all that is left.
+    assert 0.7 < mean_square_left(problem, model) < 1.3
+
+
+@pytest.mark.parametrize("factor", [0.25, 1.0, 9.0])
+def test_remaining_noise_is_at_least_the_noise(found, factor):
+    _, declared, line, models = found
+    problem = line.problem
+    scaled = replace(
+        problem.statistics, squares=factor * problem.statistics.squares, along=factor**0.5 * problem.statistics.along
+    )
+    problem = replace(problem, statistics=scaled)
+    model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
+    left = remaining_noise(problem, model, declared.noise)
+    expected = np.sqrt(max(mean_square_left(problem, model), 1.0))
+    assert left.position_m == pytest.approx(expected * declared.noise.position_m)
+    assert left.position_m >= declared.noise.position_m
+    assert left.pose_rad == pytest.approx(expected * model.pose_error_rad)
+    np.testing.assert_allclose(left.joint_rad, expected * declared.noise.joint_rad)
+    assert left.of_readings.pose_rad == 0.0

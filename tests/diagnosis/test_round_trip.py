@@ -1,0 +1,143 @@
+"""A diagnosis as files and back: one writer, one reader, and the same verdict from either."""
+
+import json
+
+import numpy as np
+import pytest
+from made_folders import PLAN, made_folder, made_table
+
+from elastocal.diagnosis import tables
+from elastocal.diagnosis.confounding import angles_between
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.settings import Settings
+from elastocal.loop.schemas import CORRELATIONS
+from elastocal.loop.whole import cases_in
+from elastocal.storage import read_table, write_table
+
+
+def there_and_back(path, schema, blocks):
+    write_table(path, schema, blocks, {})
+    return read_table(path, schema)
+
+
+def cases_of(folder, robots, robot, **changes):
+    table = made_table(robot, "made", plan=PLAN, offset_of_joint_3=changes.pop("offset", 0.0))
+    return cases_in(made_folder(folder / "made", robot, table=table, **changes), robots)
+
+
+@pytest.fixture(scope="module")
+def found(kuka, config_folder, tmp_path_factory):
+    """A diagnosis with frames, an unknown target, springs and an effect, and its held-out case."""
+    folder = tmp_path_factory.mktemp("tables")
+    targets = {"3DoF": {"point": "3DoF", "offset_m": [0, 0, 0]}, "6DoF": {"point": "6DoF", "offset_m": "unknown"}}
+    case, held_out = cases_of(folder, config_folder / "robots", kuka, offset=1e-3, frame="tracker", targets=targets)
+    return diagnose(case, Settings(), 1), held_out
+
+
+@pytest.fixture(scope="module")
+def faulty(kuka, config_folder, tmp_path_factory):
+    """A diagnosis that ended at a fault of the data: loads turned round."""
+    table = made_table(kuka, "made")
+    table |= {name: -table[name] for name in ("fx", "fy", "fz", "mx", "my", "mz")}
+    folder = made_folder(tmp_path_factory.mktemp("faulty") / "made", kuka, table=table)
+    case, held_out = cases_in(folder, config_folder / "robots")
+    diagnosis = diagnose(case, Settings(), 1)
+    assert diagnosis.evidence is None
+    return diagnosis, held_out
+
+
+@pytest.mark.parametrize("kind", ["found", "faulty"])
+def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
+    diagnosis, held_out = request.getfixturevalue(kind)
+    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
+    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    back = tables.diagnosis_from(diagnosis.case, facts, steps)
+    assert [(step.name, step.kind) for step in back.steps] == [(step.name, step.kind) for step in diagnosis.steps]
+    for mine, theirs in zip(back.steps, diagnosis.steps, strict=True):
+        assert mine.fitted.parameters == theirs.fitted.parameters, mine.name
+        assert vars(mine.fitted.noise).keys() == vars(theirs.fitted.noise).keys()
+        assert mine.fitted.noise.pose_rad == theirs.fitted.noise.pose_rad
+        # It is fitted again from where it ended: to a thousandth of a standard error.
+        np.testing.assert_allclose(mine.fitted.residual, theirs.fitted.residual, atol=1e-7)
+        deviation = np.sqrt(np.diag(theirs.fitted.covariance))
+        np.testing.assert_allclose(np.sqrt(np.diag(mine.fitted.covariance)), deviation, rtol=1e-2)
+        assert mine.fitted.held.tolist() == theirs.fitted.held.tolist()
+    one, other = (judge(each, held_out, 1) for each in (diagnosis, back))
+    for name in ("before", "after"):
+        assert one.document["heldout"][name] == pytest.approx(other.document["heldout"][name], rel=1e-3)
+    same = [
+        {key: document[key] for key in document if key not in ("heldout", "effects")}
+        for document in (one.document, other.document)
+    ]
+    assert json.loads(json.dumps(same[0])) == json.loads(json.dumps(same[1]))
+    assert [row["step"] for row in one.rows] == [row["step"] for row in other.rows]
+
+
+def test_the_effect_found_has_its_prior_in_the_table(found, tmp_path):
+    diagnosis, _ = found
+    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    last = steps["step"] == len(diagnosis.steps) - 1
+    mine = last & (steps["owner"] == "joint_offset@3")
+    prior = steps["prior_std"][mine]
+    assert mine.sum() == 1 and prior[0] in np.array(Settings().scales) * 1e-3
+    assert np.isnan(steps["prior_std"][last & np.char.startswith(steps["owner"].astype(str), "frame ")]).all()
+
+
+def test_models_table_is_the_posterior(found, tmp_path):
+    diagnosis, _ = found
+    table = there_and_back(tmp_path / "m.parquet", tables.MODELS, [tables.model_columns(diagnosis)])
+    assert table["probability"].sum() == pytest.approx(1.0)
+    assert (np.diff(table["probability"]) <= 0).all() and table["model"].tolist() == list(range(len(table["model"])))
+    assert "joint_offset" in table["mechanisms"][0] and "joint_offset@3" in table["units"][0]
+    assert table["mechanisms"][table["units"] == ""].tolist() == ["nothing"]
+
+
+def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path):
+    diagnosis, _ = found
+    table = there_and_back(tmp_path / "c.parquet", tables.CANDIDATES, [tables.candidate_columns(diagnosis)])
+    assert set(table["candidate"]) == set(diagnosis.case.candidates)
+    tested = np.isfinite(table["log_bayes_factor"])
+    assert (tested == (table["note"] == "")).all() and tested.any() and not tested.all()
+    assert (np.diff(table["log_bayes_factor"][tested]) <= 0).all()
+    assert (table["probability"][tested] >= 0).all() and (table["noncentrality"][tested] > 0).all()
+    assert table["candidate"][table["chosen"]].tolist() == ["joint_offset@3"]
+    assert table["probability"][table["chosen"]][0] > 0.9 and table["angle_deg"][table["chosen"]][0] < 1e-3
+    for key, joints, effect in zip(table["candidate"], table["joints"], table["effect"], strict=True):
+        assert joints == "+".join(map(str, diagnosis.case.candidates[key].joints)) and key.startswith(effect)
+
+
+def test_bayes_factors_of_the_table_are_those_of_single_units(found):
+    diagnosis, _ = found
+    columns, problem = tables.candidate_columns(diagnosis), diagnosis.evidence.linearized.problem
+    factors = single_log_bayes_factors(problem)
+    number = next(n for n, unit in enumerate(problem.units) if unit.key == "joint_offset@2")
+    place = columns["candidate"].index("joint_offset@2")
+    assert columns["log_bayes_factor"][place] == factors[number]
+
+
+def test_confounding_has_every_pair_of_tested_candidates_once(found, tmp_path):
+    diagnosis, _ = found
+    table = there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])
+    problem = diagnosis.evidence.linearized.problem
+    numbers = [n for n, unit in enumerate(problem.units) if unit.candidate]
+    assert len(table["one"]) == len(numbers) * (len(numbers) - 1) // 2
+    angles, keys = angles_between(problem, numbers), [problem.units[n].key for n in numbers]
+    for place in range(0, len(table["one"]), 997):
+        one, other = keys.index(table["one"][place]), keys.index(table["other"][place])
+        assert table["angle_deg"][place] == angles[one, other]
+
+
+def test_tables_of_a_faulty_campaign_have_no_rows_but_for_the_candidates(faulty, tmp_path):
+    diagnosis, _ = faulty
+    assert len(there_and_back(tmp_path / "m.parquet", tables.MODELS, [tables.model_columns(diagnosis)])["model"]) == 0
+    assert len(there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])["one"]) == 0
+    candidates = there_and_back(tmp_path / "c.parquet", tables.CANDIDATES, [tables.candidate_columns(diagnosis)])
+    assert set(candidates["note"]) == {"the readings are at fault"} and not candidates["chosen"].any()
+
+
+def test_correlations_are_of_the_final_model(found, tmp_path):
+    diagnosis, _ = found
+    table = there_and_back(tmp_path / "r.parquet", CORRELATIONS, [tables.final_correlations(diagnosis)])
+    assert any("joint_offset@3" in name for name in (*table["one"], *table["other"]))

@@ -1,0 +1,137 @@
+"""The search: on problems small enough for all models to be enumerated, the posterior is that of the enumeration."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from made_problems import made_problem, made_rows, made_unit
+
+from elastocal.diagnosis.evidence import evaluate, log_sum_exp
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.search import posterior, single_log_bayes_factors
+from elastocal.diagnosis.settings import Settings
+
+TAU = [0.0, 0.3, 0.9]
+# Two laws at one location, two mechanisms at three and two locations, and the competitor.
+UNITS = (
+    made_unit("offset", (1,), 0),
+    made_unit("offset", (2,), 1),
+    made_unit("offset", (3,), 2),
+    made_unit("tilt", (1,), [3, 4]),
+    made_unit("tilt", (2,), 5, log_prior=np.log(0.5)),
+    made_unit("tilt", (2,), 6, log_prior=np.log(0.5)),
+    made_unit(OTHER, (1,), [7, 8, 9]),
+)
+SIGNALS = {
+    "nothing": {},
+    "one": {0: 0.8},
+    "a faint one": {0: 0.45},
+    "one mechanism everywhere": {0: 0.7, 1: -0.6, 2: 0.7},
+    "two mechanisms": {1: 0.8, 3: 0.8, 4: 0.3},
+}
+
+
+def problem_of(signal, seed=0, settings=None):
+    rows = made_rows(seed, poses=14, candidates=10)
+    moved = sum(size * rows.candidates[:, column] for column, size in SIGNALS[signal].items())
+    return made_problem(replace(rows, residual=rows.residual + moved), UNITS, settings, TAU)[0]
+
+
+def enumerated(problem):
+    """Posterior probability of every model, each evaluated in full."""
+    odds = {}
+    for size in range(len(problem.units) + 1):
+        for model in combinations(range(len(problem.units)), size):
+            units = [problem.units[number] for number in model]
+            if len({(unit.mechanism, unit.location) for unit in units}) < size:
+                continue
+            found = evaluate(problem.statistics, units, problem.grid, problem.log_pose, np.full(size, 0.1))
+            odds[model] = found.log_evidence + problem.prior.log_odds_of(units)
+    values = np.array(list(odds.values()))
+    return dict(zip(odds, np.exp(values - log_sum_exp(values)), strict=True))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("signal", SIGNALS)
+def test_posterior_is_that_of_all_models(signal, seed):
+    """To 0.02 in every probability, and models that were not met hold less than 2 % together."""
+    problem = problem_of(signal, seed)
+    expected, (found, _) = enumerated(problem), posterior(problem)
+    assert found.probabilities.sum() == pytest.approx(1.0)
+    mine = dict(zip((model.units for model in found.models), found.probabilities, strict=True))
+    assert len(mine) == len(found.models)
+    assert all(abs(mine.get(model, 0.0) - probability) < 0.02 for model, probability in expected.items())
+    assert sum(probability for model, probability in expected.items() if model not in mine) < 0.02
+    assert set(mine) <= set(expected)
+
+
+@pytest.mark.parametrize(("signal", "best"), [("nothing", ()), ("one", (0,)), ("one mechanism everywhere", (0, 1, 2))])
+def test_the_most_probable_model_is_the_one_that_made_the_readings(signal, best):
+    found, _ = posterior(problem_of(signal))
+    assert found.models[0].units == best
+    assert (np.diff(found.probabilities) <= 0).all()
+    assert [model.log_odds for model in found.models] == sorted((m.log_odds for m in found.models), reverse=True)
+
+
+def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_shows():
+    """Columns that nearly cancel: each location alone explains a tenth of the residual."""
+    rows = made_rows(3, poses=14, candidates=6)
+    common = 4 * np.random.default_rng(4).standard_normal(len(rows.pose))
+    candidates = rows.candidates.copy()
+    candidates[:, :3] += np.outer(common, [1, 1, -2])
+    rows = replace(rows, candidates=candidates, residual=rows.residual + candidates[:, :3].sum(axis=1))
+    units = (*UNITS[:3], made_unit("tilt", (1,), 3), made_unit("tilt", (2,), 4))
+    problem, _ = made_problem(rows, units, tau=TAU)
+    assert posterior(problem)[0].models[0].units == (0, 1, 2)
+
+
+def test_nothing_is_always_among_the_models_and_is_returned_beside_them():
+    found, nothing = posterior(problem_of("two mechanisms"))
+    (empty,) = [model for model in found.models if not model.units]
+    assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
+    assert len(nothing.scales) == 0
+
+
+def test_no_model_has_two_laws_at_one_location():
+    found, _ = posterior(problem_of("two mechanisms", settings=replace(Settings(), kept_models=10**6)))
+    for model in found.models:
+        places = [(UNITS[number].mechanism, UNITS[number].location) for number in model.units]
+        assert len(set(places)) == len(places)
+
+
+def test_no_model_is_larger_than_the_settings_allow():
+    found, _ = posterior(problem_of("one mechanism everywhere", settings=replace(Settings(), largest_model=2)))
+    assert max(len(model.units) for model in found.models) == 2
+
+
+def test_single_bayes_factors_are_those_of_the_models_with_one_unit():
+    problem = problem_of("a faint one")
+    factors = single_log_bayes_factors(problem)
+    empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
+    for number, unit in enumerate(problem.units):
+        one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
+        assert factors[number] == pytest.approx(one.log_evidence - empty, abs=1e-6)
+
+
+@pytest.mark.parametrize("tau", TAU)
+def test_the_pose_error_of_a_model_is_the_one_of_the_readings(tau):
+    rows = made_rows(6, poses=100, candidates=10)
+    noisy = rows.drawn(np.random.default_rng(8), tau)
+    problem, _ = made_problem(noisy, UNITS, tau=TAU)
+    found, nothing = posterior(problem)
+    assert nothing.pose_error_rad == found.models[0].pose_error_rad == tau
+
+
+def test_sizes_of_a_model_come_in_the_order_of_its_units():
+    rows = made_rows(0, poses=14, candidates=10)
+    rows = replace(rows, residual=rows.residual + 2.0 * rows.candidates[:, 0] + rows.candidates[:, 3:5] @ [0.4, -0.6])
+    found, _ = posterior(made_problem(rows, UNITS, tau=TAU)[0])
+    best = next(model for model in found.models if model.units == (0, 3))
+    assert best.scales[0] > best.scales[1] and len(best.scales) == 2
+
+
+def test_the_posterior_is_the_same_each_time():
+    one, other = (posterior(problem_of("two mechanisms"))[0] for _ in range(2))
+    assert [model.units for model in one.models] == [model.units for model in other.models]
+    np.testing.assert_array_equal(one.probabilities, other.probabilities)

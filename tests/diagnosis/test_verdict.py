@@ -1,0 +1,160 @@
+"""From made posteriors to each of the six verdicts."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_problems import made_problem, made_rows, made_unit
+
+from elastocal.diagnosis.alarm import Alarm
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.search import Model, Posterior
+from elastocal.diagnosis.verdict import (
+    ADEQUATE,
+    CLASS,
+    NAMED,
+    NOT_TESTABLE,
+    SEVERAL,
+    UNEXPLAINED,
+    concluded,
+    hypotheses_of,
+    location_probabilities,
+)
+
+OF_THE_ROBOT, OF_THE_SETUP = SimpleNamespace(family="geometry"), SimpleNamespace(family="drift")
+UNITS = (
+    made_unit("offset", (2,), 0, candidate=OF_THE_ROBOT),
+    made_unit("offset", (3,), 1, candidate=OF_THE_ROBOT),
+    made_unit("payload", (), 2, candidate=OF_THE_ROBOT),
+    made_unit("tilt", (2,), 3, candidate=OF_THE_ROBOT),
+    made_unit(OTHER, (1,), 4),
+    made_unit(OTHER, (2,), 5),
+)
+OFFSET_2, OFFSET_3, PAYLOAD, TILT, OTHER_1, OTHER_2 = range(6)
+PROBLEM = made_problem(made_rows(), UNITS)[0]
+RAISED, SILENT = Alarm(0.002, 9.0, True), Alarm(0.4, -1.0, False)
+
+
+def made_posterior(*pairs):
+    """Of models with their probabilities; "nothing" has what is left."""
+    left = 1.0 - sum(probability for _, probability in pairs)
+    listed = sorted([*pairs, ((), left)], key=lambda pair: -pair[1])
+    models = tuple(Model(tuple(sorted(units)), float(np.log(p + 1e-12)), np.ones(len(units)), 0.0) for units, p in listed)
+    return Posterior(models, np.array([probability for _, probability in listed]))
+
+
+def conclusion(*pairs, alarm=RAISED):
+    return concluded(PROBLEM, made_posterior(*pairs), alarm)
+
+
+def test_without_an_alarm_the_model_is_adequate_whatever_the_posterior_prefers():
+    found = conclusion(((OFFSET_2,), 0.9), alarm=SILENT)
+    assert found.verdict == ADEQUATE and found.best.mechanisms == () and found.alternatives == {}
+    assert found.mechanisms == pytest.approx({"offset": 0.9})
+
+
+def test_one_mechanism_with_enough_of_the_probability_is_named():
+    found = conclusion(((OFFSET_2,), 0.5), ((OFFSET_3,), 0.2), ((PAYLOAD,), 0.2))
+    assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
+    assert found.best.probability == pytest.approx(0.7) and found.best.model == 0
+    # One that is named has no alternatives.
+    assert found.alternatives == {"offset": ()}
+    assert list(found.mechanisms) == ["offset", "payload"]
+
+
+@pytest.mark.parametrize(("probability", "verdict"), [(0.61, NAMED), (0.59, CLASS)])
+def test_what_is_enough_is_a_setting(probability, verdict):
+    assert conclusion(((OFFSET_2,), probability), ((PAYLOAD,), 1 - probability)).verdict == verdict
+
+
+def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
+    """What the posterior still gives to "nothing" does not count against a name."""
+    found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))
+    assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
+
+
+def test_an_ambiguous_mechanism_is_a_class_of_the_credible_ones():
+    found = conclusion(((OFFSET_2,), 0.5), ((PAYLOAD,), 0.3), ((TILT,), 0.19), ((TILT, PAYLOAD), 0.001))
+    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
+    assert found.alternatives == {"offset": ("payload", "tilt")}
+
+
+def test_alternatives_beyond_the_credible_set_are_not_listed():
+    found = conclusion(((OFFSET_2,), 0.55), ((PAYLOAD,), 0.42), ((TILT,), 0.03))
+    assert found.verdict == CLASS and found.alternatives == {"offset": ("payload",)}
+
+
+def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
+    found = conclusion(((OFFSET_2, OTHER_1), 0.9), ((OFFSET_2,), 0.1))
+    assert found.verdict == CLASS and found.best.named == ("offset",)
+    assert found.alternatives == {"offset": (OTHER,)}
+
+
+def test_the_competitor_alone_means_unexplained():
+    found = conclusion(((OTHER_1,), 0.4), ((OTHER_1, OTHER_2), 0.3), ((OFFSET_2,), 0.3))
+    assert found.verdict == UNEXPLAINED and found.best.mechanisms == (OTHER,) and found.best.named == ()
+    assert found.alternatives == {}
+
+
+def test_the_competitor_as_a_mere_possibility_leaves_a_class():
+    found = conclusion(((OTHER_1,), 0.45), ((OFFSET_2,), 0.3), ((OFFSET_3,), 0.25))
+    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
+    assert found.alternatives == {"offset": (OTHER,)}
+
+
+def test_two_mechanisms_are_several_each_with_its_own_alternatives():
+    found = conclusion(((OFFSET_2, PAYLOAD), 0.7), ((TILT, PAYLOAD), 0.25), ((OFFSET_2,), 0.04))
+    assert found.verdict == SEVERAL and found.best.mechanisms == ("offset", "payload")
+    assert found.alternatives == {"offset": ("tilt",), "payload": ()}
+
+
+def test_several_have_at_least_two_names_even_where_a_single_set_is_the_most_probable():
+    found = conclusion(((OFFSET_2,), 0.3), ((TILT, PAYLOAD), 0.25), ((OFFSET_2, PAYLOAD), 0.25), ((OFFSET_2, TILT), 0.2))
+    assert found.verdict == SEVERAL and found.best.mechanisms == ("payload", "tilt")
+
+
+def test_a_class_has_one_name_even_where_a_pair_is_the_most_probable_set():
+    found = conclusion(((OFFSET_2, PAYLOAD), 0.4), ((OFFSET_2,), 0.3), ((TILT,), 0.3))
+    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
+    assert "tilt" in found.alternatives["offset"]
+
+
+def test_nothing_is_testable_where_only_the_competitor_is_left():
+    units = UNITS[OTHER_1:]
+    problem = replace(PROBLEM, units=units)
+    found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
+    assert found.verdict == NOT_TESTABLE and found.best.mechanisms == ()
+
+
+def test_a_set_up_that_holds_still_is_no_test_of_the_robot():
+    """A step between set-ups can be tested on a single pose: without one, nothing was tested; with one, it has a name."""
+    problem = replace(PROBLEM, units=(made_unit("setup_step", (), 0, candidate=OF_THE_SETUP), *UNITS[OTHER_1:]))
+    assert concluded(problem, made_posterior(((0,), 0.1)), SILENT).verdict == NOT_TESTABLE
+    found = concluded(problem, made_posterior(((0,), 0.9)), RAISED)
+    assert found.verdict == NAMED and found.best.mechanisms == ("setup_step",)
+
+
+def test_hypotheses_gather_locations_laws_and_sum_to_one():
+    posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.3), ((OFFSET_2, OFFSET_3), 0.1), ((OTHER_1, OTHER_2), 0.1))
+    found = hypotheses_of(PROBLEM, posterior)
+    assert [(h.mechanisms, pytest.approx(h.probability)) for h in found] == [
+        (("offset",), 0.7),
+        ((), 0.2),
+        ((OTHER,), 0.1),
+    ]
+    # The most probable of its models stands for each.
+    assert [h.model for h in found] == [0, 2, 4]
+    assert sum(h.probability for h in found) == pytest.approx(1.0)
+
+
+def test_nothing_is_a_hypothesis_even_where_no_model_of_it_was_kept():
+    posterior = Posterior((Model((0,), 40.0, np.ones(1), 0.0),), np.ones(1))
+    (nothing,) = [h for h in hypotheses_of(PROBLEM, posterior) if not h.mechanisms]
+    assert nothing.probability == 0.0 and nothing.model == -1
+
+
+def test_locations_are_given_that_the_mechanism_is_there():
+    posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.1), ((OFFSET_2, OFFSET_3), 0.1), ((PAYLOAD,), 0.3))
+    assert location_probabilities(PROBLEM, posterior, "offset") == pytest.approx({(2,): 0.8, (3,): 0.4})
+    assert location_probabilities(PROBLEM, posterior, "payload") == pytest.approx({(): 1.0})

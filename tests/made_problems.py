@@ -1,0 +1,91 @@
+"""Linear problems of the diagnosing engine, small enough to be worked out densely, and what that gives."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.diagnosis.hypotheses import Unit, prior_of
+from elastocal.diagnosis.search import Problem
+from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Whitened rows of a made campaign, as `products_of` takes them.
+
+    Attributes
+    ----------
+    declared, candidates : ndarray (R, P), (R, K)
+    residual : ndarray (R,)
+    jacobian : ndarray (R, n)
+    pose : ndarray of int (R,)
+    prior_std, present : ndarray (P,)
+    joint_rad : ndarray (n,)
+    """
+
+    declared: np.ndarray
+    candidates: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    pose: np.ndarray
+    prior_std: np.ndarray
+    present: np.ndarray
+    joint_rad: np.ndarray
+
+    @property
+    def products(self):
+        return products_of(**vars(self))
+
+    def covariance(self, tau):
+        """Sigma = I + J Lambda J', dense."""
+        together = self.pose[:, None] == self.pose
+        return np.eye(len(self.pose)) + (self.jacobian * (tau**2 + self.joint_rad**2)) @ self.jacobian.T * together
+
+    def marginal_covariance(self, tau):
+        """The same with the declared parameters integrated over their prior."""
+        return self.covariance(tau) + (self.declared * self.prior_std**2) @ self.declared.T
+
+    @property
+    def expected(self):
+        """Mean of the residual, from the prior means of the declared parameters."""
+        return -self.declared @ self.present
+
+    def drawn(self, rng, tau=0.0):
+        """The same with a residual drawn anew: nothing is missing, and declared parameters are at their prior means."""
+        common = np.sqrt(tau**2 + self.joint_rad**2) * rng.standard_normal((self.pose.max() + 1, self.jacobian.shape[1]))
+        noise = rng.standard_normal(len(self.pose)) + (self.jacobian * common[self.pose]).sum(axis=1)
+        return replace(self, residual=self.expected + noise)
+
+
+def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, joint_rad=0.0, prior=10.0):
+    """Rows of poses of unequal sizes, in no order."""
+    rng = np.random.default_rng(seed)
+    pose = np.repeat(np.arange(poses), rng.integers(size[0], size[1], poses, endpoint=True))
+    rng.shuffle(pose)
+    count = len(pose)
+    rows = Rows(
+        declared=rng.standard_normal((count, declared)),
+        candidates=rng.standard_normal((count, candidates)),
+        residual=np.zeros(count),
+        jacobian=rng.standard_normal((count, joints)),
+        pose=pose,
+        prior_std=prior * rng.uniform(0.5, 2.0, declared),
+        present=rng.standard_normal(declared),
+        joint_rad=joint_rad * rng.uniform(0.5, 2.0, joints),
+    )
+    return rows.drawn(rng)
+
+
+def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=None, shapes=()):
+    """A unit of some columns, each of plausible size one."""
+    columns = np.atleast_1d(columns)
+    signs = np.full(len(columns), signs, int)
+    return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior)
+
+
+def made_problem(rows, units, settings=None, tau=None):
+    """The problem of some rows, at the engine's own sizes of the pose error unless told, and its products."""
+    settings, products = settings or Settings(), rows.products
+    tau = pose_error_unit(products) * np.array(settings.pose_steps) if tau is None else np.asarray(tau, float)
+    return Problem(statistics_of(products, tau), tuple(units), prior_of(units, settings), settings), products
