@@ -69,7 +69,7 @@ class Settings:
     )
     searched_observations: int = _setting(
         30_000,
-        "averaged readings, at poses spread over the campaign, that the search looks at; so many show what is a thirtieth of the"
+        "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
     )
     settled_misfit: float = _setting(
