@@ -43,8 +43,9 @@ _ROUNDING = 1e-9
 _HUBER_QUANTILE = 0.99
 # Correlation beyond which a parameter cannot be told because of a shape.
 _BOUND_TO_SHAPE = 0.5
-# Values of sensitivities that a fit holds at once: observations beyond come in parts, linearised again in each step.
-_MOST_HELD = 8_000_000
+# Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
+# linearised again in each step.
+_MOST_HELD = 4_000_000
 # States beyond which circumstances are not kept from step to step but found again: they take some ten kilobytes each.
 _MOST_STATES = 20_000
 # A fit to more observations starts from the fit to so many of them.

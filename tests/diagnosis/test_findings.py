@@ -54,7 +54,8 @@ def with_value(fitted, key, value, error):
 def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
-    (entry,) = parameter_entries(next(e for e in fitted.model.effects if e.key == "joint_offset@3"), fitted, Averaged({}, {}))
+    effect = next(effect for effect in fitted.model.effects if effect.key == "joint_offset@3")
+    (entry,) = parameter_entries(effect, fitted, Averaged({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
@@ -63,6 +64,10 @@ def test_parameters_have_their_values_errors_and_priors(found):
         "prior_std": None,
         "held": False,
     }
+    # What other models say moves the value and widens its error.
+    name = ("joint_offset@3", "offset")
+    (entry,) = parameter_entries(effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}))
+    assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5
 
 
 def test_nothing_is_implausible_about_values_within_their_limits(found):

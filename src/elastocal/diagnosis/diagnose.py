@@ -124,7 +124,7 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
-    about = declared
+    about, before = declared, ((), np.inf)
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
@@ -133,15 +133,18 @@ def _explained(case, declared, settings, seed, tell):
         conclusion = concluded(problem.problem, found, alarm)
         evidence = Evidence(problem, found, nothing, alarm, conclusion)
         tell(_told(conclusion, alarm))
-        named, taken = bool(conclusion.best.named), about.noise
+        named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else nothing
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
+        left = (noise.position_m / declared.noise.position_m) ** 2
         off = noise.position_m > settings.relinearize_noise * taken.position_m
-        last = not off and (not named or alarm.statistic < settings.relinearize_above)
+        settled = named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
+        last = not off and (settled or not named or alarm.statistic < settings.relinearize_above)
         if named or not last:
             about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         if last:
             break
+        before = named, left
     return evidence, final if named else declared
 
 
@@ -152,13 +155,11 @@ def _effect_steps(case, declared, final, found):
     if not names:
         return []
     chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
-    steps = []
-    for number, name in enumerate(names, 1):
-        if number == len(names):
-            steps.append(Step(f"+ {name}", "effect", final))
-            continue
+    steps = [Step(f"+ {names[-1]}", "effect", final)]
+    for number in range(len(names) - 1, 0, -1):
         some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
-        steps.append(Step(f"+ {name}", "effect", fit_with_sizes(declared, case.observations, final.noise, some)))
+        fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
+        steps.insert(0, Step(f"+ {names[number - 1]}", "effect", fitted))
     return steps
 
 

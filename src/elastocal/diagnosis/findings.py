@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
@@ -77,7 +78,8 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages):
     -------
     list of dict
     """
-    units = [problem.units[n] for n in posterior.models[conclusion.best.model].units] if conclusion.best.named else []
+    numbers = posterior.models[conclusion.best.model].units if conclusion.best.named else ()
+    units = [problem.units[number] for number in numbers]
     entries = []
     for name in sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]):
         members = [unit.candidate for unit in units if unit.mechanism == name]
@@ -98,10 +100,17 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages):
                 "p_value": alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
-                "angle_to_nearest_deg": None,
+                "angle_to_nearest_deg": _angle_to_nearest(problem, [n for n in numbers if problem.units[n].mechanism == name]),
             }
         )
     return entries
+
+
+def _angle_to_nearest(problem, found):
+    """Angle of what was found of a mechanism to the nearest candidate of another one; None where there is no other."""
+    mechanism = problem.units[found[0]].mechanism
+    others = [unit.mechanism not in (mechanism, OTHER) for unit in problem.units]
+    return float(nearest_angles(problem, found)[others].min()) if any(others) else None
 
 
 def parameter_entries(member, final, averages):

@@ -73,9 +73,14 @@ class Settings:
         " errors are in units of the noise taken, so that plausible sizes mean nothing where it is far off",
     )
     searched_observations: int = _setting(
-        50_000,
-        "averaged readings at poses spread over the campaign that the search looks at; so many show what is a hundredth of the"
+        30_000,
+        "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
+    )
+    settled_misfit: float = _setting(
+        0.05,
+        "relative change of the mean square left below which, as where the mechanisms stay the same, no further linearisation"
+        " is made: less than the noise of most campaigns is known to",
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Beyond this many values of whitened columns a problem is summed: as many as take 120 MB, of which there are a few copies.
-MOST_HELD = 15_000_000
+# Beyond this many values of whitened columns a problem is summed: as many as take 60 MB, of which there are ten copies.
+MOST_HELD = 8_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
 SAMPLE_ROWS = 6000
 # Values of whitened columns in a block.
-_BLOCK_VALUES = 2_500_000
+_BLOCK_VALUES = 1_500_000
 
 
 @dataclass(frozen=True)
