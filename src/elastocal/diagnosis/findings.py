@@ -156,9 +156,9 @@ def parameter_entries(member, final, averages):
 
 
 def _product(entry, model):
-    """The entry of a mass, or of a first moment, times the compliance of the joint that a load at the end turns most."""
+    """The entry of a mass, or of a first moment, times the compliance of the joint that a weight at the end turns most."""
     sites, compliance = model.sites, model.nominal_compliance
-    turned = [0.0 if sites.prismatic[j] else c * lever_m(sites, j) for j, c in enumerate(compliance)]
+    turned = [c * lever_m(sites, j) if sites.carried_links(j) else 0.0 for j, c in enumerate(compliance)]
     joint = int(np.argmax(turned))
     owner, name = entry["name"].rsplit(" ", 1)
     scaled = {key: None if entry[key] is None else float(compliance[joint] * entry[key]) for key in _SCALED}
