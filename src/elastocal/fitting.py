@@ -297,7 +297,7 @@ class _Parts:
         """Go to an estimate."""
         self.estimate = estimate
         if self.whole:
-            self.line = linearize(self.model, estimate, self.observations, self.around[0])
+            self.line = linearize(self.model, estimate, self.observations, self.around[0], exact_frames=True)
             self.residual = self.line.residual
         else:
             self.residual = np.concatenate(
@@ -368,7 +368,7 @@ class _Parts:
         return circumstances(self.model, estimate or self.estimate, self.parts[number].states)
 
     def _linearized(self, number, part):
-        line = linearize(self.model, self.estimate, part, self._around(number))
+        line = linearize(self.model, self.estimate, part, self._around(number), exact_frames=True)
         if self.around[number] is not None:
             self.around[number] = line.circumstances
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]

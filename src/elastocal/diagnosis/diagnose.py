@@ -232,8 +232,8 @@ def _noise_warnings(measured, left, settings):
     factor = left.position_m / measured.position_m
     if factor < settings.relinearize_noise:
         return []
-    said = "their repeats scatter" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"readings scatter about the model {factor:.2g} times as much as {said}"]
+    said = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
+    return [f"readings scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
 
 
 def _averages(declared, found):
