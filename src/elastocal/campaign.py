@@ -13,6 +13,7 @@ import yaml
 
 from elastocal.documents import check_document, read_document
 from elastocal.errors import InputError
+from elastocal.groups import groups_of
 from elastocal.joint_space import blocks
 from elastocal.measurements import CSV, PARQUET, check_column_names, closest_first, read_measurements, shown, write_measurements
 from elastocal.robot import Robot, robot_from_document
@@ -438,8 +439,8 @@ def _holdout(described, folder, source):
 def _poses(readings):
     """Sorted (session, pose) pairs (P, 2), and the index of each reading's pair (N,)."""
     pairs = np.column_stack([readings.session, readings.pose])
-    unique, index = np.unique(pairs, axis=0, return_inverse=True)
-    return unique, index.ravel()
+    first, index = groups_of(pairs)
+    return pairs[first], index
 
 
 def _held_out(holdout, readings, source):
@@ -562,14 +563,14 @@ def _check_readings(readings, table, robot, targets, source):
 
 def _check_duplicates(readings, table, targets):
     key = np.column_stack([readings.session, readings.pose, readings.load, readings.repeat, readings.target])
-    _, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    again = first[inverse.ravel()] != np.arange(len(readings))
+    first, group = groups_of(key)
+    again = first[group] != np.arange(len(readings))
     if again.any():
         index = int(np.argmax(again))
         session, pose, load, repeat, target = key[index]
         of_session = f"session {session}, " if "session" in table.columns else ""
         found = f"{of_session}pose {pose}, load {load}, repeat {repeat}, target {targets[target].name} again"
-        earlier = table.rows[first[inverse.ravel()[index]]]
+        earlier = table.rows[first[group[index]]]
         raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
 
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from elastocal.fitting import observations_at_once
 from elastocal.joint_space import beyond_range
 from elastocal.model import circumstances, linearize
-from elastocal.observations import state_clusters
+from elastocal.observations import part_at, parts_of, state_clusters
 
 
 def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=None):
@@ -59,17 +60,23 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
     shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
     kept = np.array([shared or not owner.startswith(("frame ", "target ")) for owner, _ in listed], bool)
     plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])
-    line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
-    whitened = fitted.whitened(line.sensitivities) * plausible
-    gram = np.einsum("mrp,mrq->pq", whitened, whitened, optimize=True) + np.eye(len(plausible))
+    gram = np.eye(len(plausible))
+    for _, _, white in fitted.sensitivities(observations):
+        rows = (white * plausible).reshape(-1, len(plausible))
+        gram += rows.T @ rows
     root = np.linalg.inv(np.linalg.cholesky(gram))
-    own = line.sensitivities[:, :3] * plausible
-    own = _variances_left_out(own * kept, whitened, root, observations.cluster)
-    there = linearize(model, estimate, unseen, circumstances(model, estimate, unseen.states)).sensitivities[:, :3]
-    # Effects come last in the order of the parameters, whatever frames and targets stand before them.
-    there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
-    other = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
-    return _largest(own, observations.cluster), _largest(other, unseen.state)
+    own, cluster = np.empty(len(observations)), observations.cluster
+    for seen, plain, white in fitted.sensitivities(observations):
+        wanted = plain[:, :3] * (plausible * kept)
+        own[seen] = _variances_left_out(wanted, white * plausible, root, cluster[seen] - cluster[seen.start])
+    other = np.empty(len(unseen))
+    for states, seen in parts_of(unseen, observations_at_once(unseen.rows, len(plausible))):
+        some = part_at(unseen, states, seen)
+        there = linearize(model, estimate, some, circumstances(model, estimate, some.states)).sensitivities[:, :3]
+        # Effects come last in the order of the parameters, whatever frames and targets stand before them.
+        there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
+        other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+    return _largest(own, cluster), _largest(other, unseen.state)
 
 
 def _variances_left_out(wanted, whitened, root, cluster):

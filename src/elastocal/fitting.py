@@ -12,7 +12,7 @@ from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.effects.protocol import with_springs
+from elastocal.effects.protocol import at_states, with_springs
 from elastocal.model import (
     bends,
     circumstances,
@@ -26,6 +26,7 @@ from elastocal.model import (
     stepped,
 )
 from elastocal.noise import Noise
+from elastocal.observations import part_at, parts_of, select_states, spread_poses
 from elastocal.registration import registered
 from elastocal.whitening import Whitening, whitening
 
@@ -42,6 +43,13 @@ _ROUNDING = 1e-9
 _HUBER_QUANTILE = 0.99
 # Correlation beyond which a parameter cannot be told because of a shape.
 _BOUND_TO_SHAPE = 0.5
+# Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
+# linearised again in each step.
+_MOST_HELD = 4_000_000
+# States beyond which circumstances are not kept from step to step but found again: they take some ten kilobytes each.
+_MOST_STATES = 20_000
+# A fit to more observations starts from the fit to so many of them.
+_MOST_STARTED_FROM = 30_000
 
 
 @dataclass(frozen=True)
@@ -64,8 +72,8 @@ class Fit:
         m and rad, base axes.
     joint_jacobian : ndarray (M, rows, n)
         Of each target with respect to the joints.
-    circumstances : Circumstances
-        Of the states fitted.
+    circumstances : Circumstances or None
+        Of the states fitted; None where these are too many to keep it.
     converged : bool
         Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
     """
@@ -97,6 +105,29 @@ class Fit:
         weights = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
         return self.whitener.apply(values * weights)
 
+    def sensitivities(self, observations):
+        """Sensitivities of the observations that were fitted, as they are and whitened, in parts of whole poses.
+
+        Parameters
+        ----------
+        observations : Observations
+
+        Yields
+        ------
+        seen : slice
+            Observations of the part.
+        plain, whitened : ndarray (M', rows, P)
+        """
+        for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
+            some = part_at(observations, states, seen)
+            if self.circumstances is None:
+                around = circumstances(self.model, self.estimate, some.states)
+            else:
+                around = at_states(self.circumstances, states)
+            plain = linearize(self.model, self.estimate, some, around).sensitivities
+            white = whitening(some, self.joint_jacobian[seen], self.noise)
+            yield seen, plain, white.apply(plain * np.sqrt(self.weights[seen])[:, None, None])
+
 
 def fit(model, observations, noise, start=None):
     """Fit a model.
@@ -113,8 +144,23 @@ def fit(model, observations, noise, start=None):
     -------
     Fit
     """
+    some = spread_poses(observations, _MOST_STARTED_FROM)
+    if not some.all():
+        # Where all the readings lead is close to where some of them do.
+        few = select_states(observations, some)
+        start = fit(model, few, noise, start).estimate if _sees_all(observations, few) else start
     start = registered(model, observations) if start is None else start
-    return _robustly(model, observations, circumstances(model, start, observations.states), noise, start)
+    return _robustly(model, observations, _kept_circumstances(model, start, observations), noise, start)
+
+
+def _sees_all(observations, few):
+    """Whether some of the observations have all sessions and targets of all."""
+    sessions = np.isin(observations.states.session, few.states.session).all()
+    return bool(sessions and np.isin(observations.target, few.target).all())
+
+
+def _kept_circumstances(model, estimate, observations):
+    return circumstances(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None
 
 
 def fit_frames(fitted, model, observations, noise, own_targets=True):
@@ -143,7 +189,7 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
     if not own_targets:
         start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
-    around = circumstances(model, start, observations.states)
+    around = _kept_circumstances(model, start, observations)
     return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
@@ -162,34 +208,30 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
-    def objective(estimate, residual):
+    def objective(estimate, distance):
         """Half the squared distances, those of outliers counted linearly, and half the squares of what has a prior."""
-        distance = np.sqrt((whitener.apply(residual) ** 2).mean(axis=1))
         lost = distance**2 / 2 if scale is None else scale**2 * norm.rho(distance / scale)
         return rows * lost.sum() + 0.5 * penalty @ parameter_values(model, estimate) ** 2
 
     converged, scale = False, None
-    line = linearize(model, estimate, observations, around)
+    readings = _Parts(model, observations, noise, around, plausible)
+    readings.linearize(estimate)
     for step_number in range(_STEPS):
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
-        around = line.circumstances
-        jacobian = line.coordinate_jacobian[..., : model.sites.joints]
-        whitener = whitening(observations, jacobian, noise)
+        readings.whiten()
         if step_number:
-            distance = np.sqrt((whitener.apply(line.residual) ** 2).mean(axis=1))
+            distance = readings.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = norm.weights(distance / scale)
-        root = np.sqrt(weights)
-        right = whitener.apply(line.residual * root[:, None]).reshape(-1)
-        left = whitener.apply(line.sensitivities * root[:, None, None]).reshape(len(right), -1)
+        gram, along = readings.normal_equations(weights)
         present = parameter_values(model, estimate)
-        step, covariance, held = solve_identifiable(left, right, plausible, frozen, penalty, present, bending)
+        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, bending)
         # A shape that would leave its range goes to the end of it, and the others as they do then.
         leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
         if leaving.any():
             ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
-            rest = right - left[:, leaving] @ ends
-            step = solve_identifiable(left, rest, plausible, frozen | leaving, penalty, present, bending)[0]
+            rest = along - gram[:, leaving] @ (ends / plausible[leaving])
+            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, bending)[0]
             step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
         converged = bool(step_number) and bool((np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all())
@@ -197,27 +239,138 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
             estimate = stepped(model, estimate, step)
             break
         # Twice the fall that a parabola promises.
-        slope = right @ (left @ step) - penalty @ (present * step)
-        before, origin = objective(estimate, line.residual), estimate
+        slope = along @ (step / plausible) - penalty @ (present * step)
+        before, origin = objective(estimate, readings.distance()), estimate
         for halving in range(_HALVINGS + 1):
             estimate = stepped(model, origin, 0.5**halving * step)
-            line = linearize(model, estimate, observations, around)
-            after = objective(estimate, line.residual)
+            readings.linearize(estimate)
+            after = objective(estimate, readings.distance())
             least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
             if after > before - least and not halving:
                 # What it fell from was under the loads of the step before.
-                before = objective(origin, residuals(model, origin, observations, around))
+                before = objective(origin, readings.distance_at(origin))
             if after <= before - least:
                 break
         else:
             estimate = origin
-            line = linearize(model, estimate, observations, around)
+            readings.linearize(estimate)
             # The first step has another objective than those that follow: all observations count alike.
             if step_number:
                 break
-    around = with_springs(line.circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
-    residual = residuals(model, estimate, observations, around)
-    return Fit(model, estimate, noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
+    return readings.fit(estimate, held, covariance, weights, converged)
+
+
+def observations_at_once(rows, columns):
+    """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
+    return max(_MOST_HELD // (rows * max(columns, 60)), 1)
+
+
+class _Parts:
+    """Readings beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
+
+    In parts that are not kept between steps, loads are taken where the robot yields to by the present estimate itself, and
+    whitening is that of the last step; where the noise has no part of the joints it is always the same.
+    """
+
+    def __init__(self, model, observations, noise, around, plausible):
+        self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
+        self.slices = parts_of(observations, observations_at_once(observations.rows, len(plausible)))
+        self.whole = len(self.slices) == 1 and around is not None
+        self.parts = [observations] if self.whole else [part_at(observations, *edges) for edges in self.slices]
+        self.around = [around] if self.whole else [None] * len(self.parts)
+        if not self.whole and around is not None:
+            self.around = [at_states(around, states) for states, _ in self.slices]
+        self.whiteners = [None] * len(self.parts)
+        joints = model.sites.joints
+        self.jacobian = np.empty((len(observations), observations.rows, joints))
+        self.line = None
+
+    def linearize(self, estimate):
+        """Go to an estimate."""
+        self.estimate = estimate
+        if self.whole:
+            self.line = linearize(self.model, estimate, self.observations, self.around[0])
+            self.residual = self.line.residual
+        else:
+            self.residual = np.concatenate(
+                [residuals(self.model, estimate, part, self._around(number)) for number, part in enumerate(self.parts)]
+            )
+
+    def whiten(self):
+        """Take loads and whitening at the present estimate."""
+        if self.whole:
+            self.around = [self.line.circumstances]
+            self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
+            self.whiteners = [whitening(self.observations, self.jacobian, self.noise)]
+        elif self.whiteners[0] is None:
+            for number, part in enumerate(self.parts):
+                self._linearized(number, part)
+
+    def normal_equations(self, weights):
+        """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
+        size = len(self.plausible)
+        gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
+        for number, (part, (_, seen)) in enumerate(zip(self.parts, self.slices, strict=True)):
+            line = self.line if self.whole else self._linearized(number, part)
+            whitener, mine = self.whiteners[number], root[seen]
+            right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
+            left = whitener.apply(line.sensitivities * mine[:, None, None]).reshape(len(right), -1)
+            left *= self.plausible
+            gram += left.T @ left
+            along += left.T @ right
+        return gram, along
+
+    def distance(self):
+        """Whitened distance of each observation from the prediction, ndarray (M,)."""
+        return self._distance(self.residual)
+
+    def distance_at(self, estimate):
+        """The same of another estimate."""
+        found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
+        return self._distance(np.concatenate(found))
+
+    def fit(self, estimate, held, covariance, weights, converged):
+        """The `Fit` of these readings."""
+        model, around = self.model, None
+        if self.whole:
+            springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
+            around = with_springs(self.line.circumstances, *springs)
+            residual = residuals(model, estimate, self.observations, around)
+        else:
+            self.linearize(estimate)
+            residual = self.residual
+            if len(self.observations.states) <= _MOST_STATES:
+                around = circumstances(model, estimate, self.observations.states)
+        whitener = Whitening(
+            tuple(
+                (members + edges[1].start, factor)
+                for edges, found in zip(self.slices, self.whiteners, strict=True)
+                for members, factor in found.blocks
+            )
+        )
+        return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, self.jacobian, around, converged)
+
+    def _around(self, number, estimate=None):
+        kept = self.around[number]
+        if kept is not None:
+            return kept
+        return circumstances(self.model, estimate or self.estimate, self.parts[number].states)
+
+    def _linearized(self, number, part):
+        line = linearize(self.model, self.estimate, part, self._around(number))
+        if self.around[number] is not None:
+            self.around[number] = line.circumstances
+        jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
+        self.jacobian[self.slices[number][1]] = jacobian
+        self.whiteners[number] = whitening(part, jacobian, self.noise)
+        return line
+
+    def _distance(self, residual):
+        found = [
+            (whitener.apply(residual[seen]) ** 2).mean(axis=1)
+            for whitener, (_, seen) in zip(self.whiteners, self.slices, strict=True)
+        ]
+        return np.sqrt(np.concatenate(found))
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
@@ -248,8 +401,26 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     held : ndarray of bool (P,)
     """
     scaled = left * plausible
-    gram = scaled.T @ scaled + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
-    along = scaled.T @ right - plausible * np.broadcast_to(penalty * present, len(plausible))
+    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, bending)
+
+
+def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
+    """As `solve_identifiable`, from products of sensitivities in plausible sizes.
+
+    Parameters
+    ----------
+    gram : ndarray (P, P)
+    along : ndarray (P,)
+    plausible, frozen, penalty, present, bending
+        As in `solve_identifiable`.
+
+    Returns
+    -------
+    step, covariance, held
+        As in `solve_identifiable`.
+    """
+    gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
+    along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
     held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, bending)))
     free = np.flatnonzero(~held)
     step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)

@@ -6,10 +6,10 @@ import numpy as np
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from elastocal.fitting import fit_frames
+from elastocal.fitting import fit_frames, observations_at_once
 from elastocal.model import circumstances, linearize, residuals
 from elastocal.noise import reading_covariances
-from elastocal.observations import select_states
+from elastocal.observations import part_at, parts_of, select_states
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
@@ -59,8 +59,12 @@ def position_errors(model, estimate, observations):
     -------
     Errors
     """
-    off = residuals(model, estimate, observations, circumstances(model, estimate, observations.states))
-    return Errors(np.linalg.norm(off[:, :3], axis=1), observations.cluster)
+    distance = np.empty(len(observations))
+    for states, seen in parts_of(observations, observations_at_once(observations.rows, 0)):
+        some = part_at(observations, states, seen)
+        off = residuals(model, estimate, some, circumstances(model, estimate, some.states))
+        distance[seen] = np.linalg.norm(off[:, :3], axis=1)
+    return Errors(distance, observations.cluster)
 
 
 def placed_estimate(fitted, observations):
@@ -269,9 +273,12 @@ def noise_floor(fitted, observations, model, estimate):
     """
     if fitted.noise.source == "residual":
         return float("nan")
-    line = linearize(model, estimate, observations, circumstances(model, estimate, observations.states))
-    jacobian = line.coordinate_jacobian[:, None, :3, : model.sites.joints]
-    variance = np.trace(reading_covariances(fitted.noise, jacobian, 3), axis1=1, axis2=2)
+    variance = np.empty(len(observations))
+    for states, seen in parts_of(observations, observations_at_once(observations.rows, len(fitted.held))):
+        some = part_at(observations, states, seen)
+        line = linearize(model, estimate, some, circumstances(model, estimate, some.states))
+        jacobian = line.coordinate_jacobian[:, None, :3, : model.sites.joints]
+        variance[seen] = np.trace(reading_covariances(fitted.noise, jacobian, 3), axis1=1, axis2=2)
     return float(np.sqrt((variance / observations.states.repeats[observations.state]).mean()))
 
 

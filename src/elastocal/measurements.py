@@ -139,11 +139,17 @@ def _read_csv(path):
 def _read_parquet(path):
     try:
         table = pq.read_table(path)
-        columns = [(name, column.to_pylist()) for name, column in zip(table.column_names, table.columns, strict=True)]
+        columns = [(name, _cells(column)) for name, column in zip(table.column_names, table.columns, strict=True)]
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
     _check_header(path, table.column_names)
     return dict(columns), np.arange(1, table.num_rows + 1, dtype=np.int32)
+
+
+def _cells(column):
+    """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
+    numbers = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
+    return column.to_numpy() if numbers and not column.null_count else column.to_pylist()
 
 
 def _check_header(path, names):

@@ -13,12 +13,14 @@ from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from elastocal.model import circumstances, linearize
-from elastocal.observations import each_approach, without_wild_repeats
+from elastocal.observations import each_approach, select_states, without_wild_repeats
 
 # Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.
 FEWEST_FOR_JOINTS = 60
 # Fewer than this say nothing of their own.
 FEWEST = 9
+# So many tell every deviation to a percent; more only take time.
+MOST = 20_000
 # No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
 FINEST = 1e-8
 # How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
@@ -171,23 +173,43 @@ def reading_covariances(noise, jacobians, rows):
 
 def _contrasts(model, estimate, readings):
     """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
+    if not len(readings) or not np.ptp(readings.repeat):
+        return [], []
     bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
     observations, repeated = each_approach(without_wild_repeats(readings))
-    line = linearize(bare, at, observations, circumstances(bare, at, observations.states))
+    first = np.flatnonzero(np.diff(repeated, prepend=-1))
+    # The targets that an approach saw, beside those of the first approach to its state.
     seen = np.bincount(observations.state)
     start = np.concatenate([[0], np.cumsum(seen)])
+    targets = np.full((len(seen), seen.max()), -1)
+    targets[observations.state, np.arange(len(observations)) - start[observations.state]] = observations.target
+    alike = (targets == targets[first[repeated]]).all(axis=1)
+    number = np.bincount(repeated, alike).astype(int)
+    told = (number - 1) * seen[first] * model.rows
+    # As many as tell, of states spread over the campaign.
+    wanted = np.flatnonzero(number > 1)
+    share = told.sum() / MOST
+    wanted = wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)] if share > 1 else wanted
+    chosen = alike & np.isin(repeated, wanted)
+    if not chosen.any():
+        return [], []
+    some = select_states(observations, chosen)
+    line = linearize(bare, at, some, circumstances(bare, at, some.states))
+    state, seen = repeated[chosen], seen[chosen]
+    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
+    first = np.flatnonzero(np.diff(state, prepend=-1))
+    many = np.diff(first, append=len(state))
     contrasts, jacobians = {}, {}
-    for state in range(repeated.max() + 1):
-        members = np.flatnonzero(repeated == state)
-        targets = observations.target[start[members[0]] : start[members[0] + 1]]
-        members = [m for m in members if np.array_equal(observations.target[start[m] : start[m + 1]], targets)]
-        if len(members) < 2:
-            continue
-        residual = np.array([line.residual[start[m] : start[m + 1]].ravel() for m in members])
-        jacobian = line.coordinate_jacobian[start[members[0]] : start[members[0] + 1], :, : model.sites.joints]
-        contrasts.setdefault(len(targets), []).extend(helmert(len(members)) @ residual)
-        jacobians.setdefault(len(targets), []).extend([jacobian] * (len(members) - 1))
-    return [np.array(found) for found in contrasts.values()], [np.array(found) for found in jacobians.values()]
+    for repeats, count in np.unique(np.column_stack([many, seen[first]]), axis=0):
+        mine = first[(many == repeats) & (seen[first] == count)]
+        of_first = start[mine][:, None] + np.arange(count)
+        members = start[mine[:, None] + np.arange(repeats)][..., None] + np.arange(count)
+        residual = line.residual[members].reshape(len(mine), repeats, -1)
+        found = (helmert(repeats) @ residual).reshape(-1, residual.shape[2])
+        jacobian = line.coordinate_jacobian[of_first][..., : model.sites.joints]
+        contrasts.setdefault(count, []).append(found)
+        jacobians.setdefault(count, []).append(np.repeat(jacobian, repeats - 1, axis=0))
+    return tuple([np.concatenate(parts) for parts in found.values()] for found in (contrasts, jacobians))
 
 
 def _negative_log_likelihood(logs, contrasts, jacobians, rows):

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.groups import groups_of
+
 # Readings this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
 
@@ -91,7 +93,7 @@ def state_clusters(states):
     -------
     ndarray (S,)
     """
-    return np.unique(np.column_stack([states.session, states.pose]), axis=0, return_inverse=True)[1].ravel()
+    return groups_of(np.column_stack([states.session, states.pose]))[1]
 
 
 def averaged(readings):
@@ -123,9 +125,8 @@ def each_approach(readings):
         Number of the state that would hold this approach if repeats were averaged.
     """
     key = _approached_alike(readings)
-    observations = _observations(readings, np.column_stack([key, readings.repeat]))
-    unique = np.unique(np.column_stack([key, readings.repeat]), axis=0)
-    return observations, np.unique(unique[:, :-1], axis=0, return_inverse=True)[1].ravel()
+    single = np.column_stack([key, readings.repeat])
+    return _observations(readings, single), groups_of(key[groups_of(single)[0]])[1]
 
 
 def without_wild_repeats(readings):
@@ -141,7 +142,7 @@ def without_wild_repeats(readings):
     -------
     Readings
     """
-    group = np.unique(np.column_stack([_approached_alike(readings), readings.target]), axis=0, return_inverse=True)[1].ravel()
+    group = groups_of(np.column_stack([_approached_alike(readings), readings.target]))[1]
     off = np.abs(readings.position - _medians(readings.position, group)[group])
     telling = np.bincount(group)[group] > 2
     if not telling.any():
@@ -166,10 +167,10 @@ def _approached_alike(readings):
 
 
 def _observations(readings, key):
-    _, first, state_of = np.unique(key, axis=0, return_index=True, return_inverse=True)
-    state_of = state_of.ravel()
-    pairs, pair_of = np.unique(np.column_stack([state_of, readings.target]), axis=0, return_inverse=True)
-    pair_of = pair_of.ravel()
+    first, state_of = groups_of(key)
+    pairs = np.column_stack([state_of, readings.target])
+    first_pair, pair_of = groups_of(pairs)
+    pairs = pairs[first_pair]
 
     def of_states(values):
         return None if values is None else _means(values, state_of)
@@ -219,8 +220,78 @@ def select_states(observations, kept):
     )
 
 
+def parts_of(observations, most):
+    """Some observations in parts of whole poses, in their order.
+
+    Parameters
+    ----------
+    observations : Observations
+        Those of a pose one after the other, as `averaged` gives them.
+    most : int
+        About so many observations in a part.
+
+    Returns
+    -------
+    list of (slice, slice)
+        States and observations of each part; one part where they are few.
+    """
+    first = np.flatnonzero(np.diff(state_clusters(observations.states), prepend=-1))
+    place = np.searchsorted(observations.state, first)
+    chosen = np.unique(np.searchsorted(place, np.arange(0, len(observations), most)).clip(max=len(first) - 1))
+    states, seen = [*first[chosen].tolist(), len(observations.states)], [*place[chosen].tolist(), len(observations)]
+    edges = zip(states, states[1:], seen, seen[1:], strict=False)
+    return [(slice(a, b), slice(c, d)) for a, b, c, d in edges]
+
+
+def part_at(observations, states, seen):
+    """One of the `parts_of` observations.
+
+    Parameters
+    ----------
+    observations : Observations
+    states, seen : slice
+        Of the states and of the observations.
+
+    Returns
+    -------
+    Observations
+    """
+    some = States(**{name: None if value is None else value[states] for name, value in vars(observations.states).items()})
+    rotation = None if observations.rotation is None else observations.rotation[seen]
+    return Observations(
+        some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation
+    )
+
+
+def spread_poses(observations, most):
+    """Which states belong to poses evenly spread over a campaign, so many that about `most` observations are left.
+
+    Parameters
+    ----------
+    observations : Observations
+    most : int
+
+    Returns
+    -------
+    ndarray of bool (S,)
+        True throughout where there are no more.
+    """
+    if len(observations) <= most:
+        return np.ones(len(observations.states), bool)
+    pose = state_clusters(observations.states)
+    poses = pose.max() + 1
+    chosen = np.zeros(poses, bool)
+    chosen[np.linspace(0, poses - 1, max(int(poses * most / len(observations)), 2)).round().astype(int)] = True
+    return chosen[pose]
+
+
 def _means(values, group):
     count = np.bincount(group)
+    if len(count) == len(values):
+        # Nothing to average, whatever the order.
+        total = np.empty(values.shape)
+        total[group] = values
+        return total
     total = np.zeros((len(count), *values.shape[1:]))
     np.add.at(total, group, values)
     return total / count.reshape(-1, *[1] * (values.ndim - 1))

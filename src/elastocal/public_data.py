@@ -45,6 +45,7 @@ class PublicFile:
 
 
 _UR10 = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
+_JACOBI = "pauljac7700/serial_robots_datasets", "759068d85a8b95183cd71ff96d9dfc5173bc57fc"
 FILES = {
     "fanuc_static": PublicFile(
         "Sarrasor/RoboticManipulators",
@@ -74,6 +75,34 @@ FILES = {
         "Series_B/measurements_joint_configurations.csv",
         "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e",
         "ur10_ipa/Series_B/measurements_joint_configurations.csv",
+        "MIT",
+    ),
+    "jacobi_ur5_grid": PublicFile(
+        *_JACOBI,
+        "UR5/3D_UR5_uncalibrated_grid_cleaned.csv",
+        "3de63c38b4338a1fb23437a9c6ecb7e0441a9e132fc055544619b8c580f767c0",
+        "jacobi_ur5/3D_UR5_uncalibrated_grid_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_ur5_random": PublicFile(
+        *_JACOBI,
+        "UR5/3D_UR5_uncalibrated_random_cleaned.csv",
+        "3cd7a4aae072f9757ce9bd156e7470cc8caa89d8af9164c07390953ae808095a",
+        "jacobi_ur5/3D_UR5_uncalibrated_random_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_wam_grid": PublicFile(
+        *_JACOBI,
+        "WAM/3D_WAM_uncalibrated_grid_cleaned.csv",
+        "f013c0ce152cffb5f529e747681457d359a9869c46fdbb4f4e1eefb8234835ad",
+        "jacobi_wam/3D_WAM_uncalibrated_grid_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_wam_random": PublicFile(
+        *_JACOBI,
+        "WAM/3D_WAM_uncalibrated_random_cleaned.csv",
+        "b9b6f5ee9f4e9fce0ed8a70d458b08b6af7f473afe98bb92ac2ff379d398e5e2",
+        "jacobi_wam/3D_WAM_uncalibrated_random_cleaned.csv",
         "MIT",
     ),
 }

@@ -46,8 +46,8 @@ def test_probabilities_of_all_models_sum_to_one():
 def test_each_mechanism_is_there_with_the_probability_of_the_settings():
     units, prior = made_units(), prior_of(made_units(), SETTINGS)
     odds = [({unit.mechanism for unit in model}, np.exp(prior.log_odds_of(model))) for model in every_model(units)]
-    total = sum(value for _, value in odds)
-    for mechanism, probability in (("harmonic", 0.03), ("offset", 0.03), ("link_weight", 0.5)):
+    total, known = sum(value for _, value in odds), SETTINGS.mechanism_probability
+    for mechanism, probability in (("harmonic", known), ("offset", known), ("link_weight", 0.5)):
         there = sum(value for mechanisms, value in odds if mechanism in mechanisms)
         assert there / total == pytest.approx(probability)
 
@@ -59,7 +59,7 @@ def test_the_number_of_locations_is_geometric_and_all_sets_of_so_many_are_equall
     for model in every_model(units):
         places = tuple(sorted(unit.location for unit in model))
         by_places[places] = by_places.get(places, 0.0) + np.exp(prior.log_odds_of(model))
-    odds = 0.03 / 0.97
+    odds = SETTINGS.mechanism_probability / (1 - SETTINGS.mechanism_probability)
     counts = [sum(value for places, value in by_places.items() if len(places) == size) / odds for size in (1, 2, 3)]
     np.testing.assert_allclose(counts, np.array([4, 2, 1]) / 7)
     for size in (1, 2, 3):

@@ -3,12 +3,18 @@
 from pathlib import Path
 
 from elastocal.campaign import folds_of
-from elastocal.importers import fanuc_cpa, fanuc_joint, fanuc_static, ur10_ipa
+from elastocal.importers import fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa
 from elastocal.public_data import fetch
 
 from job import run
 
-IMPORTERS = {"fanuc_static": fanuc_static, "fanuc_cpa": fanuc_cpa, "fanuc_joint": fanuc_joint, "ur10_ipa": ur10_ipa}
+IMPORTERS = {
+    "fanuc_static": fanuc_static,
+    "fanuc_cpa": fanuc_cpa,
+    "fanuc_joint": fanuc_joint,
+    "ur10_ipa": ur10_ipa,
+    "jacobi": jacobi,
+}
 
 
 def import_campaign(job):

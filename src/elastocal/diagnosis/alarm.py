@@ -17,6 +17,7 @@ import numpy as np
 
 from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
 from elastocal.diagnosis.statistics import null_draws
+from elastocal.diagnosis.summed import Sums
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,8 @@ def alarm_of(problem, products, pose_error_rad, stream):
     Alarm
     """
     settings, statistics = problem.settings, problem.statistics
-    chosen = _near(statistics.pose_error_rad, pose_error_rad)
+    # Of readings that are summed, the size of the pose error is known to a step of its grid.
+    chosen = _near(statistics.pose_error_rad, pose_error_rad, 0 if isinstance(products, Sums) else 2)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
     along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
     along = np.concatenate([statistics.along[..., None], along], axis=2)
@@ -62,10 +64,10 @@ def alarm_of(problem, products, pose_error_rad, stream):
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
 
-def _near(pose_error_rad, fitted):
-    """Sizes of the pose error that draws of the fitted one can make likely: its own, and two to either side."""
+def _near(pose_error_rad, fitted, reach):
+    """Sizes of the pose error that draws of the fitted one can make likely: its own, and some to either side."""
     place = int(np.argmin(np.abs(pose_error_rad - fitted)))
-    return np.arange(max(place - 2, 0), min(place + 3, len(pose_error_rad)))
+    return np.arange(max(place - reach, 0), min(place + reach + 1, len(pose_error_rad)))
 
 
 def _average_bayes_factors(problem, statistics, log_pose, along, squares):

@@ -124,7 +124,7 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that is far from it."""
     candidates = list(case.candidates.values())
-    about = declared
+    about, before = declared, ((), np.inf)
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
@@ -138,8 +138,11 @@ def _explained(case, declared, settings, seed, tell):
         model = found.models[conclusion.best.model]
         noise = remaining_noise(problem.problem, model, declared.noise)
         final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
-        if alarm.statistic < settings.relinearize_above:
+        left = mean_square_left(problem.problem, model)
+        settled = conclusion.best.named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
+        if settled or alarm.statistic < settings.relinearize_above:
             break
+        before = conclusion.best.named, left
         about = replace(final, noise=noise)
     return evidence, final
 
@@ -151,13 +154,11 @@ def _effect_steps(case, declared, final, found):
     if not names:
         return []
     chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
-    steps = []
-    for number, name in enumerate(names, 1):
-        if number == len(names):
-            steps.append(Step(f"+ {name}", "effect", final))
-            continue
+    steps = [Step(f"+ {names[-1]}", "effect", final)]
+    for number in range(len(names) - 1, 0, -1):
         some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
-        steps.append(Step(f"+ {name}", "effect", fit_with_sizes(declared, case.observations, final.noise, some)))
+        fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
+        steps.insert(0, Step(f"+ {names[number - 1]}", "effect", fitted))
     return steps
 
 

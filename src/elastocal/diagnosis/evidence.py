@@ -15,8 +15,10 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import lapack, solve_triangular
 from scipy.special import log_ndtr
 
 
@@ -109,17 +111,37 @@ class Conditioned:
 
     Attributes
     ----------
-    gram : ndarray (T, K, K)
+    free : ndarray (T, K, K)
+        W'MW without them.
+    cross : ndarray (T, D, K)
+        Its rows of these columns, divided by the Cholesky factor of I + D^1/2 G D^1/2.
     along : ndarray (T, K)
     squares : ndarray (T,)
     log_occam : ndarray (T,)
         -1/2 ln |I + D^1/2 G D^1/2| of these columns, with what tau contributes alone and its prior.
     """
 
-    gram: np.ndarray
+    free: np.ndarray
+    cross: np.ndarray
     along: np.ndarray
     squares: np.ndarray
     log_occam: np.ndarray
+
+    @cached_property
+    def gram(self):
+        """W'MW given these columns, ndarray (T, K, K)."""
+        return self.free - self.cross.transpose(0, 2, 1) @ self.cross if self.cross.shape[1] else self.free
+
+    def blocks_of(self, units, chosen):
+        """As `blocks_of` of the whole matrix, of which only the blocks of these units are made."""
+        return _decomposed(units, chosen, self._part)
+
+    def _part(self, at):
+        part = self.free[:, at[:, :, None], at[:, None, :]]
+        if not self.cross.shape[1]:
+            return part
+        mine = self.cross[:, :, at].transpose(0, 2, 1, 3)
+        return part - mine.transpose(0, 1, 3, 2) @ mine
 
 
 def condition(statistics, columns, deviations, log_pose):
@@ -138,14 +160,17 @@ def condition(statistics, columns, deviations, log_pose):
     Conditioned
     """
     start = statistics.log_likelihood + log_pose
+    gram = statistics.gram
     if not len(columns):
-        return Conditioned(statistics.gram, statistics.along, statistics.squares, start)
-    inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
+        return Conditioned(gram, gram[:, :0], statistics.along, statistics.squares, start)
+    inner = deviations[:, None] * gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
     factor = np.linalg.cholesky(inner)
-    cross = np.linalg.solve(factor, deviations[:, None] * statistics.gram[:, columns])
-    fitted = np.linalg.solve(factor, (deviations * statistics.along[:, columns])[..., None])[..., 0]
+    right = deviations[:, None] * np.concatenate([gram[:, columns], statistics.along[:, columns, None]], axis=2)
+    both = np.array([solve_triangular(*pair, lower=True, check_finite=False) for pair in zip(factor, right, strict=True)])
+    cross, fitted = both[..., :-1], both[..., -1]
     return Conditioned(
-        statistics.gram - cross.transpose(0, 2, 1) @ cross,
+        gram,
+        cross,
         statistics.along - (fitted[:, None] @ cross)[:, 0],
         statistics.squares - (fitted**2).sum(axis=1),
         start - np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1),
@@ -185,13 +210,17 @@ def blocks_of(gram, units, chosen):
     -------
     Blocks
     """
+    return _decomposed(units, chosen, lambda at: gram[:, at[:, :, None], at[:, None, :]])
+
+
+def _decomposed(units, chosen, part_of):
     chosen = np.asarray(chosen, int)
     width = np.array([len(units[number].columns) for number in chosen], int)
     members, values, vectors, columns = [], [], [], []
     for size in np.unique(width):
         mine = chosen[width == size]
         at = np.array([units[number].columns for number in mine])
-        part = gram[:, at[:, :, None], at[:, None, :]]
+        part = part_of(at)
         found, turned = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
         members.append(mine)
         values.append(np.clip(found, 0.0, None))
@@ -307,6 +336,27 @@ def evaluate(statistics, units, grid, log_pose, start):
 _MOST_ASCENTS, _NO_GAIN = 30, 1e-9
 
 
+# Above so many columns LAPACK's inverse of positive matrices, called for each of them, costs less than all of numpy's together.
+_MANY_COLUMNS = 30
+
+
+def _inverses(matrices):
+    """Inverses and log determinants of symmetric positive matrices (T, D, D)."""
+    if matrices.shape[1] < _MANY_COLUMNS:
+        factors = np.linalg.cholesky(matrices)
+        return np.linalg.inv(matrices), 2.0 * np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+    inverses, log_dets = np.empty_like(matrices), np.empty(len(matrices))
+    for number, matrix in enumerate(matrices):
+        # The transpose is laid out as LAPACK wants it.
+        factor, failed = lapack.dpotrf(matrix.T, lower=0, clean=1)
+        if failed:
+            raise np.linalg.LinAlgError("a matrix that is not positive definite")
+        log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
+        upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
+        inverses[number] = np.triu(upper) + np.triu(upper, 1).T
+    return inverses, log_dets
+
+
 class Joint:
     """Density of the readings under one model with one size for each unit.
 
@@ -329,8 +379,7 @@ class Joint:
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
         deviations = np.repeat(self.scales, np.diff(self.starts))
         inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
-        self.covariance = np.linalg.inv(inner)
-        self.log_det = 2.0 * np.log(np.diagonal(np.linalg.cholesky(inner), axis1=1, axis2=2)).sum(axis=1)
+        self.covariance, self.log_det = _inverses(inner)
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

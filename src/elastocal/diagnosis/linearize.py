@@ -8,11 +8,13 @@ from scipy.stats import chi2
 from elastocal.diagnosis import other
 from elastocal.diagnosis.evidence import log_likelihood
 from elastocal.diagnosis.hypotheses import prior_of, units_of
-from elastocal.diagnosis.search import Problem
-from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
-from elastocal.effects.protocol import offered
+from elastocal.diagnosis.search import Problem, likely_pose_errors
+from elastocal.diagnosis.statistics import products_of, statistics_of
+from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
+from elastocal.effects.protocol import at_states, offered
 from elastocal.model import bends as shape_parameters
-from elastocal.model import effect_columns, linearize, parameter_values
+from elastocal.model import circumstances, effect_columns, linearize, parameter_values
+from elastocal.observations import part_at, parts_of, select_states, spread_poses
 from elastocal.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
@@ -66,38 +68,39 @@ def linearized(fitted, observations, candidates, settings):
     -------
     Linearized
     """
-    line = linearize(fitted.model, fitted.estimate, observations, fitted.circumstances)
-    around, sites = line.circumstances, fitted.model.sites
+    fitted, observations = selected(fitted, observations, spread_poses(observations, settings.searched_observations))
+    around, sites = fitted.circumstances, fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
     tested = [(c, shapes) for c in candidates if c.key not in untestable for shapes in shapes_tried(c, fitted)]
     places = other.locations(sites)
-    waves = [other.displacements(around, place, settings.other_features) for place in places]
-    laws = [*tested, *((_Fixed(made), ()) for made in waves)]
-    made = effect_columns(laws, around, line.coordinate_jacobian, observations.state)
-    units = units_of(tested, [(place, len(laws)) for place, laws in zip(places, waves, strict=True)], settings)
-    made *= np.concatenate([unit.sizes for unit in units])
+    features = [len(other.displacements(at_states(around, slice(1)), at, settings.other_features, around)) for at in places]
+    units = units_of(tested, list(zip(places, features, strict=True)), settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
-    residual = line.residual + line.sensitivities[..., found] @ values[found]
-    root = np.sqrt(fitted.weights)
-    whitener = whitening(observations, fitted.joint_jacobian, fitted.noise.of_readings)
-
-    def white(values):
-        weighted = values * root.reshape(-1, *[1] * (values.ndim - 1))
-        return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
-
-    parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
-    sensitivities, jacobian = white(line.sensitivities[..., ~found]), white(fitted.joint_jacobian)
-    pose = np.repeat(observations.cluster, fitted.model.rows)
     present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
-    size = declared_size(fitted, parameters, owners[~found], sensitivities, white(line.residual), present, settings)
+    source = _Source(fitted, observations, around, tested, places, units, found, values, settings)
+    width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
+    held = len(observations) * observations.rows * width <= MOST_HELD
+    parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
+    parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
+    triangle, unit_rad = source.declared_part(parts_of(observations, rows_at_once(int((~found).sum()) + 60)))
+    rows = len(observations) * observations.rows
+    size = declared_size(fitted, parameters, owners[~found], triangle, rows, present, settings)
     deviation = prior_deviations(fitted, parameters, owners[~found], size)
-    products = products_of(
-        sensitivities, white(made), white(residual), jacobian, pose, deviation, present, np.zeros(sites.joints)
-    )
-    grid = pose_error_unit(products) * np.array(settings.pose_steps)
+    still = np.zeros(sites.joints)
+    grid = unit_rad * np.array(settings.pose_steps)
+    if held:
+        (block,) = source.blocks(parts)
+        products = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+    else:
+        chosen = spread_poses(observations, SAMPLE_ROWS // observations.rows)
+        some, seen = selected(fitted, observations, chosen)
+        (block,) = replace(source, fitted=some, observations=seen).blocks(parts_of(seen, len(seen)))
+        sample = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
+        products = summed(source.blocks(parts), triangle[:-1, :-1], sample, deviation, present, grid)
     statistics = statistics_of(products, grid)
     kept = testable(statistics, units, settings)
     shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
@@ -105,7 +108,7 @@ def linearized(fitted, observations, candidates, settings):
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, size, untestable, replace(fitted, circumstances=around), keys)
+    return Linearized(problem, products, size, untestable, fitted, keys)
 
 
 def declared_geometry(model):
@@ -146,8 +149,15 @@ def has_prior(fitted):
     return np.array([p.prior_std is not None or effects.get(owner) in sized for owner, p in fitted.parameters], bool)
 
 
-def declared_size(fitted, parameters, owners, sensitivities, residual, present, settings):
+def declared_size(fitted, parameters, owners, triangle, count, present, settings):
     """Size of declared geometry that makes the readings most probable (type II maximum likelihood, one number for all of it).
+
+    Parameters
+    ----------
+    triangle : ndarray (P + 1, P + 1)
+        Of the sensitivities to the declared parameters and the residual, whitened.
+    count : int
+        Rows of these.
 
     Returns
     -------
@@ -159,11 +169,11 @@ def declared_size(fitted, parameters, owners, sensitivities, residual, present, 
     best = (-np.inf, 1.0)
     for size in settings.declared_sizes:
         deviation = prior_deviations(fitted, parameters, owners, size)
-        rows = np.concatenate([sensitivities * deviation, np.eye(len(deviation))])
-        right = np.concatenate([residual, -present / deviation])
+        rows = np.concatenate([triangle[:, :-1] * deviation, np.eye(len(deviation))])
+        right = np.concatenate([triangle[:, -1], -present / deviation])
         basis, factor = np.linalg.qr(rows)
         squares = right @ right - ((basis.T @ right) ** 2).sum()
-        evidence = log_likelihood(squares, len(residual)) - np.log(np.abs(np.diag(factor))).sum()
+        evidence = log_likelihood(squares, count) - np.log(np.abs(np.diag(factor))).sum()
         best = max(best, (float(evidence), size))
     return best[1]
 
@@ -200,6 +210,111 @@ class _Fixed:
 
     def displacement(self, _):
         return self.laws
+
+
+@dataclass(frozen=True)
+class _Source:
+    """Whitened rows of a fit, made for some whole poses at a time.
+
+    Attributes
+    ----------
+    fitted : Fit
+    observations : Observations
+    campaign : Circumstances
+        By which the competitor's inputs are normalised.
+    tested : list of (Candidate, tuple)
+    places : list of tuple
+        Of the competitor.
+    units : tuple of Unit
+        Of both.
+    found : ndarray of bool
+        Which parameters of the fit are those of candidates.
+    values : ndarray
+        Of the parameters, in which the prediction is linear; zero for shapes.
+    settings : Settings
+    """
+
+    fitted: object
+    observations: object
+    campaign: object
+    tested: list
+    places: list
+    units: tuple
+    found: np.ndarray
+    values: np.ndarray
+    settings: object
+
+    def lines(self, parts):
+        """Linearization, circumstances, states and whitening of each part."""
+        fitted = self.fitted
+        for states, seen in parts:
+            some = part_at(self.observations, states, seen)
+            line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.circumstances, states))
+            jacobian, root = fitted.joint_jacobian[seen], np.sqrt(fitted.weights[seen])
+            yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_readings), root)
+
+    def declared_part(self, parts):
+        """Triangular factor of declared sensitivities and residual; standard error with which one pose tells a joint."""
+        information = []
+
+        def rows():
+            for line, some, jacobian, white in self.lines(parts):
+                squares = (white(jacobian) ** 2).sum(axis=1) / jacobian.shape[-1]
+                information.append(np.bincount(np.repeat(some.cluster, some.rows), squares))
+                yield np.column_stack([white(line.sensitivities[..., ~self.found]), white(line.residual)])
+
+        triangle = triangle_of(rows())
+        return triangle, float(1.0 / np.sqrt(np.median(np.concatenate(information))))
+
+    def blocks(self, parts):
+        """`WhiteRows` of each part."""
+        sizes = np.concatenate([unit.sizes for unit in self.units])
+        for line, some, jacobian, white in self.lines(parts):
+            around, features = line.circumstances, self.settings.other_features
+            waves = [_Fixed(other.displacements(around, place, features, self.campaign)) for place in self.places]
+            laws = [*self.tested, *((made, ()) for made in waves)]
+            made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
+            made *= sizes
+            residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]
+            yield WhiteRows(
+                white(line.sensitivities[..., ~self.found]),
+                white(made),
+                white(residual),
+                white(jacobian),
+                np.repeat(some.cluster, some.rows),
+            )
+
+
+def _white(whitener, root):
+    def white(values):
+        weighted = values * root.reshape(-1, *[1] * (values.ndim - 1))
+        return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
+
+    return white
+
+
+def selected(fitted, observations, chosen):
+    """A fit and its observations in some of the states.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+    chosen : ndarray of bool (S,)
+
+    Returns
+    -------
+    Fit, Observations
+    """
+    some = select_states(observations, chosen)
+    around = fitted.circumstances
+    if around is None:
+        around = circumstances(fitted.model, fitted.estimate, some.states)
+    elif not chosen.all():
+        around = at_states(around, chosen)
+    seen = chosen[observations.state]
+    parts = {name: getattr(fitted, name)[seen] for name in ("weights", "residual", "joint_jacobian")}
+    return replace(fitted, circumstances=around, **parts), some
 
 
 def shapes_tried(candidate, fitted):

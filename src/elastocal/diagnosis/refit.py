@@ -53,7 +53,7 @@ def selected(linearized, model):
     return Selected(tuple(effects), linearized.declared_size)
 
 
-def fit_with_sizes(declared, observations, noise, chosen):
+def fit_with_sizes(declared, observations, noise, chosen, larger=None):
     """Fit the declared model with the effects of a selected one.
 
     Parameters
@@ -64,6 +64,8 @@ def fit_with_sizes(declared, observations, noise, chosen):
     noise : Noise
         Of readings and poses, as the selected model leaves it.
     chosen : Selected
+    larger : Fit, optional
+        Of the same model with more effects: the search then starts from its values.
 
     Returns
     -------
@@ -79,6 +81,11 @@ def fit_with_sizes(declared, observations, noise, chosen):
     effects = [candidate for candidate, _ in chosen.effects]
     start = declared.estimate.with_effects(effects)
     start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
+    if larger is not None:
+        values = [larger.values_of(effect.key) for effect in (*known, *effects)]
+        start = replace(
+            larger.estimate, coefficients=tuple(linear for linear, _ in values), shapes=tuple(bent for _, bent in values)
+        )
     return fit(replace(model, effects=known).with_effects(effects), observations, noise, start)
 
 

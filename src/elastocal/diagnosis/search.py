@@ -17,7 +17,6 @@ import numpy as np
 from elastocal.diagnosis.evidence import (
     Grid,
     added_evidence,
-    blocks_of,
     condition,
     evaluate,
     log_likelihood,
@@ -135,6 +134,37 @@ def posterior(problem):
     return searcher.weigh(), nothing
 
 
+def likely_pose_errors(statistics, units, settings):
+    """Sizes of the pose error that "nothing" or some good single unit makes likely; zero, to which Gram matrices refer, always.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        Of zero first.
+    units : sequence of Unit
+    settings : Settings
+
+    Returns
+    -------
+    ndarray of bool (T,)
+    """
+    problem = Problem(statistics, tuple(units), None, settings)
+    conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
+    blocks = conditioned.blocks_of(units, range(len(units)))
+    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, len(units))
+    empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
+    likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
+    likely[0] = True
+    return likely
+
+
+def _likely(by_pose_error, total, empty):
+    good = np.argsort(-total)[:_TELLING_UNITS]
+    weights = log_sum_exp(by_pose_error[:, good], axis=2)
+    weights = np.column_stack([weights - log_sum_exp(weights, axis=0), empty.log_pose])
+    return (weights > _UNLIKELY).any(axis=1)
+
+
 class _Searcher:
     """Models met so far with their approximate log odds, and the sizes at which they were met."""
 
@@ -164,7 +194,7 @@ class _Searcher:
         columns = np.concatenate([np.zeros(0, int), *(units[n].columns for n in model)])
         deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
         conditioned = condition(self.statistics, columns, deviations, self.log_pose)
-        blocks = blocks_of(conditioned.gram, units, open_units)
+        blocks = conditioned.blocks_of(units, open_units)
         by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, len(units))
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
@@ -185,10 +215,7 @@ class _Searcher:
 
     def keep_likely_pose_errors(self, by_pose_error, total):
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
-        good = np.argsort(-total)[:_TELLING_UNITS]
-        weights = log_sum_exp(by_pose_error[:, good], axis=2)
-        weights = np.column_stack([weights - log_sum_exp(weights, axis=0), self.empty.log_pose])
-        kept = np.flatnonzero((weights > _UNLIKELY).any(axis=1))
+        kept = np.flatnonzero(_likely(by_pose_error, total, self.empty))
         self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
         self.empty = self.evaluated((), self.empty.scales)
 

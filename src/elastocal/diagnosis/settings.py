@@ -25,7 +25,8 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.03, "prior probability of each mechanism: on average less than one of some 25 is there"
+        0.003,
+        "prior probability of each mechanism; of 0.01, 0.005, 0.003 and 0.001 that whose statements fit 540 development cases",
     )
     gravity_probability: float = _setting(
         0.5,
@@ -65,6 +66,16 @@ class Settings:
     relinearize_above: float = _setting(
         100.0,
         "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
+    )
+    searched_observations: int = _setting(
+        30_000,
+        "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
+        " noise, and the fit takes all",
+    )
+    settled_misfit: float = _setting(
+        0.05,
+        "relative change of the mean square left below which, as where the mechanisms stay the same, no further linearisation"
+        " is made: less than the noise of most campaigns is known to",
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")

@@ -21,7 +21,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
-# Of a variance of one: what is less is rounding, what is added is not seen.
+from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
+
+# Of a variance of one, or of the largest eigenvalue: what is less is rounding, what is added is not seen.
 _ROUNDING = 1e-9
 
 
@@ -114,8 +116,7 @@ class Products:
         -------
         ndarray (..., P + U)
         """
-        basis = declared @ self.into_basis
-        return np.concatenate([basis, candidates - basis @ self.projected[:, columns]], axis=-1)
+        return rows_alike(self, declared, candidates, columns)
 
 
 def products_of(declared, candidates, residual, jacobian, pose, prior_std, present, joint_rad):
@@ -184,7 +185,7 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
         len(rows),
         freedom,
         into_basis,
-        projected[:, :-1],
+        projected,
     )
 
 
@@ -199,7 +200,7 @@ def statistics_of(products, pose_error_rad):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     pose_error_rad : ndarray (T,)
 
     Returns
@@ -224,14 +225,17 @@ def normal_equations(products, tau):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     tau : float
-        rad.
+        rad; of sums, the nearest of their sizes counts.
 
     Returns
     -------
     ndarray (P + K + 1, P + K + 1), float
     """
+    if isinstance(products, Sums):
+        place = int(np.argmin(np.abs(products.pose_error_rad - tau)))
+        return products.totals[place], products.log_dets[place]
     rows, log_det = _pose_factor(products, tau)
     return products.gram - rows.T @ rows, log_det
 
@@ -241,11 +245,11 @@ def null_draws(products, tau, pose_error_rad, count, stream):
 
     Parameters
     ----------
-    products : Products
+    products : Products or Sums
     tau : float
         Pose error with which to simulate, rad.
     pose_error_rad : ndarray (T,)
-        At which the statistics are wanted.
+        At which the statistics are wanted; of sums, that with which they are simulated alone.
     count : int
     stream : numpy.random.Generator
 
@@ -255,23 +259,24 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     squares : ndarray (T, N)
         As in `Statistics`, for N draws of unit variance.
     """
+    if isinstance(products, Sums):
+        gram = _marginal(normal_equations(products, tau)[0], products.declared)[0]
+        return tuple(drawn[None] for drawn in null_draws_of(products, gram, count, stream))
     poses, joints, width = products.pose_rows.shape
-    # Covariance of [Z' e, J' e] for white e, from which all that is needed of the readings is drawn without drawing them.
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
-    size = width - 1
-    covariance = np.zeros((size + poses * joints,) * 2)
-    covariance[:size, :size] = products.white_gram
-    covariance[size:, :size] = flat
-    covariance[:size, size:] = flat.T
-    for pose in range(poses):
-        mine = slice(size + pose * joints, size + (pose + 1) * joints)
-        covariance[mine, mine] = products.pose_gram[pose]
-    scale = np.sqrt(np.clip(np.diag(covariance), 1e-300, None))
-    root = scale[:, None] * _root(covariance / np.outer(scale, scale), products.rows)
-    white = stream.standard_normal((root.shape[1], count))
-    drawn = root @ white
-    squares = (white**2).sum(axis=0) + stream.chisquare(max(products.rows - root.shape[1], 1), count)
-    along, seen = drawn[:size], drawn[size:].reshape(poses, joints, count)
+    # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
+    kept, inverse, root = _pseudo_inverse(products.pose_gram)
+    white = stream.standard_normal((poses, joints, count)) * kept[..., None]
+    seen = root @ white
+    known = inverse @ products.pose_rows[..., :-1]
+    scale = np.sqrt(np.clip(np.diag(products.white_gram), 1e-300, None))
+    left = (products.white_gram - flat.T @ known.reshape(flat.shape)) / np.outer(scale, scale)
+    factor = _root(left, products.rows)
+    rest = stream.standard_normal((factor.shape[1], count))
+    along = known.reshape(flat.shape).T @ seen.reshape(-1, count)
+    along += scale[:, None] * (factor @ rest)
+    freedom = max(products.rows - int(kept.sum()) - len(rest), 1)
+    squares = (white**2).sum(axis=(0, 1)) + (rest**2).sum(axis=0) + stream.chisquare(freedom, count)
     common = _joint_deviations(products, tau)[None, :, None] * stream.standard_normal((poses, joints, count))
     squares = squares + 2 * (common * seen).sum(axis=(0, 1))
     moved = products.pose_gram @ common
@@ -294,18 +299,27 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     return np.array(found_along), np.array(found_squares)
 
 
-def _root(correlation, rows):
-    """A matrix whose product with its transpose is a correlation matrix of products of so many white rows.
+def _root(covariance, rows):
+    """A matrix whose product with its transpose is the covariance of products, of size about one, of so many white rows.
 
     The Cholesky factor where there are more rows than products, which is nine times as fast; else by eigenvectors, since the
     matrix has no more rank than there are rows.
     """
-    size = len(correlation)
+    size = len(covariance)
     if rows > 2 * size:
-        return np.linalg.cholesky(correlation + _ROUNDING * np.eye(size))
-    values, vectors = np.linalg.eigh(correlation)
-    kept = values > _ROUNDING * values[-1]
+        return np.linalg.cholesky(covariance + _ROUNDING * np.eye(size))
+    values, vectors = np.linalg.eigh(covariance)
+    kept = values > _ROUNDING * size
     return vectors[:, kept] * np.sqrt(values[kept])
+
+
+def _pseudo_inverse(grams):
+    """Directions that are not rounding (G, n), pseudo-inverse and square root (G, n, n), of symmetric positive matrices."""
+    values, vectors = np.linalg.eigh(grams)
+    kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
+    values = np.where(kept, values, 1.0)
+    inverse = (vectors * (kept / values)[:, None]) @ vectors.transpose(0, 2, 1)
+    return kept, inverse, vectors * (kept * np.sqrt(values))[:, None]
 
 
 def _joint_deviations(products, tau):

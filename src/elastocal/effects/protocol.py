@@ -352,6 +352,29 @@ def at_coordinates(circumstances, coordinates):
     return replace(circumstances, motion=motion(sites.chain, coordinates, sites.followed))
 
 
+def at_states(circumstances, chosen):
+    """Some of the states.
+
+    Parameters
+    ----------
+    circumstances : Circumstances
+    chosen : slice or ndarray of bool (S,)
+
+    Returns
+    -------
+    Circumstances
+    """
+    moved = circumstances.motion
+    some = replace(
+        moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
+    )
+    by_state = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
+    values = {name: getattr(circumstances, name) for name in by_state}
+    return replace(
+        circumstances, motion=some, **{name: None if value is None else value[chosen] for name, value in values.items()}
+    )
+
+
 def with_springs(circumstances, compliance, mass_corrections):
     """The same states with other joint compliances (n,) and other errors of the declared masses (4 m,)."""
     same = np.array_equal(mass_corrections, circumstances.mass_corrections)

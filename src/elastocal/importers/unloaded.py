@@ -4,7 +4,7 @@
 _DECLARED = ("joint_offset", "link_geometry")
 
 
-def unloaded_document(name, robot, measured, targets, holdout=None, noise=None):
+def unloaded_document(name, robot, measured, targets, holdout=None, noise=None, point="6DoF"):
     """Contents of ``campaign.yaml``: targets on the flange whose offsets nobody knows.
 
     Parameters
@@ -13,6 +13,8 @@ def unloaded_document(name, robot, measured, targets, holdout=None, noise=None):
     measured : {"position", "pose"}
     targets : iterable of str
     holdout, noise : dict, optional
+    point : str
+        Measuring point of the chain to which the targets belong: its last.
 
     Returns
     -------
@@ -23,7 +25,7 @@ def unloaded_document(name, robot, measured, targets, holdout=None, noise=None):
         "robot": robot,
         "measured": measured,
         "frame": "tracker",
-        "targets": {target: {"point": "6DoF", "offset_m": "unknown"} for target in targets},
+        "targets": {target: {"point": point, "offset_m": "unknown"} for target in targets},
         "compliance": "nominal",
         "declared": list(_DECLARED),
     }

@@ -1,14 +1,12 @@
 """Universal Robots UR10 with a T-Mac on its flange (christianlandgraf/ipa-robot-accuracy): Series A and B as campaigns."""
 
-import csv
-from contextlib import suppress
 from datetime import datetime
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaign import write_campaign as write_folder
-from elastocal.errors import InputError
+from elastocal.importers.csv_columns import numbers, read_columns
 from elastocal.importers.repeats import pose_and_repeat
 from elastocal.importers.unloaded import unloaded_document
 
@@ -54,23 +52,19 @@ def read(path):
     InputError
         No file, a column that is missing, something that is no number.
     """
-    header, rows = _lines(path)
-    for name in (*ANGLES, *POSITION, *ORIENTATION):
-        if name not in header:
-            raise InputError(path, "header", f"no column {name!r}", "a series of ipa-robot-accuracy")
-    cells = dict(zip(header, zip(*rows, strict=True), strict=True))
+    cells = read_columns(path, ";", (*ANGLES, *POSITION, *ORIENTATION), "a series of ipa-robot-accuracy")
 
-    def numbers(names):
-        return np.column_stack([_numbers(path, name, cells[name]) for name in names])
+    def table(names):
+        return np.column_stack([numbers(path, name, cells[name], ",") for name in names])
 
     found = {
-        "joint_angles": numbers(ANGLES),
-        "position": 1e-3 * numbers(POSITION),
-        "rotation_vector": Rotation.from_euler(_EULER, numbers(ORIENTATION), degrees=True).as_rotvec(),
+        "joint_angles": table(ANGLES),
+        "position": 1e-3 * table(POSITION),
+        "rotation_vector": Rotation.from_euler(_EULER, table(ORIENTATION), degrees=True).as_rotvec(),
     }
-    if TEMPERATURE in header:
-        found["temperature_c"] = numbers([TEMPERATURE])[:, 0]
-    times = _times(cells[TIME]) if TIME in header else None
+    if TEMPERATURE in cells:
+        found["temperature_c"] = numbers(path, TEMPERATURE, cells[TEMPERATURE], ",")
+    times = _times(cells[TIME]) if TIME in cells else None
     return found if times is None else found | {"time_s": times}
 
 
@@ -102,33 +96,6 @@ def write_campaign(path, folder, name, holdout=None, noise=NOISE):
     table |= {f"r{axis}": readings["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
     table |= {covariate: readings[covariate] for covariate in ("time_s", "temperature_c") if covariate in readings}
     write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
-
-
-def _lines(path):
-    """Header and rows; blank lines are left out."""
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = [line for line in csv.reader(file, delimiter=";", strict=True) if line]
-    except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError(path, "", str(error), "text with columns separated by ;") from None
-    if len(lines) < 2:
-        raise InputError(path, "", "no row of data", "a header and rows")
-    for number, line in enumerate(lines[1:], 1):
-        if len(line) != len(lines[0]):
-            raise InputError(path, f"row {number}", f"{len(line)} cells", f"{len(lines[0])}, one for each column of the header")
-    return lines[0], lines[1:]
-
-
-def _numbers(path, name, cells):
-    values = np.full(len(cells), np.nan)
-    for index, cell in enumerate(cells):
-        with suppress(ValueError):
-            values[index] = float(cell.replace(",", "."))
-        if not np.isfinite(values[index]):
-            raise InputError(path, f"row {index + 1}, column {name}", repr(cell), "a number with a decimal comma")
-    return values
 
 
 def _times(cells):

@@ -1,0 +1,200 @@
+"""Sufficient statistics of readings that are too many to be held whitened: one pass over blocks of whole poses.
+
+Z'Sigma(tau)^-1 Z is summed at every size of the pose error that is likely, in memory that does not grow with the readings.
+No condition number is squared: candidates and residual come with what the declared parameters explain of them in a sample of
+the readings taken off, so that what is summed is of the size of what is left; the rest is exact algebra.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+# Beyond this many values of whitened columns a problem is summed: as many as take 60 MB, of which there are ten copies.
+MOST_HELD = 8_000_000
+# Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
+SAMPLE_ROWS = 6000
+# Values of whitened columns in a block.
+_BLOCK_VALUES = 1_500_000
+
+
+@dataclass(frozen=True)
+class WhiteRows:
+    """Whitened rows of some whole poses, as the arguments of `statistics.products_of`; the poses number from 0 in each block.
+
+    Attributes
+    ----------
+    declared : ndarray (R, P)
+    candidates : ndarray (R, K)
+    residual : ndarray (R,)
+    jacobian : ndarray (R, n)
+    pose : ndarray of int (R,)
+        Rising.
+    """
+
+    declared: np.ndarray
+    candidates: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    pose: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sums:
+    """What `Products` are for readings that are held; in the same parameters.
+
+    Attributes
+    ----------
+    declared : int
+        P.
+    pose_error_rad : ndarray (T,)
+        Zero first.
+    totals : ndarray (T, P + K + 1, P + K + 1)
+        Z'Sigma(tau)^-1 Z, the rows of the declared parameters' priors included.
+    log_dets : ndarray (T,)
+        ln |Sigma| beyond that of white noise.
+    rows, freedom : int
+    into_basis, projected : ndarray
+        As in `Products`.
+    """
+
+    declared: int
+    pose_error_rad: np.ndarray
+    totals: np.ndarray
+    log_dets: np.ndarray
+    rows: int
+    freedom: int
+    into_basis: np.ndarray
+    projected: np.ndarray
+
+    @property
+    def gram(self):
+        """Z'Z."""
+        return self.totals[0]
+
+    def alike(self, declared, candidates, columns):
+        """As `Products.alike`."""
+        return rows_alike(self, declared, candidates, columns)
+
+
+def rows_alike(products, declared, candidates, columns):
+    """See `Products.alike`."""
+    basis = declared @ products.into_basis
+    return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
+
+
+def rows_at_once(columns):
+    """Rows of a block of so many columns."""
+    return max(_BLOCK_VALUES // columns, 1)
+
+
+def triangle_of(blocks):
+    """Triangular factor of rows that come in blocks (Demmel et al. 2012, TSQR).
+
+    Parameters
+    ----------
+    blocks : iterable of ndarray (R, k)
+
+    Returns
+    -------
+    ndarray (k, k) or fewer rows
+    """
+    triangle = None
+    for block in blocks:
+        stacked = block if triangle is None else np.concatenate([triangle, block])
+        triangle = np.linalg.qr(stacked, mode="r")
+    return triangle
+
+
+def summed(blocks, triangle, sample, prior_std, present, pose_error_rad):
+    """Sum the products of whitened rows.
+
+    Parameters
+    ----------
+    blocks : iterable of WhiteRows
+    triangle : ndarray (P, P)
+        R of the declared columns of all rows.
+    sample : Products
+        Of a sample of them.
+    prior_std, present : ndarray (P,)
+        As in `statistics.products_of`.
+    pose_error_rad : ndarray (T,)
+        Zero first.
+
+    Returns
+    -------
+    Sums
+    """
+    prior = np.diag(1.0 / prior_std)
+    factor = np.linalg.qr(np.concatenate([triangle, prior]), mode="r")
+    norms = np.linalg.norm(factor, axis=0)
+    into_basis = np.linalg.inv(factor / norms) / norms[:, None]
+    explained = sample.into_basis @ sample.projected
+    count, width = len(prior), explained.shape[1] + len(prior)
+    totals, log_dets = np.zeros((len(pose_error_rad), width, width)), np.zeros(len(pose_error_rad))
+    rows = 0
+    for block in blocks:
+        every = np.empty((len(block.residual), width))
+        np.matmul(block.declared, into_basis, out=every[:, :count])
+        np.matmul(block.declared, -explained, out=every[:, count:])
+        every[:, count:-1] += block.candidates
+        every[:, -1] += block.residual
+        rows += len(every)
+        for number, tau in enumerate(pose_error_rad):
+            if not tau:
+                totals[number] += every.T @ every
+                continue
+            for white, log_det in _whitened(every, block.jacobian, block.pose, tau):
+                totals[number] += white.T @ white
+                log_dets[number] += log_det
+    rest = -prior @ explained
+    rest[:, -1] -= present / prior_std
+    every = np.concatenate([prior @ into_basis, rest], axis=1)
+    totals += every.T @ every
+    declared = totals[0, :count, :count]
+    # Of the readings, not of the priors: the trace of the hat matrix.
+    hat = np.trace(np.linalg.solve(declared, declared - every[:, :count].T @ every[:, :count]))
+    projected = np.linalg.solve(into_basis, explained)
+    freedom = max(round(rows - hat), 1)
+    return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
+
+
+def _whitened(every, jacobian, pose, tau):
+    """Rows with (I + tau^2 J J')^-1/2 applied, and ln |I + tau^2 J J'|, for each number of rows in a pose."""
+    sizes = np.bincount(pose)
+    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+    for size in np.unique(sizes):
+        members = starts[sizes == size][:, None] + np.arange(size)
+        seen = tau * jacobian[members]
+        factor = np.linalg.cholesky(np.eye(size) + seen @ seen.transpose(0, 2, 1))
+        white = np.linalg.inv(factor) @ every[members]
+        yield white.reshape(-1, every.shape[1]), 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
+
+
+def null_draws_of(sums, gram, count, stream):
+    """Statistics of simulated readings of the declared model, at the size of the pose error with which they are simulated.
+
+    b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left.
+
+    Parameters
+    ----------
+    sums : Sums
+    gram : ndarray (K, K)
+        W'MW.
+    count : int
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    along : ndarray (K, N)
+    squares : ndarray (N,)
+    """
+    scale = np.sqrt(np.clip(np.diag(gram), 1e-300, None))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    kept = values > _ROUNDING * values[-1]
+    white = stream.standard_normal((int(kept.sum()), count))
+    along = scale[:, None] * (vectors[:, kept] @ (np.sqrt(values[kept])[:, None] * white))
+    return along, (white**2).sum(axis=0) + stream.chisquare(max(sums.freedom - len(white), 1), count)
+
+
+# Eigenvalues below this share of the largest are rounding.
+_ROUNDING = 1e-9

@@ -1,0 +1,25 @@
+"""Which rows of an array are alike."""
+
+import numpy as np
+
+
+def groups_of(keys):
+    """Group equal rows: `numpy.unique` along the first axis, many times as fast.
+
+    Parameters
+    ----------
+    keys : ndarray (N, k)
+
+    Returns
+    -------
+    first : ndarray of int (G,)
+        First row of each group; groups in lexicographic order.
+    group : ndarray of int (N,)
+        Of each row.
+    """
+    order = np.lexsort(keys.T[::-1])
+    rising = keys[order]
+    new = np.concatenate([np.ones(min(len(keys), 1), bool), (rising[1:] != rising[:-1]).any(axis=1)])
+    group = np.empty(len(keys), int)
+    group[order] = np.cumsum(new) - 1
+    return order[new], group

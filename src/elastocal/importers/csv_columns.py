@@ -1,0 +1,81 @@
+"""Sources that are tables of text with a header: their columns by name, and the numbers in these."""
+
+import csv
+from contextlib import suppress
+
+import numpy as np
+
+from elastocal.errors import InputError
+
+_DECIMAL_WORDS = {",": "a number with a decimal comma", ".": "a number"}
+
+
+def read_columns(path, separator, needed, kind):
+    """Cells of a table, column by column; blank lines are left out.
+
+    Parameters
+    ----------
+    path : str or Path
+    separator : str
+        Between the cells of a line.
+    needed : iterable of str
+        Columns that must be there.
+    kind : str
+        What the file should be, for the message where a column is missing.
+
+    Returns
+    -------
+    dict of str to tuple of str
+        By the names of the header.
+
+    Raises
+    ------
+    InputError
+        No file, no row, rows of different lengths, a column that is missing.
+    """
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            lines = [line for line in csv.reader(file, delimiter=separator, strict=True) if line]
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(path, "", str(error), f"text with columns separated by {separator}") from None
+    if len(lines) < 2:
+        raise InputError(path, "", "no row of data", "a header and rows")
+    header, rows = lines[0], lines[1:]
+    for number, line in enumerate(rows, 1):
+        if len(line) != len(header):
+            raise InputError(path, f"row {number}", f"{len(line)} cells", f"{len(header)}, one for each column of the header")
+    for name in needed:
+        if name not in header:
+            raise InputError(path, "header", f"no column {name!r}", kind)
+    return dict(zip(header, zip(*rows, strict=True), strict=True))
+
+
+def numbers(path, name, cells, decimal="."):
+    """Numbers of one column.
+
+    Parameters
+    ----------
+    path : str or Path
+    name : str
+        Of the column.
+    cells : sequence of str
+    decimal : {".", ","}
+
+    Returns
+    -------
+    ndarray (N,)
+
+    Raises
+    ------
+    InputError
+        A cell that is no finite number.
+    """
+    values = np.full(len(cells), np.nan)
+    for index, cell in enumerate(cells):
+        with suppress(ValueError):
+            values[index] = float(cell.replace(decimal, "."))
+        if not np.isfinite(values[index]):
+            raise InputError(path, f"row {index + 1}, column {name}", repr(cell), _DECIMAL_WORDS[decimal])
+    return values
