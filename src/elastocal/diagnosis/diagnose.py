@@ -122,7 +122,7 @@ def diagnose(case, settings, seed, progress=None):
 
 
 def _explained(case, declared, settings, seed, tell):
-    """Evidence about the declared model, and again about the model found where that is far from it."""
+    """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
     about, before = declared, ((), np.inf)
     for round_number in range(settings.linearizations):
@@ -133,18 +133,19 @@ def _explained(case, declared, settings, seed, tell):
         conclusion = concluded(problem.problem, found, alarm)
         evidence = Evidence(problem, found, nothing, alarm, conclusion)
         tell(_told(conclusion, alarm))
-        if not conclusion.best.named:
-            return evidence, declared
-        model = found.models[conclusion.best.model]
-        noise = remaining_noise(problem.problem, model, declared.noise)
-        final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
-        left = mean_square_left(problem.problem, model)
-        settled = conclusion.best.named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
-        if settled or alarm.statistic < settings.relinearize_above:
+        named, taken = conclusion.best.named, about.noise
+        model = found.models[conclusion.best.model] if named else nothing
+        noise = remaining_noise(problem.problem, model, taken, declared.noise)
+        left = (noise.position_m / declared.noise.position_m) ** 2
+        off = noise.position_m > settings.relinearize_noise * taken.position_m
+        settled = named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
+        last = not off and (settled or not named or alarm.statistic < settings.relinearize_above)
+        if named or not last:
+            about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
+        if last:
             break
-        before = conclusion.best.named, left
-        about = replace(final, noise=noise)
-    return evidence, final
+        before = named, left
+    return evidence, final if named else declared
 
 
 def _effect_steps(case, declared, final, found):
