@@ -9,7 +9,7 @@ from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting import fit
@@ -124,7 +124,7 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that is far from it."""
     candidates = list(case.candidates.values())
-    about, before = declared, ((), np.inf)
+    about, before = declared, ()
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
@@ -138,11 +138,10 @@ def _explained(case, declared, settings, seed, tell):
         model = found.models[conclusion.best.model]
         noise = remaining_noise(problem.problem, model, declared.noise)
         final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
-        left = mean_square_left(problem.problem, model)
-        settled = conclusion.best.named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
-        if settled or alarm.statistic < settings.relinearize_above:
+        as_promised = abs(mean_square(final) - 1.0) < settings.linear_misfit
+        if as_promised or conclusion.best.named == before or alarm.statistic < settings.relinearize_above:
             break
-        before = conclusion.best.named, left
+        before = conclusion.best.named
         about = replace(final, noise=noise)
     return evidence, final
 
