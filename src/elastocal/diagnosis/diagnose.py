@@ -172,7 +172,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
-        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages)
+        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
     said += fitted_compliance_warnings(final)
