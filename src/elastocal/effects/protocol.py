@@ -207,7 +207,8 @@ class Circumstances:
         sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
         masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
         centres = np.array([mass.centre_m for mass in sites.masses])
-        first = np.einsum("mijs,mj->mis", self._body_rotation, masses[:, None] * centres + corrections[:, 1:])
+        along, rotation = masses[:, None] * centres + corrections[:, 1:], self._body_rotation
+        first = sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
         first += masses[:, None, None] * self._body_position
         on_each = self._falling[0] * (self._behind @ masses)[:, None]
         for i in range(3):
