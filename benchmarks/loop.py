@@ -6,17 +6,15 @@ import pstats
 import shutil
 from dataclasses import replace
 
-import numpy as np
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
-from elastocal.selection import search
 
 from elastocal.campaign import read_campaign, split, write_campaign
 from elastocal.campaign_simulation import Plan, simulated_measurements
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting import fit
-from elastocal.loop.case import Case, noise_from
-from elastocal.loop.declared import noise_of
+from elastocal.loop.case import Case
 from elastocal.model import declared_model
 from elastocal.observations import averaged
 from elastocal.public_data import FOLDER_VARIABLE
@@ -25,10 +23,9 @@ from elastocal.sites import sites_of
 POSES, POINTS = 60, ("2DoF", "3DoF", "4DoF", "6DoF")
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 ALLOWED_S, ALLOWED_PUBLIC_S = 60.0, 300.0
-REPLICATES = 2000
 REPETITIONS = 3
 # What numpy, scipy and the few functions of ours that are one matrix product long spend their own time in.
-ALGEBRA = ("linalg", "whitening.py", "screening.py", "fitting.py", "decomp", "_basic.py", "_solve_toeplitz")
+ALGEBRA = ("linalg", "whitening.py", "evidence.py", "statistics.py", "fitting.py", "decomp", "_basic.py", "_solve_toeplitz")
 
 
 def rows(work):
@@ -42,7 +39,7 @@ def rows(work):
     folder = copy_study(work / "loop")
     own = _campaign(folder / "campaigns" / "bench", POSES)
     seconds, _ = snakemake(folder, "-j2", "diagnose", "--config", f"campaign={own.relative_to(folder)}")
-    size = f"{POSES} poses x {len(LADDER)} loads x {len(POINTS)} points of poses, {REPLICATES}-fold bootstrap, -j2"
+    size = f"{POSES} poses x {len(LADDER)} loads x {len(POINTS)} points of poses, -j2"
     yield _limit("loop campaign", seconds, ALLOWED_S, f"diagnose with its report: {size}")
     if os.environ.get(FOLDER_VARIABLE):
         seconds, _ = snakemake(folder, "-j2", "reports/loop/ur10_series_a/report.pdf")
@@ -56,20 +53,20 @@ def _limit(name, seconds, allowed, how):
 
 def _growth(work):
     whole, half = (_case(work / f"growth{poses}", poses) for poses in (4 * POSES, 2 * POSES))
-    every, second = list(whole.candidates.values()), list(whole.candidates.values())[::2]
+    fewer = replace(whole, candidates=dict(list(whole.candidates.items())[::2]))
     functions = {
-        "all": lambda: _trace(whole, every),
-        "half the poses": lambda: _trace(half, every),
-        "half the candidates": lambda: _trace(whole, second),
+        "all": lambda: diagnose(whole, Settings(), 1),
+        "half the poses": lambda: diagnose(half, Settings(), 1),
+        "half the candidates": lambda: diagnose(fewer, Settings(), 1),
     }
     all_of, poses, candidates = map(min, interleaved(functions, REPETITIONS))
     rows, readings = len(whole.observations) * whole.model.rows, len(half.observations) * half.model.rows
-    how = f"declared fit and trace of {rows} rows against {readings}, minimum of {REPETITIONS}"
+    how = f"diagnosis of {rows} rows against {readings}, minimum of {REPETITIONS}"
     yield Row("loop rows", all_of, poses, all_of / poses, "", None, how)
-    how = f"the same with {len(every)} candidates against {len(second)}"
+    how = f"the same with {len(whole.candidates)} candidates against {len(fewer.candidates)}"
     yield Row("loop candidates", all_of, candidates, all_of / candidates, "", None, how)
     profile = cProfile.Profile()
-    profile.runcall(_trace, whole, every)
+    profile.runcall(diagnose, whole, Settings(), 1)
     stats = pstats.Stats(profile).stats
     spent = sum(own for (file, _, _), (_, _, own, _, _) in stats.items() if any(part in file for part in ALGEBRA))
     total = sum(own for _, _, own, _, _ in stats.values())
@@ -99,9 +96,3 @@ def _case(folder, poses):
     campaign = replace(campaign, readings=split(campaign)[0])
     sites = sites_of(campaign.robot)
     return Case(campaign, averaged(campaign.readings), declared_model(campaign), candidates_on(sites))
-
-
-def _trace(case, candidates):
-    noise = noise_from(noise_of(case))
-    declared = fit(case.model, case.observations, noise)
-    return search(declared, case.observations, candidates, REPLICATES, np.random.default_rng(1))

@@ -394,6 +394,26 @@ def test_ordinary_fits_converge(fanuc):
     assert fit(model, seen, NOISE).converged
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_fit_converges_where_readings_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed):
+    """As on a real robot with a good tracker: three reflectors, joints that repeat badly, a law of gravity that is left out."""
+    targets = tuple(Target(name, "6DoF", None) for name in "ABC")
+    true = model_of(fanuc, "joint_offset@2", "joint_offset@3", "link_geometry@3", "link_weight@2", targets=targets)
+    states = replace(made_states(6, 24, seed=(70, seed)), repeats=np.full(24, 10))
+    estimate = made_estimate(true, seed=seed, size=1.0)
+    seen = with_noise(seen_exactly(true, estimate, states), np.random.default_rng((71, seed)), position_m=20e-6)
+    model = replace(true, effects=true.effects[:-1])
+    noise = Noise("declared", 6e-6, 6e-6, 1e-6 * np.array([40.0, 15, 15, 1, 45, 220]))
+    found = fit(model, seen, noise)
+    # In standard deviations.
+    assert np.sqrt((found.whitener.apply(found.residual) ** 2).mean()) > 5.0
+    assert found.converged
+    again = fit(model, seen, noise, found.estimate)
+    moved = np.concatenate(again.estimate.coefficients) - np.concatenate(found.estimate.coefficients)
+    deviation = np.sqrt(np.diag(again.covariance))[-len(moved) :]
+    assert (np.abs(moved) <= 0.1 * deviation).all()
+
+
 def test_an_error_of_the_pose_counts_once_for_all_its_readings(fanuc):
     """Two loads and two targets a pose: estimate and covariance are those of statsmodels with the covariance written out."""
     model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)

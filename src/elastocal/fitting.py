@@ -191,27 +191,29 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
 
 
 def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False):
-    """Gauss-Newton steps on Huber's objective by iteratively reweighted least squares, each halved until it does not rise.
+    """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
 
-    The step minimises a bound of the objective that touches it at the present estimate (Huber and Ronchetti 2009, 7.8), so that
-    without curvature it never rises; against curvature it is backtracked (Nocedal and Wright 2006, 3.1). The first step gives
-    all observations one weight, unless the start comes of reweighted steps already.
+    Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
+    (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where readings have errors in common there is none: weights
+    come before whitening, which would carry an outlier into the readings beside it, and the estimate solves the weighted
+    equations (Preisser and Qaqish 1999). Against curvature a step is backtracked (Nocedal and Wright 2006, 3.1). The first step
+    gives all observations one weight, unless the start comes of reweighted steps already.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
-    plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
+    # What has a prior need not be held: where the data cannot tell it, the prior does.
+    plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
     bending, bounds = bends(model, estimate), limits(model, estimate)
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
-    def objective(estimate, distance):
-        """Half the squared distances, those of outliers counted linearly, and half the squares of what has a prior."""
-        lost = distance**2 / 2 if scale is None else scale**2 * norm.rho(distance / scale)
-        return rows * lost.sum() + 0.5 * penalty @ parameter_values(model, estimate) ** 2
+    def objective(estimate, squares):
+        """Half the weighted squares of the residual and of what has a prior."""
+        return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
-    converged, scale = False, None
+    converged, scale, last = False, 1.0, np.zeros(len(plausible))
     readings = _Parts(model, observations, noise, around, plausible)
     readings.linearize(estimate)
     for step_number in range(_STEPS):
@@ -232,21 +234,27 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
             step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, bending)[0]
             step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
-        converged = bool(step_number or reweighted) and bool((np.abs(step) <= _SETTLED * deviation + (deviation == 0)).all())
+        # Standard errors of the errors that are there, which the noise may be less than.
+        settled = _SETTLED * (scale * deviation) + (deviation == 0)
+        converged = bool(step_number or reweighted) and bool((np.abs(step) <= settled).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break
+        # Weights and whitening follow the estimate. Where they throw it to and fro, half the way lies between (relaxation of a
+        # fixed-point iteration): a step that takes back more than half of the last one is halved.
+        first = int(gram @ (step / plausible + last / 2) @ last < 0)
+        last = step / plausible
         # Twice the fall that a parabola promises.
         slope = along @ (step / plausible) - penalty @ (present * step)
-        before, origin = objective(estimate, readings.distance()), estimate
-        for halving in range(_HALVINGS + 1):
+        before, origin = objective(estimate, readings.squares(weights)), estimate
+        for halving in range(first, _HALVINGS + 1):
             estimate = stepped(model, origin, 0.5**halving * step)
             readings.linearize(estimate)
-            after = objective(estimate, readings.distance())
+            after = objective(estimate, readings.squares(weights))
             least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
-            if after > before - least and not halving:
+            if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
-                before = objective(origin, readings.distance_at(origin))
+                before = objective(origin, readings.squares(weights, origin))
             if after <= before - least:
                 break
         else:
@@ -325,12 +333,15 @@ class _Parts:
 
     def distance(self):
         """Whitened distance of each observation from the prediction, ndarray (M,)."""
-        return self._distance(self.residual)
+        return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
 
-    def distance_at(self, estimate):
-        """The same of another estimate."""
-        found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
-        return self._distance(np.concatenate(found))
+    def squares(self, weights, estimate=None):
+        """Sum of squares of the whitened residual, each observation weighted as in `normal_equations`; of another estimate."""
+        residual = self.residual
+        if estimate is not None:
+            found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
+            residual = np.concatenate(found)
+        return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
 
     def fit(self, estimate, held, covariance, weights, converged):
         """The `Fit` of these readings."""
@@ -368,12 +379,9 @@ class _Parts:
         self.whiteners[number] = whitening(part, jacobian, self.noise)
         return line
 
-    def _distance(self, residual):
-        found = [
-            (whitener.apply(residual[seen]) ** 2).mean(axis=1)
-            for whitener, (_, seen) in zip(self.whiteners, self.slices, strict=True)
-        ]
-        return np.sqrt(np.concatenate(found))
+    def _whitened(self, residual):
+        pairs = zip(self.whiteners, self.slices, strict=True)
+        return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):

@@ -7,8 +7,9 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis.averaging import Averaged
-from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries
+from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.model import predict
 
 WORDS = {
     ("joint_offset", (3,)): "joint 3",
@@ -54,7 +55,8 @@ def with_value(fitted, key, value, error):
 def test_parameters_have_their_values_errors_and_priors(found):
     fitted, _ = found
     fitted = with_value(fitted, "joint_offset@3", 3e-4, 2e-5)
-    (entry,) = parameter_entries(next(e for e in fitted.model.effects if e.key == "joint_offset@3"), fitted, Averaged({}, {}))
+    effect = next(effect for effect in fitted.model.effects if effect.key == "joint_offset@3")
+    (entry,) = parameter_entries(effect, fitted, Averaged({}, {}))
     assert entry == {
         "name": "joint_offset@3 offset",
         "value": pytest.approx(3e-4),
@@ -63,6 +65,60 @@ def test_parameters_have_their_values_errors_and_priors(found):
         "prior_std": None,
         "held": False,
     }
+    # What other models say moves the value and widens its error.
+    name = ("joint_offset@3", "offset")
+    (entry,) = parameter_entries(effect, fitted, Averaged({name: 1e-5}, {name: 4e-5}))
+    assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5
+
+
+def declared_springs(fitted, compliance):
+    """The same fit of a campaign that takes the compliances from the robot file."""
+    kept = [n for n, effect in enumerate(fitted.model.effects) if effect.effect != "joint_compliance"]
+    free = np.array([owner != "joint_compliance" for owner, _ in fitted.parameters])
+    return replace(
+        fitted,
+        model=replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept), nominal_compliance=compliance),
+        estimate=replace(
+            fitted.estimate,
+            coefficients=tuple(fitted.estimate.coefficients[n] for n in kept),
+            shapes=tuple(fitted.estimate.shapes[n] for n in kept),
+        ),
+        covariance=fitted.covariance[np.ix_(free, free)],
+        held=fitted.held[free],
+    )
+
+
+def test_no_mass_is_told_where_the_compliances_are_not_identified(found):
+    fitted, entries = found
+    heavy = with_value(fitted, "payload", 24.4, 0.9)
+    payload = next(effect for effect in heavy.model.effects if effect.key == "payload")
+    assert parameter_entries(payload, heavy, Averaged({}, {}))[0]["unit"] == "kg"
+    taken = declared_springs(heavy, 1e-6 * np.array([20.0, 8.0, 3.0, 2.0, 2.0, 2.0]))
+    # Weight cannot turn the first joint, however soft it is.
+    first, *others = parameter_entries(payload, taken, Averaged({}, {}))
+    assert first["name"] == "payload compliance_of_joint_2_times_mass"
+    assert (first["value"], first["std_error"]) == pytest.approx((8e-6 * 24.4, 8e-6 * 0.9))
+    assert [entry["unit"] for entry in (first, *others)] == ["rad kg/(N m)", *["rad kg m/(N m)"] * 3]
+    assert not any("rated payload" in warning for warning in implausible(taken, entries, rated_kg=3.0))
+
+
+def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, kuka):
+    campaign = planted(kuka, {}, seed=1)
+    fitted, _ = found
+    payload = next(effect for effect in fitted.model.effects if effect.key == "payload")
+    heavy = with_value(fitted, "payload", 20.0, 1.0)
+    assert sag_entries("payload", [payload], heavy, campaign.observations) == []
+    taken = declared_springs(heavy, kuka.compliance)
+    (entry,) = sag_entries("payload", [payload], taken, campaign.observations)
+    # Predictions with and without the mass, by the exact kinematics.
+    around = taken.circumstances
+    light = with_value(taken, "payload", 0.0, 1.0)
+    positions = [predict(each.model, each.estimate, campaign.observations, around)[0] for each in (taken, light)]
+    largest = np.linalg.norm(positions[0] - positions[1], axis=1).max()
+    assert entry["unit"] == "m" and entry["value"] == pytest.approx(largest, rel=0.02)
+    assert entry["std_error"] == pytest.approx(entry["value"] / 20.0, rel=1e-3)
+    tilt = next(effect for effect in fitted.model.effects if effect.key == "joint_tilt@2")
+    assert sag_entries("joint_tilt", [tilt], taken, campaign.observations) == []
 
 
 def test_nothing_is_implausible_about_values_within_their_limits(found):

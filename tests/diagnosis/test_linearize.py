@@ -100,6 +100,18 @@ def test_declared_geometry_has_the_size_that_the_readings_make_most_probable(off
     assert alone.declared_size == 1.0 and declared_geometry(campaign.declared.model) == set()
 
 
+@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
+def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
+    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
+    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
+    campaign = planted(kuka, {key: [1e-3 * (-1) ** n] for n, key in enumerate(keys)}, seed=2)
+    known = [campaign.candidates[key] for key in keys]
+    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
+    fitted = fit(model, campaign.observations, campaign.declared.noise.scaled(share), start)
+    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
+    assert found.declared_size == 1.0
+
+
 def test_the_competitor_is_at_every_joint_and_at_the_base_always(campaign):
     found = problem_of(campaign, keys=KEYS[:1])
     places = [unit.location for unit in found.problem.units if unit.mechanism == OTHER]

@@ -85,6 +85,21 @@ def test_mean_square_left_is_that_of_the_penalised_fit(found):
     assert 0.7 < mean_square_left(problem, model) < 1.3
 
 
+@pytest.mark.parametrize("times", [0.5, 1.0, 4.0])
+def test_remaining_noise_does_not_depend_on_the_noise_by_which_the_problem_was_whitened(found, times):
+    """Where the readings leave more than the least noise, and else the least; readings scatter by 1.3 and 0.65 of it."""
+    _, declared, line, models = found
+    problem, least = line.problem, declared.noise
+    for spread in (1.3, 0.65):
+        share = (spread / times) ** 2 / mean_square_left(problem, models.models[0])
+        scaled = replace(
+            problem.statistics, squares=share * problem.statistics.squares, along=share**0.5 * problem.statistics.along
+        )
+        left = remaining_noise(replace(problem, statistics=scaled), models.models[0], least.scaled(times), least)
+        assert left.position_m == pytest.approx(max(spread, 1.0) * least.position_m)
+        np.testing.assert_allclose(left.joint_rad, max(spread, 1.0) * least.joint_rad)
+
+
 @pytest.mark.parametrize("factor", [0.25, 1.0, 9.0])
 def test_remaining_noise_is_at_least_the_noise(found, factor):
     _, declared, line, models = found
@@ -94,7 +109,7 @@ def test_remaining_noise_is_at_least_the_noise(found, factor):
     )
     problem = replace(problem, statistics=scaled)
     model = replace(models.models[0], pose_error_rad=problem.statistics.pose_error_rad[2])
-    left = remaining_noise(problem, model, declared.noise)
+    left = remaining_noise(problem, model, declared.noise, declared.noise)
     expected = np.sqrt(max(mean_square_left(problem, model), 1.0))
     assert left.position_m == pytest.approx(expected * declared.noise.position_m)
     assert left.position_m >= declared.noise.position_m

@@ -122,9 +122,9 @@ def diagnose(case, settings, seed, progress=None):
 
 
 def _explained(case, declared, settings, seed, tell):
-    """Evidence about the declared model, and again about the model found where that is far from it."""
+    """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
-    about, before = declared, ()
+    about, before = declared, None
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
@@ -133,17 +133,17 @@ def _explained(case, declared, settings, seed, tell):
         conclusion = concluded(problem.problem, found, alarm)
         evidence = Evidence(problem, found, nothing, alarm, conclusion)
         tell(_told(conclusion, alarm))
-        if not conclusion.best.named:
-            return evidence, declared
-        model = found.models[conclusion.best.model]
-        noise = remaining_noise(problem.problem, model, declared.noise)
-        final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
-        as_promised = abs(mean_square(final) - 1.0) < settings.linear_misfit
-        if as_promised or conclusion.best.named == before or alarm.statistic < settings.relinearize_above:
+        named, taken = conclusion.best.named, about.noise
+        model = found.models[conclusion.best.model] if named else nothing
+        noise = remaining_noise(problem.problem, model, taken, declared.noise)
+        off = noise.position_m > settings.relinearize_noise * taken.position_m
+        if named or off:
+            about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
+        small = not named or alarm.statistic < settings.relinearize_above
+        if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
             break
-        before = conclusion.best.named
-        about = replace(final, noise=noise)
-    return evidence, final
+        before = named
+    return evidence, final if named else declared
 
 
 def _effect_steps(case, declared, final, found):
@@ -172,7 +172,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
-        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages)
+        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
     said += fitted_compliance_warnings(final)

@@ -2,14 +2,20 @@
 
 import numpy as np
 
+from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
+from elastocal.effects.protocol import lever_m
+from elastocal.model import effect_columns
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
 # Standard errors beyond which a value is taken at its word, and times the plausible size that no machine reaches.
 _SURE, _IMPLAUSIBLE = 2.0, 3.0
+# Units of masses and first moments, and of their products with a compliance; what of an entry goes with them.
+_OF_MASS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
+_SCALED = ("value", "std_error", "prior_std")
 
 
 def location_words(mechanism, location):
@@ -59,7 +65,7 @@ def probability_facts(problem, posterior, conclusion, alarm):
     }
 
 
-def effect_entries(problem, posterior, conclusion, alarm, final, averages):
+def effect_entries(problem, posterior, conclusion, alarm, final, averages, observations):
     """Entries of the effects found, those of the most probable mechanisms first.
 
     Parameters
@@ -72,16 +78,20 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages):
         Of the most probable model.
     averages : Averaged
         What the other models add to it.
+    observations : Observations
+        To which it was fitted.
 
     Returns
     -------
     list of dict
     """
-    units = [problem.units[n] for n in posterior.models[conclusion.best.model].units] if conclusion.best.named else []
+    numbers = posterior.models[conclusion.best.model].units if conclusion.best.named else ()
+    units = [problem.units[number] for number in numbers]
     entries = []
     for name in sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]):
         members = [unit.candidate for unit in units if unit.mechanism == name]
         where = location_probabilities(problem, posterior, name)
+        values = [entry for member in members for entry in parameter_entries(member, final, averages)]
         entries.append(
             {
                 "name": name,
@@ -94,18 +104,28 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages):
                     for place, value in where.items()
                     if value >= _LEAST_LISTED
                 ],
-                "parameters": [entry for member in members for entry in parameter_entries(member, final, averages)],
+                "parameters": values + sag_entries(name, members, final, observations),
                 "p_value": alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),
-                "angle_to_nearest_deg": None,
+                "angle_to_nearest_deg": _angle_to_nearest(problem, [n for n in numbers if problem.units[n].mechanism == name]),
             }
         )
     return entries
 
 
+def _angle_to_nearest(problem, found):
+    """Angle of what was found of a mechanism to the nearest candidate of another one; None where there is no other."""
+    mechanism = problem.units[found[0]].mechanism
+    others = [unit.mechanism not in (mechanism, OTHER) for unit in problem.units]
+    return float(nearest_angles(problem, found)[others].min()) if any(others) else None
+
+
 def parameter_entries(member, final, averages):
     """Parameters and shapes of one candidate in a fit.
+
+    How far springs of unknown compliance sag does not tell a mass. Where the compliances are those of the robot
+    file, a mass is given as its product with that of the joint that it turns most, which readings tell.
 
     Parameters
     ----------
@@ -120,7 +140,7 @@ def parameter_entries(member, final, averages):
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
     mine = np.flatnonzero([owner == member.key for owner, _ in final.parameters])
     values = np.concatenate(final.values_of(member.key))
-    return [
+    entries = [
         {
             "name": f"{member.key} {parameter.name}",
             "value": float(value) + averages.shift.get((member.key, parameter.name), 0.0),
@@ -131,6 +151,50 @@ def parameter_entries(member, final, averages):
         }
         for parameter, value, index in zip((*effect.parameters, *effect.shapes), values, mine, strict=True)
     ]
+    told = final.model.identifies_compliance or member.family != "gravity"
+    return entries if told else [_product(entry, final.model) if entry["unit"] in _OF_MASS else entry for entry in entries]
+
+
+def _product(entry, model):
+    """The entry of a mass, or of a first moment, times the compliance of the joint that a weight at the end turns most."""
+    sites, compliance = model.sites, model.nominal_compliance
+    turned = [c * lever_m(sites, j) if sites.carried_links(j) else 0.0 for j, c in enumerate(compliance)]
+    joint = int(np.argmax(turned))
+    owner, name = entry["name"].rsplit(" ", 1)
+    scaled = {key: None if entry[key] is None else float(compliance[joint] * entry[key]) for key in _SCALED}
+    return entry | scaled | {"name": f"{owner} compliance_of_joint_{joint + 1}_times_{name}", "unit": _OF_MASS[entry["unit"]]}
+
+
+def sag_entries(name, members, final, observations):
+    """How far weight lets a target sag at most, where the readings tell no masses.
+
+    Parameters
+    ----------
+    name : str
+        Of the effect.
+    members : sequence of Candidate
+        At all of its locations.
+    final : Fit
+    observations : Observations
+        To which it was fitted.
+
+    Returns
+    -------
+    list of dict
+        One entry, in m; none where the effect is not of gravity, or where its masses can be told.
+    """
+    if members[0].family != "gravity" or final.model.identifies_compliance or final.circumstances is None:
+        return []
+    jacobian = final.joint_jacobian[:, :3]
+    columns = effect_columns([(member, ()) for member in members], final.circumstances, jacobian, observations.state)
+    owners = [owner for owner, _ in final.parameters]
+    mine = np.concatenate([np.flatnonzero([owner == member.key for owner in owners]) for member in members])
+    sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])
+    most = int(np.argmax((sag**2).sum(axis=1)))
+    size = float(np.linalg.norm(sag[most]))
+    along = sag[most] @ columns[most] / max(size, np.finfo(float).tiny)
+    error = float(np.sqrt(along @ final.covariance[np.ix_(mine, mine)] @ along))
+    return [{"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None, "held": False}]
 
 
 def fault_entry(fault):
@@ -171,7 +235,7 @@ def implausible(final, entries, rated_kg=None):
     entries : sequence of dict
         Of `effect_entries`.
     rated_kg : float, optional
-        Payload for which the robot is rated.
+        Payload for which the robot is rated; looked at where the compliances are identified, without which no mass is.
 
     Returns
     -------
@@ -189,6 +253,7 @@ def implausible(final, entries, rated_kg=None):
                 found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
             if abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error:
                 found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
-            if rated_kg is not None and parameter.unit == "kg" and value - _SURE * error > rated_kg:
+            weighed = parameter.unit == "kg" and final.model.identifies_compliance
+            if rated_kg is not None and weighed and value - _SURE * error > rated_kg:
                 found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
     return found

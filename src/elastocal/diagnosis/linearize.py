@@ -6,7 +6,6 @@ import numpy as np
 from scipy.stats import chi2
 
 from elastocal.diagnosis import other
-from elastocal.diagnosis.evidence import log_likelihood
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors
 from elastocal.diagnosis.statistics import products_of, statistics_of
@@ -152,6 +151,8 @@ def has_prior(fitted):
 def declared_size(fitted, parameters, owners, triangle, count, present, settings):
     """Size of declared geometry that makes the readings most probable (type II maximum likelihood, one number for all of it).
 
+    At the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the readings.
+
     Parameters
     ----------
     triangle : ndarray (P + 1, P + 1)
@@ -167,13 +168,14 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
     if not declared_geometry(fitted.model):
         return 1.0
     best = (-np.inf, 1.0)
+    spread = max(abs(triangle[-1, -1]) / np.sqrt(max(count - len(parameters), 1)), 1.0)
     for size in settings.declared_sizes:
         deviation = prior_deviations(fitted, parameters, owners, size)
-        rows = np.concatenate([triangle[:, :-1] * deviation, np.eye(len(deviation))])
-        right = np.concatenate([triangle[:, -1], -present / deviation])
+        rows = np.concatenate([triangle[:, :-1] * deviation / spread, np.eye(len(deviation))])
+        right = np.concatenate([triangle[:, -1] / spread, -present / deviation])
         basis, factor = np.linalg.qr(rows)
         squares = right @ right - ((basis.T @ right) ** 2).sum()
-        evidence = log_likelihood(squares, count) - np.log(np.abs(np.diag(factor))).sum()
+        evidence = -0.5 * squares - np.log(np.abs(np.diag(factor))).sum()
         best = max(best, (float(evidence), size))
     return best[1]
 

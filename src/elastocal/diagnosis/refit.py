@@ -133,21 +133,25 @@ def mean_square(fitted):
     return float(squares / (white.size - (~known & ~fitted.held).sum()))
 
 
-def remaining_noise(problem, model, noise):
-    """Noise as a model leaves it: at least the noise that repeats or the campaign say.
+def remaining_noise(problem, model, taken, least):
+    """Noise as a model leaves it.
 
     Parameters
     ----------
     problem : Problem
     model : search.Model
-    noise : Noise
+    taken : Noise
+        By which the problem was whitened.
+    least : Noise
+        That repeats or the campaign say, below which it does not fall.
 
     Returns
     -------
     Noise
     """
-    factor = float(np.sqrt(max(mean_square_left(problem, model), 1.0)))
-    return replace(noise.scaled(factor), pose_rad=factor * model.pose_error_rad)
+    left = mean_square_left(problem, model)
+    factor = float(np.sqrt(max(left * (taken.position_m / least.position_m) ** 2, 1.0)))
+    return replace(least.scaled(factor), pose_rad=float(np.sqrt(max(left, 1.0))) * model.pose_error_rad)
 
 
 def _with_prior(candidate, deviations):

@@ -67,6 +67,11 @@ class Settings:
         100.0,
         "log Bayes factor above which what is missing is so large that the problem is linearised again about what was found",
     )
+    relinearize_noise: float = _setting(
+        1.5,
+        "times the noise taken that a model leaves, above which the problem is whitened again by that: sizes of effects and of"
+        " errors are in units of the noise taken, so that plausible sizes mean nothing where it is far off",
+    )
     searched_observations: int = _setting(
         30_000,
         "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
