@@ -16,6 +16,7 @@ from elastocal.effects.protocol import at_states, with_springs
 from elastocal.model import (
     bends,
     circumstances,
+    displaced_coordinates,
     joint_compliances,
     limits,
     linearize,
@@ -274,8 +275,8 @@ def observations_at_once(rows, columns):
 class _Parts:
     """Readings beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
 
-    In parts that are not kept between steps, loads are taken where the robot yields to by the present estimate itself, and
-    whitening is that of the last step; where the noise has no part of the joints it is always the same.
+    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
+    are too many to keep their circumstances, the coordinates are kept at which loads are taken.
     """
 
     def __init__(self, model, observations, noise, around, plausible):
@@ -288,6 +289,7 @@ class _Parts:
         self.around = [around] if self.whole else [None] * len(self.parts)
         if not self.whole and around is not None:
             self.around = [at_states(around, states) for states, _ in self.slices]
+        self.coordinates = [None] * len(self.parts)
         self.whiteners = [None] * len(self.parts)
         joints = model.sites.joints
         self.jacobian = np.zeros((len(observations), observations.rows, joints))
@@ -368,11 +370,14 @@ class _Parts:
         kept = self.around[number]
         if kept is not None:
             return kept
-        return circumstances(self.model, estimate or self.estimate, self.parts[number].states)
+        return circumstances(self.model, estimate or self.estimate, self.parts[number].states, self.coordinates[number])
 
     def _linearized(self, number, part):
-        line = linearize(self.model, self.estimate, part, self._around(number))
-        if self.around[number] is not None:
+        around = self._around(number)
+        line = linearize(self.model, self.estimate, part, around)
+        if self.around[number] is None:
+            self.coordinates[number] = displaced_coordinates(self.model, self.estimate, around)
+        else:
             self.around[number] = line.circumstances
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
         self.jacobian[self.slices[number][1]] = jacobian
