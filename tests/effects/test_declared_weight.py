@@ -156,7 +156,7 @@ def test_torques_of_masses_are_slopes_of_the_gravity(fanuc):
 def test_priors_are_those_of_the_robot_file(fanuc):
     robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
     found = candidate(sites_of(robot)).parameters
-    # A centre is off by its relative error times its distance from the joint, or times the width of a link: 15 % of the arm.
+    # A centre is off by its relative error times its distance from the joint, or times the width of a link: a tenth of the arm.
     width = 0.1 * np.linalg.norm(sites_of(robot).link_vectors_m, axis=1).sum()
     assert 0.3 < width < 0.7
     first, second = (20.0 * max(0.5, width)), (10.0 * width)
