@@ -515,9 +515,10 @@ def _gain(gain):
 
 def _parameter_row(entry, members):
     # The longest, since keys may have blanks and one may begin another.
-    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default="")
-    name = words(entry["name"].removeprefix(f"{member} "))
-    where = f"{members_words([member])}: " if len(members) > 1 else ""
+    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default=None)
+    # What belongs to the effect as a whole, such as its largest sag, is no member's.
+    name = words(entry["name"].removeprefix(f"{member} ") if member else entry["name"].partition(" ")[2])
+    where = f"{members_words([member])}: " if member and len(members) > 1 else ""
     row = [where + name, *scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))
