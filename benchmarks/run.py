@@ -9,7 +9,7 @@ import tempfile
 from dataclasses import fields
 from pathlib import Path
 
-NAMES = ("kinematics", "identification", "study", "rerun", "scale", "loop")
+NAMES = ("kinematics", "identification", "study", "rerun", "scale", "loop", "large")
 REPORT = Path(__file__).resolve().parents[1] / "reports" / "benchmarks.csv"
 
 

@@ -16,6 +16,7 @@ from elastocal.effects.protocol import at_states, with_springs
 from elastocal.model import (
     bends,
     circumstances,
+    displaced_coordinates,
     joint_compliances,
     limits,
     linearize,
@@ -26,7 +27,7 @@ from elastocal.model import (
     stepped,
 )
 from elastocal.noise import Noise
-from elastocal.observations import part_at, parts_of, select_states, spread_poses
+from elastocal.observations import part_at, parts_of, sample_of
 from elastocal.registration import registered
 from elastocal.whitening import Whitening, whitening
 
@@ -46,6 +47,8 @@ _BOUND_TO_SHAPE = 0.5
 # Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
 # linearised again in each step.
 _MOST_HELD = 4_000_000
+# Observations of a part: what it makes stays in the processor's cache and is not asked of the system again and again.
+_MOST_AT_ONCE = 4000
 # States beyond which circumstances are not kept from step to step but found again: they take some ten kilobytes each.
 _MOST_STATES = 20_000
 # A fit to more observations starts from the fit to so many of them.
@@ -144,19 +147,14 @@ def fit(model, observations, noise, start=None):
     -------
     Fit
     """
-    some = spread_poses(observations, _MOST_STARTED_FROM)
-    if not some.all():
+    few = sample_of(observations, _MOST_STARTED_FROM)
+    if len(few) < len(observations):
         # Where all the readings lead is close to where some of them do.
-        few = select_states(observations, some)
-        start = fit(model, few, noise, start).estimate if _sees_all(observations, few) else start
+        start = fit(model, few, noise, start).estimate
+        around = _kept_circumstances(model, start, observations)
+        return _robustly(model, observations, around, noise, start, reweighted=True)
     start = registered(model, observations) if start is None else start
     return _robustly(model, observations, _kept_circumstances(model, start, observations), noise, start)
-
-
-def _sees_all(observations, few):
-    """Whether some of the observations have all sessions and targets of all."""
-    sessions = np.isin(observations.states.session, few.states.session).all()
-    return bool(sessions and np.isin(observations.target, few.target).all())
 
 
 def _kept_circumstances(model, estimate, observations):
@@ -193,13 +191,14 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
     return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
-def _robustly(model, observations, around, noise, estimate, frozen=False):
+def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False):
     """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
     (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where readings have errors in common there is none: weights
     come before whitening, which would carry an outlier into the readings beside it, and the estimate solves the weighted
-    equations (Preisser and Qaqish 1999). Against curvature a step is backtracked (Nocedal and Wright 2006, 3.1).
+    equations (Preisser and Qaqish 1999). Against curvature a step is backtracked (Nocedal and Wright 2006, 3.1). The first step
+    gives all observations one weight, unless the start comes of reweighted steps already.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
@@ -221,7 +220,7 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
     for step_number in range(_STEPS):
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
         readings.whiten()
-        if step_number:
+        if step_number or reweighted:
             distance = readings.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = norm.weights(distance / scale)
@@ -238,7 +237,7 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
         settled = _SETTLED * (scale * deviation) + (deviation == 0)
-        converged = bool(step_number) and bool((np.abs(step) <= settled).all())
+        converged = bool(step_number or reweighted) and bool((np.abs(step) <= settled).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break
@@ -270,27 +269,30 @@ def _robustly(model, observations, around, noise, estimate, frozen=False):
 
 def observations_at_once(rows, columns):
     """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
-    return max(_MOST_HELD // (rows * max(columns, 60)), 1)
+    return max(min(_MOST_HELD // (rows * max(columns, 60)), _MOST_AT_ONCE), 1)
 
 
 class _Parts:
     """Readings beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
 
-    In parts that are not kept between steps, loads are taken where the robot yields to by the present estimate itself, and
-    whitening is that of the last step; where the noise has no part of the joints it is always the same.
+    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
+    are too many to keep their circumstances, the coordinates are kept at which loads are taken.
     """
 
     def __init__(self, model, observations, noise, around, plausible):
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
-        self.slices = parts_of(observations, observations_at_once(observations.rows, len(plausible)))
+        held = observations.rows * len(observations) * max(len(plausible), 60) <= _MOST_HELD
+        most = len(observations) if held else observations_at_once(observations.rows, len(plausible))
+        self.slices = parts_of(observations, most)
         self.whole = len(self.slices) == 1 and around is not None
         self.parts = [observations] if self.whole else [part_at(observations, *edges) for edges in self.slices]
         self.around = [around] if self.whole else [None] * len(self.parts)
         if not self.whole and around is not None:
             self.around = [at_states(around, states) for states, _ in self.slices]
+        self.coordinates = [None] * len(self.parts)
         self.whiteners = [None] * len(self.parts)
         joints = model.sites.joints
-        self.jacobian = np.empty((len(observations), observations.rows, joints))
+        self.jacobian = np.zeros((len(observations), observations.rows, joints))
         self.line = None
 
     def linearize(self, estimate):
@@ -312,7 +314,10 @@ class _Parts:
             self.whiteners = [whitening(self.observations, self.jacobian, self.noise)]
         elif self.whiteners[0] is None:
             for number, part in enumerate(self.parts):
-                self._linearized(number, part)
+                if self.noise.pose_rad or self.noise.joint_rad.any():
+                    self._linearized(number, part)
+                else:
+                    self.whiteners[number] = whitening(part, self.jacobian[self.slices[number][1]], self.noise)
 
     def normal_equations(self, weights):
         """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
@@ -365,11 +370,14 @@ class _Parts:
         kept = self.around[number]
         if kept is not None:
             return kept
-        return circumstances(self.model, estimate or self.estimate, self.parts[number].states)
+        return circumstances(self.model, estimate or self.estimate, self.parts[number].states, self.coordinates[number])
 
     def _linearized(self, number, part):
-        line = linearize(self.model, self.estimate, part, self._around(number), exact_frames=True)
-        if self.around[number] is not None:
+        around = self._around(number)
+        line = linearize(self.model, self.estimate, part, around, exact_frames=True)
+        if self.around[number] is None:
+            self.coordinates[number] = displaced_coordinates(self.model, self.estimate, around)
+        else:
             self.around[number] = line.circumstances
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
         self.jacobian[self.slices[number][1]] = jacobian

@@ -156,7 +156,7 @@ def declared_model(campaign, effects=()):
     )
 
 
-def circumstances(model, estimate, states):
+def circumstances(model, estimate, states, coordinates=None):
     """What the effects of a model may depend on, in some states.
 
     Parameters
@@ -165,14 +165,16 @@ def circumstances(model, estimate, states):
     estimate : Estimate
         Its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are taken.
     states : States
+    coordinates : ndarray (S, C), optional
+        Where the robot has yielded to; found without.
 
     Returns
     -------
     Circumstances
     """
     compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span)
-    for _ in range(_PASSES):
+    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
+    for _ in range(_PASSES if coordinates is None else 0):
         around = at_coordinates(around, displaced_coordinates(model, estimate, around))
     return around
 

@@ -285,6 +285,25 @@ def spread_poses(observations, most):
     return chosen[pose]
 
 
+def sample_of(observations, most):
+    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target.
+
+    Parameters
+    ----------
+    observations : Observations
+    most : int
+
+    Returns
+    -------
+    Observations
+    """
+    if len(observations) <= most:
+        return observations
+    some = select_states(observations, spread_poses(observations, most))
+    sessions = np.isin(observations.states.session, some.states.session).all()
+    return some if sessions and np.isin(observations.target, some.target).all() else observations
+
+
 def _means(values, group):
     count = np.bincount(group)
     if len(count) == len(values):

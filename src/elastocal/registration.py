@@ -5,7 +5,10 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.kinematics import poses
 from elastocal.model import Estimate
+from elastocal.observations import sample_of
 
+# Of more observations than this a sample tells where a fit starts.
+_MOST = 50_000
 _ROUNDS = 200
 _SETTLED_M = 1e-9
 
@@ -23,6 +26,7 @@ def registered(model, observations):
     Estimate
         With all effects at zero, except that joint compliances start at their nominal values.
     """
+    observations = sample_of(observations, _MOST)
     chain, states = model.sites.chain, observations.states
     coordinates = np.zeros((len(states), chain.coordinates))
     coordinates[:, : model.sites.joints] = states.joint_angles

@@ -75,14 +75,14 @@ def test_the_most_probable_model_is_the_one_that_made_the_readings(signal, best)
 
 
 def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_shows():
-    """Columns that nearly cancel: each location alone explains a tenth of the residual."""
+    """Columns that nearly cancel, and a search that extends but the best model once: no single location leads there."""
     rows = made_rows(3, poses=14, candidates=6)
-    common = 4 * np.random.default_rng(4).standard_normal(len(rows.pose))
+    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
     candidates = rows.candidates.copy()
     candidates[:, :3] += np.outer(common, [1, 1, -2])
     rows = replace(rows, candidates=candidates, residual=rows.residual + candidates[:, :3].sum(axis=1))
     units = (*UNITS[:3], made_unit("tilt", (1,), 3), made_unit("tilt", (2,), 4))
-    problem, _ = made_problem(rows, units, tau=TAU)
+    problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
     assert posterior(problem)[0].models[0].units == (0, 1, 2)
 
 

@@ -85,6 +85,11 @@ def test_alternatives_beyond_the_credible_set_are_not_listed():
     assert found.verdict == CLASS and found.alternatives == {"offset": ("payload",)}
 
 
+def test_what_is_credible_is_counted_given_that_something_is_missing():
+    found = conclusion(((OFFSET_2,), 0.08), ((PAYLOAD,), 0.055), ((TILT,), 0.005))
+    assert found.verdict == CLASS and found.alternatives == {"offset": ("payload",)}
+
+
 def test_a_mechanism_beside_the_competitor_is_a_class_with_a_related_one():
     found = conclusion(((OFFSET_2, OTHER_1), 0.9), ((OFFSET_2,), 0.1))
     assert found.verdict == CLASS and found.best.named == ("offset",)

@@ -252,6 +252,13 @@ def test_hundreds_of_parameters_are_summarised():
     assert found["members"] == "joints 1, 2, 3, 4, 5 and 6: orders 1-2, orders 3-6, orders 7-12"
 
 
+def test_what_belongs_to_an_effect_as_a_whole_stands_without_a_member():
+    effect = effect_entry("link_weight", ("link_weight@2", "link_weight@3"), (2, 3), ("compliance_times_mass",))
+    effect["parameters"].insert(0, effect["parameters"][0] | {"name": "link_weight largest_sag", "unit": "m"})
+    names = [row[0] for row in effect_facts(effect)["parameters"]]
+    assert names[0] == "largest sag" and names[1].startswith("joint 2: ")
+
+
 def test_few_parameters_are_all_there_in_readable_units():
     assert effect_facts(effect_entry())["parameters"] == [["half play", "120.0 ± 3.0", "µrad", "measurements"]]
 

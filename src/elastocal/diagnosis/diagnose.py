@@ -9,7 +9,7 @@ from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting import fit
@@ -126,7 +126,7 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
-    about, before = declared, ((), np.inf)
+    about, before = declared, None
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
         found, nothing = posterior(problem.problem)
@@ -138,15 +138,13 @@ def _explained(case, declared, settings, seed, tell):
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else nothing
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
-        left = (noise.position_m / declared.noise.position_m) ** 2
         off = noise.position_m > settings.relinearize_noise * taken.position_m
-        settled = named == before[0] or abs(left / before[1] - 1.0) < settings.settled_misfit
-        last = not off and (settled or not named or alarm.statistic < settings.relinearize_above)
-        if named or not last:
+        if named or off:
             about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
-        if last:
+        small = not named or alarm.statistic < settings.relinearize_above
+        if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
             break
-        before = named, left
+        before = named
     if not named:
         final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
     return evidence, final

@@ -15,6 +15,7 @@ import numpy as np
 
 from elastocal.diagnosis.linearize import declared_geometry
 from elastocal.fitting import fit
+from elastocal.model import parameter_values
 
 
 @dataclass(frozen=True)
@@ -109,6 +110,27 @@ def mean_square_left(problem, model):
     along = deviations * statistics.along[place, columns]
     inner = deviations[:, None] * statistics.gram[place][np.ix_(columns, columns)] * deviations + np.eye(len(columns))
     return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
+
+
+def mean_square(fitted):
+    """Mean square of the whitened residual of an exact fit, over all that is left free, its priors included.
+
+    Parameters
+    ----------
+    fitted : Fit
+        With the noise that a linear problem promised to leave.
+
+    Returns
+    -------
+    float
+        1 where it left that.
+    """
+    white = fitted.whitened(fitted.residual)
+    squares, priors = (white**2).sum(), [parameter.prior_std for _, parameter in fitted.parameters]
+    values = parameter_values(fitted.model, fitted.estimate)
+    known = np.array([prior is not None for prior in priors], bool)
+    squares += sum((value / prior) ** 2 for value, prior in zip(values[known], np.array(priors)[known], strict=True))
+    return float(squares / (white.size - (~known & ~fitted.held).sum()))
 
 
 def remaining_noise(problem, model, taken, least):

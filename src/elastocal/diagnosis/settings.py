@@ -25,8 +25,8 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.003,
-        "prior probability of each mechanism; of 0.01, 0.005, 0.003 and 0.001 that whose statements fit 540 development cases",
+        0.03,
+        "prior probability of each mechanism; smaller ones name more, but what they state fits development cases less",
     )
     gravity_probability: float = _setting(
         0.5,
@@ -61,7 +61,7 @@ class Settings:
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
     testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
     linearizations: int = _setting(
-        3, "times that the problem is linearised, each about the model found before; the third moves no verdict"
+        2, "times that the problem is linearised at most, each about the model found before; a third moves no verdict"
     )
     relinearize_above: float = _setting(
         100.0,
@@ -77,10 +77,10 @@ class Settings:
         "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
     )
-    settled_misfit: float = _setting(
-        0.05,
-        "relative change of the mean square left below which, as where the mechanisms stay the same, no further linearisation"
-        " is made: less than the noise of most campaigns is known to",
+    linear_misfit: float = _setting(
+        0.02,
+        "relative difference between the mean square that an exact fit leaves and that which the linear problem promised, below"
+        " which the problem was linear enough: it changes the log likelihood of a hundred readings by one",
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")

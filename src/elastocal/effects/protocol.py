@@ -207,7 +207,8 @@ class Circumstances:
         sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
         masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
         centres = np.array([mass.centre_m for mass in sites.masses])
-        first = np.einsum("mijs,mj->mis", self._body_rotation, masses[:, None] * centres + corrections[:, 1:])
+        along, rotation = masses[:, None] * centres + corrections[:, 1:], self._body_rotation
+        first = sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
         first += masses[:, None, None] * self._body_position
         on_each = self._falling[0] * (self._behind @ masses)[:, None]
         for i in range(3):
@@ -309,7 +310,7 @@ def progress_of(states, row_span=None):
     return (place - first) / max(last - first, 1)
 
 
-def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None):
+def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None, coordinates=None):
     """What effects may depend on, in some states.
 
     Parameters
@@ -324,14 +325,16 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
         As in `Circumstances`; zero without.
     row_span : (int, int), optional
         As in `progress_of`.
+    coordinates : ndarray (S, C), optional
+        Where the robot has yielded to; the commanded poses without.
 
     Returns
     -------
     Circumstances
-        With loads at the commanded poses.
     """
-    coordinates = np.zeros((len(states), sites.chain.coordinates))
-    coordinates[:, : sites.joints] = states.joint_angles
+    if coordinates is None:
+        coordinates = np.zeros((len(states), sites.chain.coordinates))
+        coordinates[:, : sites.joints] = states.joint_angles
     return Circumstances(
         sites,
         np.asarray(compliance),

@@ -8,10 +8,10 @@ import numpy as np
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.faults.placement import IMPLAUSIBLE_M, robust_sigma, robustly_placed, single_observations, spread, trimmed_rms
 from elastocal.faults.protocol import Fault, Value
-from elastocal.fitting import fit
+from elastocal.fitting import fit, observations_at_once
 from elastocal.model import circumstances, declared_model, residuals
 from elastocal.noise import Noise
-from elastocal.observations import averaged
+from elastocal.observations import averaged, part_at, parts_of, select_states, spread_poses
 
 NAMES, FAMILY, AFTER = ("outliers",), "data", ("constant_columns", "alternatives", "loads", "shuffled_rows", "implausible")
 
@@ -23,6 +23,8 @@ _BULK, _BEYOND_BULK = 0.9, 3.0
 _FEWEST = 20
 # No sensor reads closer: smaller deviations are rounding.
 _FINEST = 1e-5
+# Readings that a fit needs at most to tell which others are far from it.
+_MOST_FITTED = 20_000
 # All readings count alike, whatever their noise.
 _ALIKE = 1e-3
 
@@ -46,9 +48,13 @@ def find(campaign, readings):
     sites = declared_model(campaign).sites
     model = declared_model(campaign, declared_candidates(campaign.declared, sites))
     noise = Noise("declared", _ALIKE, _ALIKE, np.zeros(campaign.robot.joints))
-    estimate = fit(model, averaged(readings), noise).estimate
-    single = single_observations(readings)
-    residual = residuals(model, estimate, single, circumstances(model, estimate, single.states))
+    some = averaged(readings)
+    some = select_states(some, spread_poses(some, _MOST_FITTED))
+    estimate, single = fit(model, some, noise).estimate, single_observations(readings)
+    residual = np.empty((len(readings), model.rows))
+    for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
+        part = part_at(single, states, seen)
+        residual[seen] = residuals(model, estimate, part, circumstances(model, estimate, part.states))
     far = np.zeros(len(readings), bool)
     for target in np.unique(readings.target):
         members = np.flatnonzero(readings.target == target)

@@ -13,6 +13,7 @@ from elastocal.diagnosis.words import (
     physical_name,
 )
 from elastocal.effects.catalogue import effects
+from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import (
     AT_FAULT,
     LEAST_SHOWN,
@@ -515,9 +516,11 @@ def _gain(gain):
 
 def _parameter_row(entry, members):
     # The longest, since keys may have blanks and one may begin another.
-    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default="")
-    name = words(entry["name"].removeprefix(f"{member} "))
-    where = f"{members_words([member])}: " if len(members) > 1 else ""
+    member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default=None)
+    # What belongs to an effect as a whole, such as its largest sag, is no member's; faults of the data have none.
+    owner = member or (effect_of(members[0]) if members else "")
+    name = words(entry["name"].removeprefix(f"{owner} "))
+    where = f"{members_words([member])}: " if member and len(members) > 1 else ""
     row = [where + name, *scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
         row[1] = grouped(int(entry["value"]))

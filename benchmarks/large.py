@@ -1,0 +1,120 @@
+"""The diagnosing engine in one process: a case of the blind proof, UR10 Series A, a million readings; growth.
+
+Each campaign is diagnosed and judged by a process of its own, from its folder to the verdict, which notes its peak memory at
+the end (Linux).
+"""
+
+import json
+import os
+import subprocess
+import sys
+from statistics import median
+
+from common import ROOT, Row
+
+from elastocal.blind.cases import SIZES, cases_of, make_case
+from elastocal.importers import ur10_ipa
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.defects import Defect, with_defects
+from elastocal.plant.folders import write_dynamic_campaign
+from elastocal.plant.physical_robot import specimen
+from elastocal.plant.weights import declared_masses
+from elastocal.public_data import FILES, FOLDER_VARIABLE
+
+ROBOTS = ROOT / "config" / "robots"
+CASES, SEED = 12, 2026
+CASE_S, PROOF_MIN, CORES = 0.7, 45.0, 2
+SERIES_A_S, SERIES_A_GB = 60.0, 1.0
+MILLION, MILLION_S, MILLION_GB = 1_000_000, 300.0, 2.0
+# Readings of the growth; the larger number twice the smaller.
+GROWTH = (20_000, 40_000)
+# What a process of its own does: campaigns one after the other, all candidates or every second one.
+SCRIPT = """
+import json, resource, sys, time
+from dataclasses import replace
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.settings import Settings
+from elastocal.loop.whole import cases_in
+
+robots, share, *folders = sys.argv[1:]
+seconds = []
+for folder in folders:
+    start = time.perf_counter()
+    training, held_out = cases_in(folder, robots)
+    kept = list(training.candidates.items())[:: int(share)]
+    judge(diagnose(replace(training, candidates=dict(kept)), Settings(), 1), held_out, 1)
+    seconds.append(time.perf_counter() - start)
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
+print(json.dumps({"seconds": seconds, "peak_gb": peak, "candidates": len(kept), "readings": len(training.observations)}))
+"""
+
+
+def rows(work):
+    """Rows of the report.
+
+    Parameters
+    ----------
+    work : Path
+        Temporary folder.
+    """
+    yield from _proof(work)
+    if os.environ.get(FOLDER_VARIABLE):
+        source = os.path.join(os.environ[FOLDER_VARIABLE], FILES["ur10_ipa_a"].local)
+        ur10_ipa.write_campaign(source, work / "series_a", "ur10_series_a")
+        how = "UR10 Series A, 11,911 poses, from its folder to its verdict, linear algebra on two threads"
+        yield from _limits("large ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
+    how = "a million readings of a tracker's dynamic mode, from the file to the verdict, linear algebra on two threads"
+    yield from _limits("large million", _dynamic(work, MILLION), MILLION_S, MILLION_GB, how)
+    yield from _growth(work)
+
+
+def _proof(work):
+    every = cases_of(SIZES["full"], SEED)
+    # Development cases: those of the proof stay unseen.
+    some = cases_of(SIZES["development"], SEED)[:CASES]
+    for case in some:
+        make_case(case, work / "blind", work / "sealed", ROBOTS)
+    # The first pays for the imports.
+    run = _run([work / "blind" / case.name for case in (some[0], *some)])
+    seconds = run["seconds"][1:]
+    typical = median(seconds)
+    how = f"median of {CASES} cases of the development set, diagnosed and judged in one process, one thread"
+    yield Row("large case", typical, CASE_S, typical / CASE_S, "<= 1", typical <= CASE_S, how)
+    minutes = sum(seconds) / CASES * len(every) / CORES / 60
+    how = f"minutes for the {len(every)} cases of the full proof on {CORES} cores at the mean of these, without making them"
+    yield Row("large proof", 60 * minutes, 60 * PROOF_MIN, minutes / PROOF_MIN, "<= 1", minutes <= PROOF_MIN, how)
+
+
+def _limits(name, folder, allowed_s, allowed_gb, how):
+    run = _run([folder], threads=CORES)
+    (seconds,), peak = run["seconds"], run["peak_gb"]
+    yield Row(f"{name} time", seconds, allowed_s, seconds / allowed_s, "<= 1", seconds <= allowed_s, how)
+    memory = f"peak of {peak:.2f} GB against {allowed_gb:g} GB: {how}"
+    yield Row(f"{name} memory", None, None, peak / allowed_gb, "<= 1", peak <= allowed_gb, memory)
+
+
+def _growth(work):
+    few, many = (_dynamic(work, readings) for readings in GROWTH)
+    small, large, half = _run([few]), _run([many]), _run([many], share=2)
+    for name, less, part in (("readings", small, "readings"), ("candidates", half, "candidates")):
+        (ours,), (theirs,) = large["seconds"], less["seconds"]
+        how = f"{large[part]} {name} against {less[part]}, the rest alike, from the file to the verdict"
+        yield Row(f"large {name} time", ours, theirs, ours / theirs, "", None, how)
+        ratio = large["peak_gb"] / less["peak_gb"]
+        yield Row(f"large {name} memory", None, None, ratio, "", None, f"peak of {large['peak_gb']:.2f} GB: {how}")
+
+
+def _dynamic(work, readings):
+    arm, folder = arm_from_file(ROBOTS / "fanuc.yaml"), work / f"dynamic{readings}"
+    robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
+    write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, readings, 4, declared_masses(arm))
+    return folder
+
+
+def _run(folders, threads=1, share=1):
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    environment = os.environ | dict.fromkeys(names, str(threads))
+    command = [sys.executable, "-c", SCRIPT, ROBOTS, str(share), *folders]
+    done = subprocess.run(list(map(str, command)), env=environment, check=True, capture_output=True, text=True)
+    return json.loads(done.stdout.splitlines()[-1])
