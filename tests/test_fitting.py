@@ -12,7 +12,7 @@ from support import OTHER_CHAINS, chain_of
 from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaign import Target
-from elastocal.fitting import fit, fit_frames, identifiable, solve_identifiable
+from elastocal.fitting import _Parts, fit, fit_frames, identifiable, solve_identifiable
 from elastocal.model import circumstances, linearize, parameters, residuals, stepped
 from elastocal.noise import Noise, reading_covariances
 
@@ -394,14 +394,15 @@ def test_ordinary_fits_converge(fanuc):
     assert fit(model, seen, NOISE).converged
 
 
+@pytest.mark.parametrize("rows", [3, 6])
 @pytest.mark.parametrize("seed", range(6))
-def test_fit_converges_where_readings_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed):
+def test_fit_converges_where_readings_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed, rows):
     """As on a real robot with a good tracker: three reflectors, joints that repeat badly, a law of gravity that is left out."""
     targets = tuple(Target(name, "6DoF", None) for name in "ABC")
-    true = model_of(fanuc, "joint_offset@2", "joint_offset@3", "link_geometry@3", "link_weight@2", targets=targets)
+    true = model_of(fanuc, "joint_offset@2", "joint_offset@3", "link_geometry@3", "link_weight@2", targets=targets, rows=rows)
     states = replace(made_states(6, 24, seed=(70, seed)), repeats=np.full(24, 10))
     estimate = made_estimate(true, seed=seed, size=1.0)
-    seen = with_noise(seen_exactly(true, estimate, states), np.random.default_rng((71, seed)), position_m=20e-6)
+    seen = with_noise(seen_exactly(true, estimate, states), np.random.default_rng((71, seed)), 20e-6, 20e-6)
     model = replace(true, effects=true.effects[:-1])
     noise = Noise("declared", 6e-6, 6e-6, 1e-6 * np.array([40.0, 15, 15, 1, 45, 220]))
     found = fit(model, seen, noise)
@@ -412,6 +413,29 @@ def test_fit_converges_where_readings_share_an_error_and_the_model_misses_far_mo
     moved = np.concatenate(again.estimate.coefficients) - np.concatenate(found.estimate.coefficients)
     deviation = np.sqrt(np.diag(again.covariance))[-len(moved) :]
     assert (np.abs(moved) <= 0.1 * deviation).all()
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_a_step_goes_by_the_slope_of_what_it_is_judged_by(fanuc, rows):
+    """Errors that differ much by direction, and residuals far beyond them: central differences of the weighted squares."""
+    model = model_of(fanuc, "joint_offset@2", "link_geometry@3", targets=TARGETS, rows=rows)
+    estimate = made_estimate(model, seed=80)
+    exact = seen_exactly(model, estimate, made_states(6, 12, seed=81))
+    seen = with_noise(exact, np.random.default_rng(82), 2e-3, 2e-3)
+    noise = Noise("declared", 5e-6, 1e-5, 1e-6 * np.array([40.0, 15, 15, 30, 45, 220]))
+    plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
+    readings = _Parts(model, seen, noise, circumstances(model, estimate, seen.states), plausible)
+    readings.linearize(estimate)
+    readings.whiten()
+    weights = np.random.default_rng(83).uniform(0.3, 1.0, len(seen))
+    gram, along = readings.normal_equations(weights)
+    for number, unit in enumerate(np.diag(1e-2 / np.sqrt(np.diag(gram)))):
+        ends = [readings.squares(weights, stepped(model, estimate, sign * unit * plausible)) for sign in (-1, 1)]
+        size = unit[number]
+        # Of what the residual and the sensitivity could make at most.
+        assert (ends[0] - ends[1]) / (4 * size) == pytest.approx(
+            along[number], abs=2e-5 * np.sqrt(gram[number, number] * readings.squares(weights))
+        )
 
 
 def test_an_error_of_the_pose_counts_once_for_all_its_readings(fanuc):

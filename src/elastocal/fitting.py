@@ -197,8 +197,10 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
     (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where readings have errors in common there is none: weights
     come before whitening, which would carry an outlier into the readings beside it, and the estimate solves the weighted
-    equations (Preisser and Qaqish 1999). Against curvature a step is backtracked (Nocedal and Wright 2006, 3.1). The first step
-    gives all observations one weight, unless the start comes of reweighted steps already.
+    equations (Preisser and Qaqish 1999). A whitening belongs to the axes in which a step begins: residuals after the step
+    are turned into these, or a fit would turn frame and robot together on and on. Against curvature a step is backtracked
+    (Nocedal and Wright 2006, 3.1). The first step gives all observations one weight, unless the start comes of reweighted
+    steps already.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
@@ -299,7 +301,7 @@ class _Parts:
         """Go to an estimate."""
         self.estimate = estimate
         if self.whole:
-            self.line = linearize(self.model, estimate, self.observations, self.around[0], exact_frames=True)
+            self.line = linearize(self.model, estimate, self.observations, self.around[0])
             self.residual = self.line.residual
         else:
             self.residual = np.concatenate(
@@ -308,6 +310,7 @@ class _Parts:
 
     def whiten(self):
         """Take loads and whitening at the present estimate."""
+        self.origin = self.estimate
         if self.whole:
             self.around = [self.line.circumstances]
             self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
@@ -327,7 +330,8 @@ class _Parts:
             line = self.line if self.whole else self._linearized(number, part)
             whitener, mine = self.whiteners[number], root[seen]
             right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
-            left = whitener.apply(line.sensitivities * mine[:, None, None]).reshape(len(right), -1)
+            left = _of_rotation_vectors(line.sensitivities, line.residual) * mine[:, None, None]
+            left = whitener.apply(left).reshape(len(right), -1)
             left *= self.plausible
             gram += left.T @ left
             along += left.T @ right
@@ -338,12 +342,23 @@ class _Parts:
         return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
 
     def squares(self, weights, estimate=None):
-        """Sum of squares of the whitened residual, each observation weighted as in `normal_equations`; of another estimate."""
+        """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
         residual = self.residual
         if estimate is not None:
             found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
             residual = np.concatenate(found)
+        residual = self._in_axes_of_step(residual, self.estimate if estimate is None else estimate)
         return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
+
+    def _in_axes_of_step(self, residual, estimate):
+        """A residual in the base axes of an estimate in those of the one by which it is whitened."""
+        turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
+        if (turn == np.eye(3)).all():
+            return residual
+        states, state = self.observations.states, self.observations.state
+        session = np.searchsorted(estimate.sessions, states.session[state])
+        vectors = residual.reshape(len(residual), -1, 3)
+        return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
 
     def fit(self, estimate, held, covariance, weights, converged):
         """The `Fit` of these readings."""
@@ -374,7 +389,7 @@ class _Parts:
 
     def _linearized(self, number, part):
         around = self._around(number)
-        line = linearize(self.model, self.estimate, part, around, exact_frames=True)
+        line = linearize(self.model, self.estimate, part, around)
         if self.around[number] is None:
             self.coordinates[number] = displaced_coordinates(self.model, self.estimate, around)
         else:
@@ -387,6 +402,15 @@ class _Parts:
     def _whitened(self, residual):
         pairs = zip(self.whiteners, self.slices, strict=True)
         return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
+
+
+def _of_rotation_vectors(sensitivities, residual):
+    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2)."""
+    if residual.shape[1] == 3:
+        return sensitivities
+    turned = sensitivities[:, 3:]
+    exact = turned + 0.5 * np.cross(residual[:, 3:, None], turned, axis=1)
+    return np.concatenate([sensitivities[:, :3], exact], axis=1)
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):

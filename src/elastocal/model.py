@@ -298,16 +298,13 @@ def residuals(model, estimate, observations, circumstances):
     return _differences(measured_in_base(estimate, observations), position, rotation)
 
 
-def linearize(model, estimate, observations, circumstances, exact_frames=False):
+def linearize(model, estimate, observations, circumstances):
     """Residuals of a model and their sensitivities.
 
     Parameters
     ----------
     model, estimate, observations, circumstances
         As in `predict`.
-    exact_frames : bool
-        Whether frames turn the measured positions, as a search for the minimum needs it, and not the predicted ones, by which a
-        design does not depend on the noise of its readings.
 
     Returns
     -------
@@ -333,8 +330,6 @@ def linearize(model, estimate, observations, circumstances, exact_frames=False):
     columns = []
     if model.fitted_frames:
         at_base = jacobian[..., list(model.sites.base)]
-        if exact_frames:
-            at_base = _turning_measured(at_base, residual)
         for session in estimate.sessions:
             in_session = observations.states.session[observations.state] == session
             columns.append(at_base * in_session[:, None, None])
@@ -515,17 +510,6 @@ def _differences(measured, position, rotation):
 def _points(model, estimate):
     points = [model.sites.chain.point(target.point) for target in model.targets]
     return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]
-
-
-def _turning_measured(at_base, residual):
-    """Shift and turn of the base: measured positions turn about it, which are the residual away from the predicted ones.
-
-    It matters where errors differ by direction: a residual along one in which they are large turns into one in which they are
-    small.
-    """
-    columns = at_base.copy()
-    columns[:, :3, 3:] += np.cross(np.eye(3), residual[:, None, :3]).transpose(0, 2, 1)
-    return columns
 
 
 def _target_columns(rotation, mask, rows):
