@@ -216,7 +216,7 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
         """Half the weighted squares of the residual and of what has a prior."""
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
-    converged, scale, last = False, 1.0, np.zeros(len(plausible))
+    converged, scale, last, stuck = False, 1.0, np.zeros(len(plausible)), False
     readings = _Parts(model, observations, noise, around, plausible)
     readings.linearize(estimate)
     for step_number in range(_STEPS):
@@ -263,9 +263,13 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
         else:
             estimate = origin
             readings.linearize(estimate)
-            # The first step has another objective than those that follow: all observations count alike.
-            if step_number:
+            # A step goes by the loads of the step before, and the first one by weights that are all alike: once more by those
+            # of now.
+            if stuck:
                 break
+            stuck = True
+            continue
+        stuck = False
     return readings.fit(estimate, held, covariance, weights, converged)
 
 
