@@ -53,18 +53,6 @@ def test_sensitivities_are_central_differences_of_the_residuals(case):
     np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-5)
 
 
-def test_frames_are_differentiated_exactly_however_far_readings_are_off(case):
-    model, estimate, seen = case
-    rng = np.random.default_rng(3)
-    seen = replace(seen, position=seen.position + 0.01 * rng.standard_normal(seen.position.shape))
-    around = circumstances(model, estimate, seen.states)
-    frames = [owner.startswith("frame ") for owner, _ in parameters(model, estimate)]
-    steps = np.diag(small_steps(model, estimate))
-    expected = slopes(model, estimate, seen, around, steps)[:, :3, frames]
-    found = (linearize(model, estimate, seen, around).sensitivities @ steps)[:, :3, frames]
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
-
-
 def test_residual_is_what_was_added_to_the_readings_seen_in_base_axes(case):
     model, estimate, seen = case
     around = circumstances(model, estimate, seen.states)

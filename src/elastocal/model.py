@@ -329,7 +329,7 @@ def linearize(model, estimate, observations, circumstances):
     jacobian = np.moveaxis(jacobian, -1, 0)
     columns = []
     if model.fitted_frames:
-        at_base = _frame_columns(jacobian[..., list(model.sites.base)], residual)
+        at_base = jacobian[..., list(model.sites.base)]
         for session in estimate.sessions:
             in_session = observations.states.session[observations.state] == session
             columns.append(at_base * in_session[:, None, None])
@@ -510,17 +510,6 @@ def _differences(measured, position, rotation):
 def _points(model, estimate):
     points = [model.sites.chain.point(target.point) for target in model.targets]
     return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]
-
-
-def _frame_columns(at_base, residual):
-    """Shift and turn of the base in the frame of a session: measured positions turn about it, not predicted ones.
-
-    The difference is that of the residual. It matters where errors differ by direction: the residual along one in which they
-    are large would turn into one in which they are small.
-    """
-    columns = at_base.copy()
-    columns[:, :3, 3:] += np.cross(np.eye(3), residual[:, None, :3]).transpose(0, 2, 1)
-    return columns
 
 
 def _target_columns(rotation, mask, rows):

@@ -31,7 +31,7 @@ class Params(dict):
 def test_a_campaign_ends_in_a_report(turned, kuka, config_folder, tmp_path):
     table = made_table(kuka, "made")
     folder = made_folder(tmp_path / "made", kuka, table=table | {"q3": turned * table["q3"]})
-    params = Params(seed=1, folder=folder.as_posix(), robots=(config_folder / "robots").as_posix())
+    params = Params(seed=1, states=4, folder=folder.as_posix(), robots=(config_folder / "robots").as_posix())
 
     def run(script, output, **more):
         job = {"input": Files(tmp_path, **more), "output": output, "params": params, "wildcards": Params(campaign="made")}

@@ -116,8 +116,10 @@ def diagnose(case, settings, seed, progress=None):
         found, final = None, declared
     else:
         found, final = _explained(case, declared, settings, seed, tell)
+        if not found.conclusion.best.named:
+            steps[-1] = replace(steps[-1], fitted=final)
         steps += _effect_steps(case, declared, final, found)
-    document = _document(case, declared, final, found, known, settings, warnings)
+    document = _document(case, noise, steps[1].fitted, final, found, known, settings, warnings)
     return Diagnosis(case, tuple(steps), found, document)
 
 
@@ -143,7 +145,9 @@ def _explained(case, declared, settings, seed, tell):
         if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
             break
         before = named
-    return evidence, final if named else declared
+    if not named:
+        final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
+    return evidence, final
 
 
 def _effect_steps(case, declared, final, found):
@@ -161,7 +165,7 @@ def _effect_steps(case, declared, final, found):
     return steps
 
 
-def _document(case, declared, final, found, known, settings, warnings):
+def _document(case, noise, declared, final, found, known, settings, warnings):
     listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
     decisive = [fault for fault in listed if fault["decisive"]]
     averages = _averages(declared, found) if found else Averaged({}, {})
@@ -175,7 +179,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found, found.nothing)
-    said += fitted_compliance_warnings(final)
+    said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
@@ -185,7 +189,7 @@ def _document(case, declared, final, found, known, settings, warnings):
         "verdict": verdict,
         "effects": entries,
         "probabilities": probabilities,
-        "noise": _noise_facts(declared.noise, final.noise),
+        "noise": _noise_facts(noise, final.noise),
         "misfit": misfit,
         "heldout": None,
         "compliance_urad_per_Nm": _compliances(declared, final, averages),
@@ -220,6 +224,14 @@ def _noise_facts(measured, left):
         "pose_rad": left.pose_rad,
         "factor": left.position_m / measured.position_m,
     }
+
+
+def _noise_warnings(measured, left, settings):
+    factor = left.position_m / measured.position_m
+    if factor < settings.relinearize_noise:
+        return []
+    said = "their repeats scatter" if measured.source == "repeats" else "the noise that is declared for them"
+    return [f"readings scatter about the model {factor:.2g} times as much as {said}"]
 
 
 def _averages(declared, found):

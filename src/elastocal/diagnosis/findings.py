@@ -104,7 +104,7 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages, obser
                     for place, value in where.items()
                     if value >= _LEAST_LISTED
                 ],
-                "parameters": values + sag_entries(name, members, final, observations),
+                "parameters": sag_entries(name, members, final, observations) + values,
                 "p_value": alarm.p_value,
                 "heldout_gain": None,
                 "alternatives": list(conclusion.alternatives[name]),

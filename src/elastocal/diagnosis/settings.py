@@ -25,8 +25,8 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.003,
-        "prior probability of each mechanism; of 0.01, 0.005, 0.003 and 0.001 that whose statements fit 540 development cases",
+        0.03,
+        "prior probability of each mechanism; smaller ones name more, but what they state fits development cases less",
     )
     gravity_probability: float = _setting(
         0.5,

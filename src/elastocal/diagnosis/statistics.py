@@ -16,6 +16,7 @@ References
 .. [1] Harville, D. A. (1977). Maximum likelihood approaches to variance component estimation. JASA 72, 320-338.
 """
 
+import contextlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -307,7 +308,9 @@ def _root(covariance, rows):
     """
     size = len(covariance)
     if rows > 2 * size:
-        return np.linalg.cholesky(covariance + _ROUNDING * np.eye(size))
+        # Where columns are alike, rounding may leave the difference of two products just below zero.
+        with contextlib.suppress(np.linalg.LinAlgError):
+            return np.linalg.cholesky(covariance + _ROUNDING * np.eye(size))
     values, vectors = np.linalg.eigh(covariance)
     kept = values > _ROUNDING * size
     return vectors[:, kept] * np.sqrt(values[kept])

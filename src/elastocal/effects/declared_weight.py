@@ -10,9 +10,9 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 EFFECT = "declared_weight"
-# A centre of mass is uncertain by its share of the width of a link, too, which is about a seventh of the arm's length (KUKA
-# KR 270: 0.4 m of 2.7 m): links that are short, or whose centre is stated on their line, have it somewhere in their housing.
-_WIDTH_OF_LENGTH = 0.15
+# A centre of mass is uncertain by its share of the width of a link, too, which is about a tenth of the arm's length (KUKA
+# KR 270: 0.3 m of 2.7 m): links that are short, or whose centre is stated on their line, have it somewhere in their housing.
+_WIDTH_OF_LENGTH = 0.1
 
 
 def candidate(sites):
