@@ -73,8 +73,8 @@ class Fit:
     whitener : Whitening
     residual : ndarray (M, rows)
         m and rad, base axes.
-    joint_jacobian : ndarray (M, rows, n)
-        Of each target with respect to the joints.
+    joint_jacobian : ndarray (M, rows, n) or None
+        Of each target with respect to the joints; None where there are too many to keep it.
     circumstances : Circumstances or None
         Of the states fitted; None where these are too many to keep it.
     converged : bool
@@ -127,9 +127,15 @@ class Fit:
                 around = circumstances(self.model, self.estimate, some.states)
             else:
                 around = at_states(self.circumstances, states)
-            plain = linearize(self.model, self.estimate, some, around).sensitivities
-            white = whitening(some, self.joint_jacobian[seen], self.noise)
-            yield seen, plain, white.apply(plain * np.sqrt(self.weights[seen])[:, None, None])
+            line = linearize(self.model, self.estimate, some, around)
+            white = whitening(some, self.jacobian_at(line, seen), self.noise)
+            yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+
+    def jacobian_at(self, line, seen):
+        """Jacobian of some observations with respect to the joints: as it was kept, or that of their `Linearization`."""
+        if self.joint_jacobian is None:
+            return line.coordinate_jacobian[..., : self.model.sites.joints]
+        return self.joint_jacobian[seen]
 
 
 def fit(model, observations, noise, start=None):
@@ -297,8 +303,9 @@ class _Parts:
             self.around = [at_states(around, states) for states, _ in self.slices]
         self.coordinates = [None] * len(self.parts)
         self.whiteners = [None] * len(self.parts)
-        joints = model.sites.joints
-        self.jacobian = np.zeros((len(observations), observations.rows, joints))
+        # Of so many states that circumstances are not kept neither is this.
+        shape = len(observations), observations.rows, model.sites.joints
+        self.jacobian = None if around is None else np.zeros(shape)
         self.line = None
 
     def linearize(self, estimate):
@@ -324,7 +331,7 @@ class _Parts:
                 if self.noise.pose_rad or self.noise.joint_rad.any():
                     self._linearized(number, part)
                 else:
-                    self.whiteners[number] = whitening(part, self.jacobian[self.slices[number][1]], self.noise)
+                    self.whiteners[number] = whitening(part, None, self.noise)
 
     def normal_equations(self, weights):
         """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
@@ -389,17 +396,25 @@ class _Parts:
         kept = self.around[number]
         if kept is not None:
             return kept
-        return circumstances(self.model, estimate or self.estimate, self.parts[number].states, self.coordinates[number])
+        states, coordinates = self.parts[number].states, None
+        if self.coordinates[number] is not None:
+            moved, displaced = self.coordinates[number]
+            coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
+            coordinates[:, moved] = displaced
+        return circumstances(self.model, estimate or self.estimate, states, coordinates)
 
     def _linearized(self, number, part):
         around = self._around(number)
         line = linearize(self.model, self.estimate, part, around)
         if self.around[number] is None:
-            self.coordinates[number] = displaced_coordinates(self.model, self.estimate, around)
+            displaced = displaced_coordinates(self.model, self.estimate, around)
+            moved = np.flatnonzero(displaced.any(axis=0))
+            self.coordinates[number] = moved, displaced[:, moved]
         else:
             self.around[number] = line.circumstances
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
-        self.jacobian[self.slices[number][1]] = jacobian
+        if self.jacobian is not None:
+            self.jacobian[self.slices[number][1]] = jacobian
         self.whiteners[number] = whitening(part, jacobian, self.noise)
         return line
 

@@ -252,7 +252,7 @@ class _Source:
         for states, seen in parts:
             some = part_at(self.observations, states, seen)
             line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.circumstances, states))
-            jacobian, root = fitted.joint_jacobian[seen], np.sqrt(fitted.weights[seen])
+            jacobian, root = fitted.jacobian_at(line, seen), np.sqrt(fitted.weights[seen])
             yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_readings), root)
 
     def declared_part(self, parts):
@@ -315,7 +315,8 @@ def selected(fitted, observations, chosen):
     elif not chosen.all():
         around = at_states(around, chosen)
     seen = chosen[observations.state]
-    parts = {name: getattr(fitted, name)[seen] for name in ("weights", "residual", "joint_jacobian")}
+    kept = {name: getattr(fitted, name) for name in ("weights", "residual", "joint_jacobian")}
+    parts = {name: None if values is None else values[seen] for name, values in kept.items()}
     return replace(fitted, circumstances=around, **parts), some
 
 

@@ -73,7 +73,7 @@ class Settings:
         " errors are in units of the noise taken, so that plausible sizes mean nothing where it is far off",
     )
     searched_observations: int = _setting(
-        30_000,
+        20_000,
         "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
     )
