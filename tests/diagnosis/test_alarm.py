@@ -10,7 +10,7 @@ from scipy.stats import binom
 from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.settings import Settings
 
 UNITS = (
@@ -111,6 +111,6 @@ def test_it_is_the_same_for_one_seed():
 
 def test_it_agrees_with_the_posterior_on_what_cannot_be_missed():
     problem, products = signalled(1.5)
-    found, nothing = posterior(problem)
+    found, (nothing, _) = posterior(problem), first_look(problem)
     assert alarm_of(problem, products, nothing.pose_error_rad, np.random.default_rng(9)).raised
     assert found.models[0].units == (2,)

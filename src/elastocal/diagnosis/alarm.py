@@ -88,7 +88,8 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
             log_prior = prior.log_odds_of([problem.units[number]])
             terms = []
-            for scale, log_weight in zip(grid.scales, grid.log_weights, strict=True):
+            weights = grid.of(problem.units[number])
+            for scale, log_weight in zip(grid.scales[np.isfinite(weights)], weights[np.isfinite(weights)], strict=True):
                 widened = 1.0 + scale**2 * values[:, place]
                 gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
                 occam = -0.5 * np.log(widened).sum(axis=1)[:, None]

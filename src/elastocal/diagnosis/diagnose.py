@@ -8,9 +8,9 @@ from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged
-from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting import fit
 from elastocal.hygiene import faults
@@ -44,15 +44,12 @@ class Evidence:
     ----------
     linearized : Linearized
     posterior : Posterior
-    nothing : search.Model
-        The declared model alone.
     alarm : Alarm
     conclusion : Conclusion
     """
 
     linearized: object
     posterior: object
-    nothing: object
     alarm: Alarm
     conclusion: object
 
@@ -129,14 +126,19 @@ def _explained(case, declared, settings, seed, tell):
     about, before = declared, None
     for round_number in range(settings.linearizations):
         problem = linearized(about, case.observations, candidates, settings)
-        found, nothing = posterior(problem.problem)
+        nothing, alone = first_look(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
+        # The alarm comes before the readings choose at which shapes to look more closely: it would no longer be exact.
+        closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
+        if closer:
+            problem = linearized(about, case.observations, candidates, settings, closer)
+        found = posterior(problem.problem)
         conclusion = concluded(problem.problem, found, alarm)
-        evidence = Evidence(problem, found, nothing, alarm, conclusion)
+        evidence = Evidence(problem, found, alarm, conclusion)
         tell(_told(conclusion, alarm))
         named, taken = conclusion.best.named, about.noise
-        model = found.models[conclusion.best.model] if named else nothing
+        model = found.models[conclusion.best.model] if named else found.nothing
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         if named or off:
@@ -178,7 +180,7 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
-        misfit = _misfit(found, found.nothing)
+        misfit = _misfit(found)
     said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
@@ -207,11 +209,11 @@ def _told(conclusion, alarm):
     return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
 
 
-def _misfit(found, nothing):
+def _misfit(found):
     """Mean square of the residual over that of the noise: declared, and with the most probable model."""
-    problem = found.linearized.problem
-    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.mechanisms else nothing
-    return {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)}
+    problem, models = found.linearized.problem, found.posterior.models
+    best = models[found.conclusion.best.model] if found.conclusion.best.mechanisms else found.posterior.nothing
+    return {"before": mean_square_left(problem, found.posterior.nothing), "after": mean_square_left(problem, best)}
 
 
 def _noise_facts(measured, left):
@@ -235,7 +237,7 @@ def _noise_warnings(measured, left, settings):
 
 
 def _averages(declared, found):
-    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.nothing
+    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.posterior.nothing
     owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
     return averaged(found.linearized, found.posterior, best, owners)
 

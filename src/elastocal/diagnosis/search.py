@@ -98,9 +98,14 @@ class Posterior:
     models: tuple
     probabilities: np.ndarray
 
+    @property
+    def nothing(self):
+        """The declared model alone."""
+        return next(model for model in self.models if not model.units)
 
-def single_log_bayes_factors(problem):
-    """Log Bayes factor of each unit alone against the declared model.
+
+def first_look(problem):
+    """The declared model alone, and each unit alone against it.
 
     Parameters
     ----------
@@ -108,10 +113,13 @@ def single_log_bayes_factors(problem):
 
     Returns
     -------
-    ndarray (number of units,)
+    nothing : Model
+    log_bayes_factors : ndarray (number of units,)
     """
-    met, prior = _Searcher(problem).met, problem.prior
-    return np.array([met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)])
+    searcher, prior = _Searcher(problem), problem.prior
+    met = searcher.met
+    single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
+    return searcher.measure(()), np.array(single)
 
 
 def posterior(problem):
@@ -123,15 +131,13 @@ def posterior(problem):
 
     Returns
     -------
-    posterior : Posterior
-    nothing : Model
-        The declared model alone.
+    Posterior
     """
     searcher = _Searcher(problem)
-    nothing = searcher.measure(())
+    searcher.measure(())
     searcher.start_from_whole_mechanisms()
     searcher.grow()
-    return searcher.weigh(), nothing
+    return searcher.weigh()
 
 
 def likely_pose_errors(statistics, units, settings):
@@ -151,7 +157,7 @@ def likely_pose_errors(statistics, units, settings):
     problem = Problem(statistics, tuple(units), None, settings)
     conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
     blocks = conditioned.blocks_of(units, range(len(units)))
-    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, len(units))
+    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, units)
     empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
     likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
     likely[0] = True
@@ -195,7 +201,7 @@ class _Searcher:
         deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
         conditioned = condition(self.statistics, columns, deviations, self.log_pose)
         blocks = conditioned.blocks_of(units, open_units)
-        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, len(units))
+        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, units)
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
         # What the sizes already in the model are worth as they are, against their average: the same for all extensions.

@@ -32,6 +32,9 @@ class Settings:
         0.5,
         "prior probability of link_weight where no masses are declared: every arm has weight; what is open is whether it shows",
     )
+    other_probability: float = _setting(
+        0.1, "prior probability of what the catalogue does not have: more than of any one mechanism, less than of all together"
+    )
     further_location: float = _setting(
         0.5, "ratio of the geometric prior on the number of locations of a mechanism: one defect at five joints is one finding"
     )
@@ -52,9 +55,7 @@ class Settings:
     )
     pose_error_probability: float = _setting(0.5, "prior probability that the readings of a pose have an error in common")
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
-    other_features: int = _setting(
-        40, "random Fourier features at each joint; twice as many change no verdict of the development cases"
-    )
+    other_features: int = _setting(16, "random Fourier features of each law at each joint; few inputs need no more")
     named_probability: float = _setting(
         0.6, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
