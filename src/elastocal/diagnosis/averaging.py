@@ -74,6 +74,39 @@ def averaged(linearized, posterior, best, owners):
     return Averaged(shift, std_error)
 
 
+def expected_to_help(problem, posterior, model):
+    """Whether predictions are expected to be better with a model than without it, at poses like those of the readings.
+
+    With d the displacement that a model predicts and E d its mean over all models, the expected square of the error falls from
+    E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds d'd. Readings that were held out take no part.
+
+    Parameters
+    ----------
+    problem : Problem
+    posterior : Posterior
+    model : search.Model
+        Of the posterior.
+
+    Returns
+    -------
+    bool
+    """
+    gram = problem.statistics.gram[0]
+    mean, mine = np.zeros(len(gram)), _predicted(problem, model)
+    for other, probability in zip(posterior.models, posterior.probabilities, strict=True):
+        mean += probability * _predicted(problem, other)
+    return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
+
+
+def _predicted(problem, model):
+    """Coefficients of all columns in a model at its most probable sizes, in plausible sizes, ndarray (K,)."""
+    coefficients = np.zeros(problem.statistics.gram.shape[1])
+    units = [problem.units[number] for number in model.units]
+    for unit, (value, _) in zip(units, _coefficients(problem, units, model), strict=True):
+        coefficients[unit.columns] = value
+    return coefficients
+
+
 def _moments(linearized, model, equations, owners):
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, units = linearized.products, [linearized.problem.units[number] for number in model.units]

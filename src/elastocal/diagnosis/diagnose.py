@@ -7,7 +7,7 @@ import numpy as np
 from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
-from elastocal.diagnosis.averaging import Averaged, averaged
+from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
@@ -46,12 +46,15 @@ class Evidence:
     posterior : Posterior
     alarm : Alarm
     conclusion : Conclusion
+    adopted : bool
+        Whether the effects found enter the model.
     """
 
     linearized: object
     posterior: object
     alarm: Alarm
     conclusion: object
+    adopted: bool
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,8 @@ def diagnose(case, settings, seed, progress=None):
         found, final = _explained(case, declared, settings, seed, tell)
         if not found.conclusion.best.named:
             steps[-1] = replace(steps[-1], fitted=final)
-        steps += _effect_steps(case, declared, final, found)
+        if found.adopted:
+            steps += _effect_steps(case, declared, final, found)
     document = _document(case, noise, steps[1].fitted, final, found, known, settings, warnings)
     return Diagnosis(case, tuple(steps), found, document)
 
@@ -135,10 +139,11 @@ def _explained(case, declared, settings, seed, tell):
             problem = linearized(about, case.observations, candidates, settings, closer)
         found = posterior(problem.problem)
         conclusion = concluded(problem.problem, found, alarm)
-        evidence = Evidence(problem, found, alarm, conclusion)
-        tell(_told(conclusion, alarm))
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
+        adopted = bool(named) and expected_to_help(problem.problem, found, model)
+        evidence = Evidence(problem, found, alarm, conclusion, adopted)
+        tell(_told(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         if named or off:
@@ -156,8 +161,6 @@ def _effect_steps(case, declared, final, found):
     """One step for each mechanism, the most probable first, each with those before it."""
     conclusion = found.conclusion
     names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
-    if not names:
-        return []
     chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
     steps = [Step(f"+ {names[-1]}", "effect", final)]
     for number in range(len(names) - 1, 0, -1):
@@ -179,6 +182,9 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
+        entries = [entry | {"adopted": found.adopted} for entry in entries]
+        if entries and not found.adopted:
+            said.append("what was found is too uncertain to make predictions better: the model stays as declared")
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found)
     said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)

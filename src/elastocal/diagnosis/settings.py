@@ -33,7 +33,7 @@ class Settings:
         "prior probability of link_weight where no masses are declared: every arm has weight; what is open is whether it shows",
     )
     other_probability: float = _setting(
-        0.1, "prior probability of what the catalogue does not have: more than of any one mechanism, less than of all together"
+        0.05, "prior probability of what the catalogue does not have: more than of any one mechanism, less than of all together"
     )
     further_location: float = _setting(
         0.5, "ratio of the geometric prior on the number of locations of a mechanism: one defect at five joints is one finding"
