@@ -190,11 +190,10 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
 
 
 def smallest_shown(statistics, units, settings):
-    """Last size before each unit would be found with a power of one half, were it the only candidate.
+    """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction among all units reaches that where the non-centrality is the critical value. A smaller effect is
-    there or not, and the readings are the same: it counts as not there. One step of the sizes below is kept, between which and
-    the first that shows an effect can be seen, too.
+    there or not, and the readings are the same: it counts as not there.
 
     Parameters
     ----------
@@ -210,8 +209,7 @@ def smallest_shown(statistics, units, settings):
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
     largest = np.array([np.linalg.eigvalsh(gram)[-1] for gram in grams])
-    first = np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
-    return np.where(first < len(settings.scales), np.maximum(first - 1, 0), first)
+    return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,8 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.03,
-        "prior probability of each mechanism; smaller ones name more, but what they state fits development cases less",
+        0.02,
+        "prior probability of each mechanism, of which there are some thirty: what it states fits development cases best",
     )
     gravity_probability: float = _setting(
         0.5,
