@@ -3,8 +3,8 @@
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
 distribution is that of simulated readings of the same design, at the pose error that fits best, with the pose error averaged
 over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
-no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw. Sizes begin a step below
-those of the posterior: what lies between may be seen, and its probability does not matter to a test.
+no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw. Sizes begin a step
+below those of the posterior: what lies between may be seen, and its probability does not matter to a test.
 
 References
 ----------

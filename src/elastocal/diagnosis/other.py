@@ -3,9 +3,9 @@
 A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
 approximate Gaussian process. A function of everything at once would fit nothing better than chance does, so that each law has
 the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach; the angles of the
-joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features are multiplied by the
-load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a mechanism, that a *related*
-one acts. It names nothing and is not used to predict.
+joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features
+are multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a
+mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 References
 ----------
@@ -122,9 +122,9 @@ def _waves(inputs, load, count, draws, loaded):
 
 
 def _inputs(around, competitor, coordinate, campaign):
-    """Inputs of a law for one of its coordinates, each of size about one, ndarray (S, D): angles as points of a circle, others about their mean.
+    """Inputs of a law for one of its coordinates, each of size about one, ndarray (S, D).
 
-    What is constant or absent in the campaign is left out.
+    Angles as points of a circle, all about their mean. What is constant or absent in the campaign is left out.
     """
     parts = [_scaled(value(around), value(campaign)) for value in _INPUTS[competitor.law](coordinate, campaign)]
     return np.concatenate([np.zeros((len(around.joint_angles), 0)), *parts], axis=1)
