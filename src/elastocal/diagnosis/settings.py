@@ -57,7 +57,7 @@ class Settings:
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
     other_features: int = _setting(16, "random Fourier features of each law at each joint; few inputs need no more")
     named_probability: float = _setting(
-        0.6, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
+        0.65, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
     testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
