@@ -7,7 +7,7 @@ import numpy as np
 from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
-from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help
+from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
@@ -17,6 +17,9 @@ from elastocal.hygiene import faults
 from elastocal.loop.declared import estimated_noise
 from elastocal.model import joint_compliances
 from elastocal.random_streams import stream
+
+# Mechanisms that are added one at a time, each by a fit; of more, only the first.
+_MOST_STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -137,12 +140,10 @@ def _explained(case, declared, settings, seed, tell):
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
             problem = linearized(about, case.observations, candidates, settings, closer)
-        found = posterior(problem.problem)
+        found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        adopted = bool(named) and expected_to_help(problem.problem, found, model)
-        evidence = Evidence(problem, found, alarm, conclusion, adopted)
         tell(_told(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
@@ -154,19 +155,22 @@ def _explained(case, declared, settings, seed, tell):
         before = named
     if not named:
         final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
-    return evidence, final
+    adopted = bool(named) and expected_to_help(problem.problem, found, model)
+    return Evidence(problem, found, alarm, conclusion, adopted), final
 
 
 def _effect_steps(case, declared, final, found):
-    """One step for each mechanism, the most probable first, each with those before it."""
-    conclusion = found.conclusion
-    names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
-    chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
-    steps = [Step(f"+ {names[-1]}", "effect", final)]
-    for number in range(len(names) - 1, 0, -1):
-        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
+    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
+    model = found.posterior.models[found.conclusion.best.model]
+    chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
+    names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
+    alone = names if len(names) <= _MOST_STEPS else names[:1]
+    last = names[-1] if len(alone) == len(names) else f"{len(names) - len(alone)} further effects"
+    steps = [Step(f"+ {last}", "effect", final)]
+    for number in range(len(alone) - (len(alone) == len(names)), 0, -1):
+        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
-        steps.insert(0, Step(f"+ {names[number - 1]}", "effect", fitted))
+        steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))
     return steps
 
 

@@ -18,9 +18,9 @@ from elastocal.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
 _SHAPES_TRIED = 3
-# Values that a closer look tries between the neighbours of the best, an odd number so that it is among them. Where the fit has
-# the candidate already, a step is looked for within a quarter of the spacing to either side.
-_SHAPES_CLOSER, _CLOSER_STILL = 7, 0.25
+# Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
+# a step is looked for within a quarter of the spacing to either side.
+_SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
 # A candidate is looked at more closely whose log odds come so near to those of the best and whose log Bayes factor is so large:
 # below, its shape hardly matters.
 _NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
@@ -340,7 +340,7 @@ def shapes_tried(candidate, fitted):
     if candidate.key in {effect.key for effect in fitted.model.effects}:
         (value,) = fitted.values_of(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
-        values = [value] if shape.tried < 2 else shape.between(value - reach, value + reach, _SHAPES_CLOSER)
+        values = [value] if shape.tried < 2 else shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
     return [(float(value),) for value in values]
 
 
@@ -369,10 +369,8 @@ def shapes_looked_at_closely(problem, alone):
             tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
             place = tried.index(best)
             below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
-            kept = [value for value in tried if value != best]
-            found[unit.candidate.key] = [
-                (float(value),) for value in sorted([*kept, *shape.between(below, above, _SHAPES_CLOSER)])
-            ]
+            closer = [*shape.between(below, best, _SHAPES_CLOSER), *shape.between(best, above, _SHAPES_CLOSER)]
+            found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
     return found
 
 
