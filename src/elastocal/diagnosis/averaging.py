@@ -115,9 +115,11 @@ def squares_explained(problem, model):
 def _predicted(problem, model):
     """Coefficients of all columns in a model at its most probable sizes, in plausible sizes, ndarray (K,)."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
-    units = [problem.units[number] for number in model.units]
-    for unit, (value, _) in zip(units, _coefficients(problem, units, model), strict=True):
-        coefficients[unit.columns] = value
+    if model.units:
+        units = [problem.units[number] for number in model.units]
+        joint = _joint(problem, units, model)
+        columns = np.concatenate([unit.columns for unit in units])
+        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[np.argmax(joint.by_pose_error)]
     return coefficients
 
 
@@ -145,8 +147,10 @@ def _moments(linearized, model, equations, owners):
 
 def _coefficients(problem, units, model):
     """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
-    if not units:
-        return []
+    return _joint(problem, units, model).moments() if units else []
+
+
+def _joint(problem, units, model):
     places = np.searchsorted(problem.grid.scales, model.scales)
     base = problem.statistics.log_likelihood + problem.log_pose
-    return Joint(problem.statistics, units, problem.grid, base, places).moments()
+    return Joint(problem.statistics, units, problem.grid, base, places)

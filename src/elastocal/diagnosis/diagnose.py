@@ -12,7 +12,7 @@ from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
-from elastocal.fitting import fit
+from elastocal.fitting import ON_THE_WAY, fit
 from elastocal.hygiene import faults
 from elastocal.loop.declared import estimated_noise
 from elastocal.model import joint_compliances
@@ -147,13 +147,16 @@ def _explained(case, declared, settings, seed, tell):
         tell(_told(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
-        if named or off:
-            about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         small = not named or alarm.statistic < settings.relinearize_above
-        if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
+        if named or off:
+            chosen, near = selected(problem, model), about if before else None
+            about = fit_with_sizes(declared, case.observations, noise, chosen, near, settled=ON_THE_WAY)
+        if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named
-    if not named:
+    if named:
+        final = fit_with_sizes(declared, case.observations, noise, chosen, about)
+    else:
         final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
     return Evidence(problem, found, alarm, conclusion, adopted), final
