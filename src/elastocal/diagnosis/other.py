@@ -27,7 +27,7 @@ _LENGTH_SCALES = (0.7, 3.0)
 OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
 SHIFT, TURN = "shift", "turn"
 _AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
-_BASE_FEATURES = 8
+_BASE_FEATURES = 6
 _SEED = 2007
 
 

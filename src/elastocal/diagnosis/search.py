@@ -10,6 +10,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from heapq import nlargest
 
 import numpy as np
@@ -51,7 +52,7 @@ class Problem:
     prior: object
     settings: object
 
-    @property
+    @cached_property
     def grid(self):
         """Sizes of a unit."""
         return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
