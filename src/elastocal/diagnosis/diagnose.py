@@ -8,7 +8,7 @@ from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
-from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
+from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
@@ -130,16 +130,17 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
-    about, before = declared, None
+    about, searched = searched_part(declared, case.observations, settings)
+    before = None
     for round_number in range(settings.linearizations):
-        problem = linearized(about, case.observations, candidates, settings)
+        problem = linearized(about, searched, candidates, settings)
         nothing, alone = first_look(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
         # The alarm comes before the readings choose at which shapes to look more closely: it would no longer be exact.
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
-            problem = linearized(about, case.observations, candidates, settings, closer)
+            problem = linearized(about, searched, candidates, settings, closer)
         found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
@@ -150,7 +151,7 @@ def _explained(case, declared, settings, seed, tell):
         small = not named or alarm.statistic < settings.relinearize_above
         if named or off:
             chosen, near = selected(problem, model), about if before else None
-            about = fit_with_sizes(declared, case.observations, noise, chosen, near, settled=ON_THE_WAY)
+            about = fit_with_sizes(declared, searched, noise, chosen, near, settled=ON_THE_WAY)
         if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named

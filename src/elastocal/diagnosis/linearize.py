@@ -78,7 +78,6 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     -------
     Linearized
     """
-    fitted, observations = selected(fitted, observations, spread_poses(observations, settings.searched_observations))
     around, sites = fitted.circumstances, fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
@@ -303,6 +302,22 @@ def _white(whitener, root):
         return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
 
     return white
+
+
+def searched_part(fitted, observations, settings):
+    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+    settings : Settings
+
+    Returns
+    -------
+    Fit, Observations
+    """
+    return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
 
 
 def selected(fitted, observations, chosen):
