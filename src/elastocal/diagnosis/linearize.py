@@ -383,7 +383,7 @@ def lacking(candidate, sites, states):
     missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
-    for joint in candidate.joints if candidate.distinct_angles else ():
+    for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
         angles = len(np.unique(np.round(np.mod(states.joint_angles[:, joint - 1], 2 * np.pi), 3)))
         if angles < candidate.distinct_angles:
             return f"{angles} angles of joint {joint} where {candidate.distinct_angles} are needed"
