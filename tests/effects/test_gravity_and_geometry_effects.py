@@ -126,7 +126,7 @@ def test_payload_hangs_at_the_flange_whatever_target_sits_there(fanuc):
     ],
 )
 def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(fanuc, known, expected):
-    masses = tuple(Mass(2 + link, mass, 0.1, (0.0, 0.0, 0.0)) for link, mass in enumerate(known.get("masses", ())))
+    masses = tuple(Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1) for link, mass in enumerate(known.get("masses", ())))
     sites = replace(sites_of(fanuc.chain), masses=masses, payload_kg=known.get("payload_kg"))
     tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
     assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])

@@ -28,6 +28,8 @@ OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "pla
 SHIFT, TURN = "shift", "turn"
 _AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
 _BASE_FEATURES = 8
+# Inputs that differ by less, in SI units or of their largest value, differ by rounding.
+_ROUNDING = 1e-9
 _SEED = 2007
 
 
@@ -91,7 +93,7 @@ def displacements(around, competitor, features, campaign=None):
     """
     campaign, location = around if campaign is None else campaign, competitor.location
     inputs, load = _inputs(around, competitor, campaign), _relative_load(around, location, campaign)
-    loaded = bool(_load(campaign, location).any())
+    loaded = bool(np.abs(_load(campaign, location)).max(initial=0.0) > _ROUNDING)
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     if location:
         return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws, loaded)]
@@ -125,7 +127,8 @@ def _inputs(around, competitor, campaign):
 def _scaled(values, known):
     known, values = (np.reshape(each, (len(each), -1)).astype(float) for each in (known, values))
     spread = np.abs(known - known.mean(axis=0)).max(axis=0, initial=0.0)
-    return ((values - known.mean(axis=0)) / np.where(spread > 0, spread, 1.0))[:, spread > 0]
+    differ = spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
+    return ((values - known.mean(axis=0)) / np.where(differ, spread, 1.0))[:, differ]
 
 
 def _angles(joints):
@@ -164,7 +167,7 @@ _INPUTS = {OWN: _own, NEIGHBOURS: _neighbours, TIME: _time, FORCE: _force, PLACE
 def _relative_load(around, location, campaign):
     """The load relative to the largest of the campaign, ndarray (S,)."""
     load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
-    return load / largest if largest else np.zeros(len(load))
+    return load / largest if largest > _ROUNDING else np.zeros(len(load))
 
 
 def _load(around, location):
