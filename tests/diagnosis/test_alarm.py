@@ -88,9 +88,11 @@ def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
     assert not found[0].raised
 
 
-def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors():
-    """Of all models of one unit, each averaged over sizes and pose errors; signs of physics do not count."""
+@pytest.mark.parametrize("smallest", [0, 2, 4])
+def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
+    """Of all models of one unit, each averaged over its sizes and pose errors; signs of physics do not count."""
     problem, products = signalled(0.3)
+    problem = replace(problem, units=(*problem.units[:2], replace(problem.units[2], smallest=smallest), *problem.units[3:]))
     found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
     # The sizes of the pose error that draws at zero can make likely: zero and the two next.
     some = problem.statistics.at(np.arange(3))

@@ -86,11 +86,13 @@ def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_s
     assert posterior(problem).models[0].units == (0, 1, 2)
 
 
-def test_nothing_is_always_among_the_models_and_is_returned_beside_them():
+def test_nothing_is_always_among_the_models_however_improbable():
     problem = problem_of("two mechanisms")
     found, (nothing, _) = posterior(problem), first_look(problem)
     (empty,) = [model for model in found.models if not model.units]
+    assert found.nothing is empty
     assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
+    assert empty.pose_error_rad == nothing.pose_error_rad
     assert len(nothing.scales) == 0
 
 
@@ -106,8 +108,10 @@ def test_no_model_is_larger_than_the_settings_allow():
     assert max(len(model.units) for model in found.models) == 2
 
 
-def test_single_bayes_factors_are_those_of_the_models_with_one_unit():
+@pytest.mark.parametrize("smallest", [0, 3])
+def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     problem = problem_of("a faint one")
+    problem = replace(problem, units=tuple(replace(unit, smallest=smallest) for unit in problem.units))
     _, factors = first_look(problem)
     empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
     for number, unit in enumerate(problem.units):
@@ -130,6 +134,18 @@ def test_sizes_of_a_model_come_in_the_order_of_its_units():
     found = posterior(made_problem(rows, UNITS, tau=TAU)[0])
     best = next(model for model in found.models if model.units == (0, 3))
     assert best.scales[0] > best.scales[1] and len(best.scales) == 2
+
+
+def test_no_unit_of_a_model_is_smaller_than_readings_can_show():
+    """Where the most probable size of a faint signal is below that."""
+    problem = problem_of("a faint one")
+    free = next(model for model in posterior(problem).models if model.units == (0,))
+    least = len(problem.settings.scales) - 1
+    assert free.scales[0] < problem.grid.scales[least]
+    held = replace(problem, units=tuple(replace(unit, smallest=least) for unit in problem.units))
+    found = posterior(held)
+    assert (0,) in [model.units for model in found.models]
+    assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
 
 
 def test_the_posterior_is_the_same_each_time():
