@@ -342,7 +342,11 @@ def shapes_tried(candidate, fitted):
     if candidate.key in {effect.key for effect in fitted.model.effects}:
         (value,) = fitted.values_of(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
-        values = [value] if shape.tried < 2 else shape.between(value - reach, value + reach, _SHAPES_CLOSER)
+        values = [value]
+        if shape.tried > 1:
+            values = np.unique(
+                np.clip(shape.between(value - reach, value + reach, _SHAPES_CLOSER), shape.lowest, shape.highest)
+            )
     return [(float(value),) for value in values]
 
 
@@ -371,10 +375,10 @@ def shapes_looked_at_closely(problem, alone):
             tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
             place = tried.index(best)
             below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
-            kept = [value for value in tried if value != best]
-            found[unit.candidate.key] = [
-                (float(value),) for value in sorted([*kept, *shape.between(below, above, _SHAPES_CLOSER)])
-            ]
+            closer = shape.between(below, above, _SHAPES_CLOSER)
+            # At an end of what was tried, or where but one value was, the best is not in the middle between its neighbours.
+            kept = [value for value in tried if value != best or not np.isclose(closer, best).any()]
+            found[unit.candidate.key] = [(float(value),) for value in sorted([*kept, *closer])]
     return found
 
 
