@@ -120,8 +120,11 @@ def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
     assert found.declared_size == 1.0
 
 
-def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs(campaign):
-    found = problem_of(campaign, keys=KEYS[:1])
+def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
+    loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
+    quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
+    found = problem_of(campaign, quiet, KEYS[:1])
+    assert loud < {unit.key for unit in found.problem.units}
     against = [unit.competitor for unit in found.problem.units if unit.mechanism == OTHER]
     assert against == competitors(campaign.declared.circumstances)
     assert {each.location for each in against} == {(1,), (2,), (3,), (4,), (5,), (6,), ()}

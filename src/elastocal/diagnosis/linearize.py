@@ -344,9 +344,8 @@ def shapes_tried(candidate, fitted):
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = [value]
         if shape.tried > 1:
-            values = np.unique(
-                np.clip(shape.between(value - reach, value + reach, _SHAPES_CLOSER), shape.lowest, shape.highest)
-            )
+            about = shape.between(value - reach, value + reach, _SHAPES_CLOSER)
+            values = np.unique(np.clip(about, shape.lowest, shape.highest))
     return [(float(value),) for value in values]
 
 
