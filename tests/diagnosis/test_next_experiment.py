@@ -31,9 +31,9 @@ def diagnosed(campaign, robot, keys, declared=None):
     """A diagnosis in which only some candidates compete."""
     declared = declared or campaign.declared
     line = linearized(declared, campaign.observations, [campaign.candidates[key] for key in keys], SETTINGS)
-    found, nothing = posterior(line.problem)
+    found = posterior(line.problem)
     conclusion = concluded(line.problem, found, RAISED)
-    evidence = SimpleNamespace(linearized=line, posterior=found, nothing=nothing, alarm=RAISED, conclusion=conclusion)
+    evidence = SimpleNamespace(linearized=line, posterior=found, alarm=RAISED, conclusion=conclusion)
     case = SimpleNamespace(observations=campaign.observations, campaign=SimpleNamespace(robot=robot))
     return SimpleNamespace(case=case, evidence=evidence, final=declared)
 
@@ -79,7 +79,8 @@ def proposal(ambiguous, kuka):
 
 
 def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
-    states = replace(two_loads_a_pose(6, 12, 1), time_s=None, temperature_c=None)
+    # Without a time or rows: new states come after all of those.
+    states = replace(two_loads_a_pose(6, 12, 1), time_s=None, temperature_c=None, row=np.ones(24, int))
     unknown = (Target("elbow", "3DoF", None), Target("hand", "6DoF", (0.1, 0.0, 0.0)))
     campaign = planted(kuka, {}, states=states, targets=unknown, fitted_frames=True)
     declared = replace(campaign.declared, weights=np.ones(len(campaign.observations)))

@@ -27,7 +27,7 @@ def found(kuka):
     candidates = [candidate for candidate in campaign.all_candidates if candidate.effect != "joint_offset"]
     candidates.append(replace(campaign.candidates["joint_offset@3"], effect="offset"))
     problem = linearized(declared, campaign.observations, candidates, SETTINGS)
-    models, _ = posterior(problem.problem)
+    models = posterior(problem.problem)
     return campaign, declared, problem, models
 
 

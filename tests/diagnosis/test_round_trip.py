@@ -10,7 +10,7 @@ from elastocal.diagnosis import tables
 from elastocal.diagnosis.confounding import angles_between
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.loop.whole import cases_in
@@ -111,7 +111,7 @@ def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path
 def test_bayes_factors_of_the_table_are_those_of_single_units(found):
     diagnosis, _ = found
     columns, problem = tables.candidate_columns(diagnosis), diagnosis.evidence.linearized.problem
-    factors = single_log_bayes_factors(problem)
+    factors = first_look(problem)[1]
     number = next(n for n, unit in enumerate(problem.units) if unit.key == "joint_offset@2")
     place = columns["candidate"].index("joint_offset@2")
     assert columns["log_bayes_factor"][place] == factors[number]
