@@ -34,8 +34,8 @@ from elastocal.whitening import Whitening, whitening
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
-# Largest step that remains, in standard errors.
-_SETTLED = 1e-3
+# Largest step that remains, in standard errors; and that of a fit from which others start.
+_SETTLED, ON_THE_WAY = 1e-3, 0.1
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
 _LEAST_FALL = 0.1
 # Of the objective. In a fit of a thousand rows a thousandth of a standard error in one parameter makes half of that.
@@ -138,7 +138,7 @@ class Fit:
         return self.joint_jacobian[seen]
 
 
-def fit(model, observations, noise, start=None):
+def fit(model, observations, noise, start=None, reweighted=False, settled=_SETTLED):
     """Fit a model.
 
     Parameters
@@ -148,6 +148,10 @@ def fit(model, observations, noise, start=None):
     noise : Noise
     start : Estimate, optional
         Of this model; by `registered` without.
+    reweighted : bool
+        Whether the start comes of a fit: outliers lose weight from the first step on.
+    settled : float
+        Largest step that remains, in standard errors.
 
     Returns
     -------
@@ -156,11 +160,12 @@ def fit(model, observations, noise, start=None):
     few = sample_of(observations, _MOST_STARTED_FROM)
     if len(few) < len(observations):
         # Where all the readings lead is close to where some of them do.
-        start = fit(model, few, noise, start).estimate
+        start = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate
         around = _kept_circumstances(model, start, observations)
-        return _robustly(model, observations, around, noise, start, reweighted=True)
+        return _robustly(model, observations, around, noise, start, reweighted=True, settled=settled)
     start = registered(model, observations) if start is None else start
-    return _robustly(model, observations, _kept_circumstances(model, start, observations), noise, start)
+    around = _kept_circumstances(model, start, observations)
+    return _robustly(model, observations, around, noise, start, reweighted=reweighted, settled=settled)
 
 
 def _kept_circumstances(model, estimate, observations):
@@ -197,7 +202,7 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
     return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
-def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False):
+def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False, settled=_SETTLED):
     """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
@@ -244,8 +249,8 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
             step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
-        settled = _SETTLED * (scale * deviation) + (deviation == 0)
-        converged = bool(step_number or reweighted) and bool((np.abs(step) <= settled).all())
+        small = settled * (scale * deviation) + (deviation == 0)
+        converged = bool(step_number or reweighted) and bool((np.abs(step) <= small).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break

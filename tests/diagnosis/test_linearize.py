@@ -172,7 +172,7 @@ def test_what_is_too_small_to_be_seen_at_its_plausible_size_is_untestable(kuka):
     assert not any(unit.candidate for unit in found.problem.units)
 
 
-def test_the_smallest_size_is_the_last_before_one_that_would_be_found_with_a_power_of_a_half(campaign):
+def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(campaign):
     """Non-centrality equal to the critical value of a chi-square of one degree of freedom, at each of the sizes."""
     problem = problem_of(campaign).problem
     gram, scales = problem.statistics.gram.copy(), SETTINGS.scales
@@ -183,8 +183,7 @@ def test_the_smallest_size_is_the_last_before_one_that_would_be_found_with_a_pow
     for place, scale in enumerate(scales):
         for factor, shown in ((1.01, place), (0.99, place + 1)):
             scaled = replace(problem.statistics, gram=gram * factor * critical / largest / scale**2)
-            expected = shown if shown == len(scales) else max(shown - 1, 0)
-            assert smallest_shown(scaled, units, SETTINGS)[0] == expected
+            assert smallest_shown(scaled, units, SETTINGS)[0] == shown
 
 
 def test_units_know_the_smallest_size_that_readings_show(campaign):
@@ -261,10 +260,10 @@ def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_
     assert set(found) == {"setup_step", "thermal_growth[time]"}
     twelfths = np.arange(1, 12) / 12
     closer = np.linspace(5 / 12, 7 / 12, 9)[1:-1]
-    np.testing.assert_allclose(found["setup_step"], np.sort([*np.delete(twelfths, 5), *closer]))
+    np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*twelfths, *closer], 12)))
     lags = np.geomspace(900.0, 36000.0, 5)
-    closer = np.geomspace(lags[1], lags[3], 9)[1:-1]
-    np.testing.assert_allclose(found["thermal_growth[time]"], np.sort([lags[1], lags[3], *closer]))
+    closer = np.geomspace(lags[1], lags[3], 9)
+    np.testing.assert_allclose(found["thermal_growth[time]"], closer)
 
 
 @pytest.mark.parametrize(
@@ -279,7 +278,7 @@ def test_the_best_shape_stays_among_those_looked_at_wherever_it_lies(bent, key, 
     (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
     assert np.isclose(values, best).sum() == 1 and values == sorted(values)
     inside = [value for value in values if ends[0] < value < ends[1]]
-    assert len(inside) >= 7
+    assert len(inside) >= 3 and (np.diff(values) > 1e-6).all()
 
 
 def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
@@ -290,7 +289,8 @@ def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_a
     fitted = replace(campaign.declared, model=model, estimate=start)
     problem = problem_of(campaign, fitted, (key, "joint_offset@3")).problem
     (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
-    assert np.isclose(values, 1300.0).sum() == 1 and len(values) == 8
+    below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
+    np.testing.assert_allclose(values, [*below, 1300.0, *above])
 
 
 def test_a_step_is_found_closer_to_where_it_was_by_a_closer_look(kuka):

@@ -123,9 +123,36 @@ def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
     """Unloaded, or the load of a joint would change with the angles; the force on the base does not."""
     states = around(force=500.0 if law == FORCE else 0.0)
     moved = CHANGED[what](states)
-    competitor = Competitor((joint,) if joint else (), law)
+    competitor = Competitor((joint,), law) if joint else Competitor((), law, SHIFT)
     one, other = (waves(displacements(each, competitor, FEATURES, states)) for each in (states, moved))
-    assert (np.abs(one - other).max() > 0.02 * JOINT_RAD) == (what in DEPENDS[joint, law])
+    assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
+
+
+@pytest.mark.parametrize("motion", [SHIFT, TURN])
+def test_each_coordinate_of_the_base_goes_by_the_load_along_it(motion):
+    """The force of the pull and of the weight along each axis, and the moment about it: of the first half of the features."""
+    states = around()
+    competitor = Competitor((), FORCE, motion)
+    mine = states.sites.base[:3] if motion == SHIFT else states.sites.base[3:]
+    for changed in mine:
+        total = states.total.copy()
+        total[:, changed] = total[::-1, changed]
+        moved = replace(states)
+        vars(moved)["total"] = total
+        pairs = zip(*(displacements(each, competitor, FEATURES, states) for each in (states, moved)), strict=True)
+        differ = {at for one, other in pairs for at in one if np.abs(one[at] - other[at]).max() > 0.02 * BASE_M}
+        assert differ == {changed}
+
+
+def test_a_coordinate_without_an_input_is_not_displaced():
+    """Of a load that always pulls down the foot feels a force along one axis alone."""
+    wrench = np.zeros((60, 6))
+    wrench[:, 2] = -np.linspace(0, 500, 60)
+    found = displacements(around(wrench=wrench), Competitor((), FORCE, SHIFT), FEATURES)
+    moved = {coordinate for law in found for coordinate, values in law.items() if values.any()}
+    assert moved == {around().sites.base[2]}
+    # As many columns as others have, of which units are numbered by those of one state.
+    assert len(found) == len(displacements(around(), Competitor((), FORCE, SHIFT), FEATURES))
 
 
 def test_own_law_and_neighbours_go_by_the_torque_and_the_place_by_where_the_end_is():

@@ -7,16 +7,19 @@ import numpy as np
 from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
-from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help
+from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
 from elastocal.diagnosis.linearize import linearized, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
-from elastocal.fitting import fit
+from elastocal.fitting import ON_THE_WAY, fit
 from elastocal.hygiene import faults
 from elastocal.loop.declared import estimated_noise
 from elastocal.model import joint_compliances
 from elastocal.random_streams import stream
+
+# Mechanisms that are added one at a time, each by a fit; of more, only the first.
+_MOST_STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -137,36 +140,40 @@ def _explained(case, declared, settings, seed, tell):
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
             problem = linearized(about, case.observations, candidates, settings, closer)
-        found = posterior(problem.problem)
+        found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        adopted = bool(named) and expected_to_help(problem.problem, found, model)
-        evidence = Evidence(problem, found, alarm, conclusion, adopted)
         tell(_told(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
-        if named or off:
-            about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         small = not named or alarm.statistic < settings.relinearize_above
-        if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
+        if named or off:
+            chosen, near = selected(problem, model), about if before else None
+            about = fit_with_sizes(declared, case.observations, noise, chosen, near, settled=ON_THE_WAY)
+        if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named
-    if not named:
+    if named:
+        final = fit_with_sizes(declared, case.observations, noise, chosen, about)
+    else:
         final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
-    return evidence, final
+    adopted = bool(named) and expected_to_help(problem.problem, found, model)
+    return Evidence(problem, found, alarm, conclusion, adopted), final
 
 
 def _effect_steps(case, declared, final, found):
-    """One step for each mechanism, the most probable first, each with those before it."""
-    conclusion = found.conclusion
-    names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
-    chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
-    steps = [Step(f"+ {names[-1]}", "effect", final)]
-    for number in range(len(names) - 1, 0, -1):
-        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
+    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
+    model = found.posterior.models[found.conclusion.best.model]
+    chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
+    names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
+    alone = names if len(names) <= _MOST_STEPS else names[:1]
+    last = names[-1] if len(alone) == len(names) else f"{len(names) - len(alone)} further effects"
+    steps = [Step(f"+ {last}", "effect", final)]
+    for number in range(len(alone) - (len(alone) == len(names)), 0, -1):
+        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
-        steps.insert(0, Step(f"+ {names[number - 1]}", "effect", fitted))
+        steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))
     return steps
 
 

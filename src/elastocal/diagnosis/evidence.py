@@ -55,8 +55,14 @@ class Grid:
 
     def of(self, unit):
         """Logarithms of the weights for one unit: its smallest size and those above share them, ndarray (S,)."""
-        weights = np.where(np.arange(len(self.scales)) < unit.smallest, -np.inf, self.log_weights)
-        return weights - log_sum_exp(weights)
+        return self._from[unit.smallest]
+
+    @cached_property
+    def _from(self):
+        """Weights from each size on, ndarray (S, S)."""
+        places = np.arange(len(self.scales))
+        weights = np.where(places < places[:, None], -np.inf, self.log_weights)
+        return weights - log_sum_exp(weights, axis=1)[:, None]
 
 
 def scale_weights(scales, settings):

@@ -18,9 +18,9 @@ from elastocal.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
 _SHAPES_TRIED = 3
-# Values that a closer look tries between the neighbours of the best, an odd number so that it is among them. Where the fit has
-# the candidate already, a step is looked for within a quarter of the spacing to either side.
-_SHAPES_CLOSER, _CLOSER_STILL = 7, 0.25
+# Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
+# a step is looked for within a quarter of the spacing to either side.
+_SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
 # A candidate is looked at more closely whose log odds come so near to those of the best and whose log Bayes factor is so large:
 # below, its shape hardly matters.
 _NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
@@ -190,11 +190,10 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
 
 
 def smallest_shown(statistics, units, settings):
-    """Last size before each unit would be found with a power of one half, were it the only candidate.
+    """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction among all units reaches that where the non-centrality is the critical value. A smaller effect is
-    there or not, and the readings are the same: it counts as not there. One step of the sizes below is kept, between which and
-    the first that shows an effect can be seen, too.
+    there or not, and the readings are the same: it counts as not there.
 
     Parameters
     ----------
@@ -210,8 +209,7 @@ def smallest_shown(statistics, units, settings):
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
     grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
     largest = np.array([np.linalg.eigvalsh(gram)[-1] for gram in grams])
-    first = np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
-    return np.where(first < len(settings.scales), np.maximum(first - 1, 0), first)
+    return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
 @dataclass(frozen=True)
@@ -344,7 +342,7 @@ def shapes_tried(candidate, fitted):
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
         values = [value]
         if shape.tried > 1:
-            about = shape.between(value - reach, value + reach, _SHAPES_CLOSER)
+            about = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
             values = np.unique(np.clip(about, shape.lowest, shape.highest))
     return [(float(value),) for value in values]
 
@@ -374,10 +372,10 @@ def shapes_looked_at_closely(problem, alone):
             tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
             place = tried.index(best)
             below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
-            closer = shape.between(below, above, _SHAPES_CLOSER)
-            # At an end of what was tried, or where but one value was, the best is not in the middle between its neighbours.
-            kept = [value for value in tried if value != best or not np.isclose(closer, best).any()]
-            found[unit.candidate.key] = [(float(value),) for value in sorted([*kept, *closer])]
+            # The best may lie at an end of the range.
+            sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
+            closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
+            found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
     return found
 
 

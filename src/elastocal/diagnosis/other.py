@@ -3,9 +3,9 @@
 A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
 approximate Gaussian process. A function of everything at once would fit nothing better than chance does, so that each law has
 the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach; the angles of the
-joints beside it; time and temperature; the force on the base; the place of the end. Half of the features are multiplied by the
-load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a mechanism, that a *related*
-one acts. It names nothing and is not used to predict.
+joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features
+are multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a
+mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 References
 ----------
@@ -27,7 +27,7 @@ _LENGTH_SCALES = (0.7, 3.0)
 OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
 SHIFT, TURN = "shift", "turn"
 _AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
-_BASE_FEATURES = 8
+_BASE_FEATURES = 6
 # Inputs that differ by less, in SI units or of their largest value, differ by rounding.
 _ROUNDING = 1e-9
 _SEED = 2007
@@ -71,7 +71,9 @@ def competitors(campaign):
     joints = range(campaign.sites.joints)
     every = [Competitor((joint + 1,), law) for joint in joints for law in _AT_A_JOINT]
     every += [Competitor((), law, motion) for law in _AT_THE_BASE for motion in (SHIFT, TURN)]
-    return [each for each in every if _inputs(campaign, each, campaign).shape[1]]
+    return [
+        each for each in every if any(_inputs(campaign, each, at, campaign).shape[1] for at in _coordinates(campaign, each))
+    ]
 
 
 def displacements(around, competitor, features, campaign=None):
@@ -92,35 +94,42 @@ def displacements(around, competitor, features, campaign=None):
         For each feature a displacement of one coordinate.
     """
     campaign, location = around if campaign is None else campaign, competitor.location
-    inputs, load = _inputs(around, competitor, campaign), _relative_load(around, location, campaign)
+    load = _relative_load(around, location, campaign)
     loaded = bool(np.abs(_load(campaign, location)).max(initial=0.0) > _ROUNDING)
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
-    if location:
-        return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws, loaded)]
-    shifts, turns = around.sites.base[:3], around.sites.base[3:]
-    coordinates, size = (shifts, BASE_M) if competitor.motion == SHIFT else (turns, BASE_RAD)
-    return [
-        {coordinate: size * wave} for coordinate in coordinates for wave in _waves(inputs, load, _BASE_FEATURES, draws, loaded)
-    ]
+    count = features if location else _BASE_FEATURES
+    size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
+    found = []
+    for coordinate in _coordinates(around, competitor):
+        inputs = _inputs(around, competitor, coordinate, campaign)
+        found += [{coordinate: size * wave} for wave in _waves(inputs, load, count, draws, loaded)]
+    return found
+
+
+def _coordinates(around, competitor):
+    """Coordinates of the sites that a law displaces."""
+    if competitor.location:
+        return [competitor.location[0] - 1]
+    return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
 def _waves(inputs, load, count, draws, loaded):
-    """Features (count, S) whose squares sum to about one; the second half times the load."""
+    """Features (count, S) whose squares sum to about one, the second half times the load; none of them without an input."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, count))
     frequency = draws.standard_normal((inputs.shape[1], count)) / lengths
     waves = np.sqrt(2.0 / count) * np.cos(inputs @ frequency + draws.uniform(0, 2 * np.pi, count))
     if loaded:
         waves[:, count // 2 :] *= load[:, None]
-    return waves.T
+    return waves.T if inputs.shape[1] else np.zeros_like(waves.T)
 
 
-def _inputs(around, competitor, campaign):
-    """Inputs of a law, each of size about one, ndarray (S, D): angles as points of a circle, others about their mean.
+def _inputs(around, competitor, coordinate, campaign):
+    """Inputs of a law for one of its coordinates, each of size about one, ndarray (S, D).
 
-    What is constant or absent in the campaign is left out.
+    Angles as points of a circle, all about their mean. What is constant or absent in the campaign is left out.
     """
-    parts = [_scaled(value(around), value(campaign)) for value in _INPUTS[competitor.law](competitor, campaign)]
+    parts = [_scaled(value(around), value(campaign)) for value in _INPUTS[competitor.law](coordinate, campaign)]
     return np.concatenate([np.zeros((len(around.joint_angles), 0)), *parts], axis=1)
 
 
@@ -136,28 +145,26 @@ def _angles(joints):
     return [lambda around, j=j, wave=wave: wave(around.joint_angles[:, j]) for j in joints for wave in (np.cos, np.sin)]
 
 
-def _own(competitor, campaign):
-    joint = competitor.location[0] - 1
+def _own(joint, campaign):
     approach = [lambda around: around.approach[:, joint]] if campaign.approach is not None else []
     return [*_angles([joint]), lambda around: around.total[:, joint], *approach]
 
 
-def _neighbours(competitor, campaign):
-    joint = competitor.location[0] - 1
+def _neighbours(joint, campaign):
     beside = [other for other in (joint - 1, joint, joint + 1) if 0 <= other < campaign.sites.joints]
     return [*_angles(beside), lambda around: around.total[:, joint]]
 
 
-def _time(competitor, campaign):
+def _time(coordinate, campaign):
     names = ("time_s", "temperature_c", "progress")
     return [lambda around, name=name: getattr(around, name) for name in names if getattr(campaign, name) is not None]
 
 
-def _force(competitor, campaign):
-    return [lambda around: around.wrench[:, :3]]
+def _force(coordinate, campaign):
+    return [lambda around: around.total[:, coordinate]]
 
 
-def _place(competitor, campaign):
+def _place(coordinate, campaign):
     return [lambda around: around.motion.position[0].T]
 
 

@@ -10,6 +10,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from heapq import nlargest
 
 import numpy as np
@@ -51,7 +52,7 @@ class Problem:
     prior: object
     settings: object
 
-    @property
+    @cached_property
     def grid(self):
         """Sizes of a unit."""
         return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
@@ -122,12 +123,14 @@ def first_look(problem):
     return searcher.measure(()), np.array(single)
 
 
-def posterior(problem):
+def posterior(problem, known=()):
     """Search the models.
 
     Parameters
     ----------
     problem : Problem
+    known : collection of str, optional
+        Keys of the candidates of a good model, from which the search starts, too.
 
     Returns
     -------
@@ -136,6 +139,7 @@ def posterior(problem):
     searcher = _Searcher(problem)
     searcher.measure(())
     searcher.start_from_whole_mechanisms()
+    searcher.start_from(known)
     searcher.grow()
     return searcher.weigh()
 
@@ -259,19 +263,32 @@ class _Searcher:
             if 1 < len(whole) <= self.problem.settings.largest_model:
                 self.measure(whole)
 
+    def start_from(self, known):
+        """Meet the model of some candidates, each with the best of its shapes."""
+        best = {}
+        for number, unit in enumerate(self.problem.units):
+            if unit.candidate and unit.candidate.key in known:
+                place = unit.mechanism, unit.location
+                best[place] = max(best.get(place, (number,)), (number,), key=self.met.get)
+        if best:
+            self.measure(tuple(sorted(number for (number,) in best.values())))
+
     def grow(self):
         """Extend the best models that have not been, in rounds, until rounds bring nothing better."""
-        settings, idle = self.problem.settings, 0
+        settings, idle, rising = self.problem.settings, 0, False
         while idle < settings.patience:
             best = max(self.met.values())
             waiting = [m for m, odds in self.met.items() if m not in self.extended and odds > best - _NEGLIGIBLE]
             if not waiting:
                 break
-            for model in nlargest(settings.beam, waiting, key=self.met.get):
+            # While the best gets better, it alone is followed; where it does not, there is time for others.
+            for model in nlargest(1 if rising else settings.beam, waiting, key=self.met.get):
                 if model not in self.measured:
                     self.measure(model)
                 self.extend(model)
-            idle = 0 if max(self.met.values()) > best + _BETTER else idle + 1
+            gained = max(self.met.values()) - best
+            rising = gained > _BETTER
+            idle = 0 if rising else idle + 1
 
     def weigh(self):
         """Evaluate the best models in full."""

@@ -25,8 +25,8 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.03,
-        "prior probability of each mechanism; smaller ones name more, but what they state fits development cases less",
+        0.02,
+        "prior probability of each mechanism, of which there are some thirty: what it states fits development cases best",
     )
     gravity_probability: float = _setting(
         0.5,
@@ -57,7 +57,7 @@ class Settings:
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
     other_features: int = _setting(16, "random Fourier features of each law at each joint; few inputs need no more")
     named_probability: float = _setting(
-        0.6, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
+        0.65, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
     linearizations: int = _setting(
