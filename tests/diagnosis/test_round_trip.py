@@ -10,6 +10,7 @@ from elastocal.diagnosis import tables
 from elastocal.diagnosis.confounding import angles_between
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.schemas import CORRELATIONS
@@ -46,6 +47,41 @@ def faulty(kuka, config_folder, tmp_path_factory):
     diagnosis = diagnose(case, Settings(), 1)
     assert diagnosis.evidence is None
     return diagnosis, held_out
+
+
+@pytest.fixture(scope="module")
+def unsure(kuka, config_folder, tmp_path_factory):
+    """A diagnosis that names an effect which is not expected to make predictions better."""
+    case, held_out = cases_of(tmp_path_factory.mktemp("unsure"), config_folder / "robots", kuka, offset=1e-3)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("elastocal.diagnosis.diagnose.expected_to_help", lambda problem, posterior, model: False)
+        return diagnose(case, Settings(), 1), held_out
+
+
+def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_declared(unsure, kuka, tmp_path):
+    diagnosis, held_out = unsure
+    (entry,) = diagnosis.document["effects"]
+    assert diagnosis.document["verdict"] == "named" and entry["name"] == "joint_offset" and not entry["adopted"]
+    # What it would be is said all the same.
+    assert abs(entry["parameters"][0]["value"] - 1e-3) < 1e-4
+    assert [step.kind for step in diagnosis.steps] == ["frames", "declared"] and diagnosis.final is diagnosis.declared
+    assert any("stays as declared" in warning for warning in diagnosis.document["warnings"])
+    verdict = judge(diagnosis, held_out, 1).document
+    assert verdict["heldout"]["before"] == verdict["heldout"]["after"] and verdict["effects"][0]["heldout_gain"] is None
+    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
+    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    back = tables.diagnosis_from(diagnosis.case, facts, steps)
+    assert [step.kind for step in back.steps] == ["frames", "declared"]
+    assert not any(effect["adopted"] for effect in judge(back, held_out, 1).document["effects"])
+    # And the next experiment can be planned.
+    assert propose(diagnosis, kuka.joint_limits, Settings(), np.random.default_rng(0)).best == ("joint_offset",)
+
+
+def test_an_effect_that_is_expected_to_help_is_adopted(found):
+    diagnosis, _ = found
+    assert [entry["adopted"] for entry in diagnosis.document["effects"]] == [True]
+    assert [step.kind for step in diagnosis.steps] == ["frames", "declared", "effect"]
+    assert not any("stays as declared" in warning for warning in diagnosis.document["warnings"])
 
 
 @pytest.mark.parametrize("kind", ["found", "faulty"])
