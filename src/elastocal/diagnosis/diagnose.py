@@ -157,7 +157,7 @@ def _explained(case, declared, settings, seed, tell):
     if named:
         final = fit_with_sizes(declared, case.observations, noise, chosen, about)
     else:
-        final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
+        final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
     return Evidence(problem, found, alarm, conclusion, adopted), final
 
@@ -194,6 +194,7 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
             said.append("what was found is too uncertain to make predictions better: the model stays as declared")
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found)
+        said += _pose_error_warnings(final.noise, found.linearized)
     said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
@@ -247,6 +248,15 @@ def _noise_warnings(measured, left, settings):
         return []
     said = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
     return [f"readings scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
+
+
+def _pose_error_warnings(left, linearized):
+    if left.pose_rad < linearized.pose_std_error_rad:
+        return []
+    return [
+        f"readings of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a pose do"
+        " not show: new poses will err as much"
+    ]
 
 
 def _averages(declared, found):

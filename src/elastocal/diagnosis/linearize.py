@@ -45,6 +45,8 @@ class Linearized:
     about : Fit
     candidates : frozenset of str
         Keys of all candidates: parameters of the fit that they own are coefficients of units here.
+    pose_std_error_rad : float
+        With which the readings of one pose tell a joint angle.
     """
 
     problem: object
@@ -53,6 +55,7 @@ class Linearized:
     untestable: dict
     about: object
     candidates: frozenset
+    pose_std_error_rad: float
 
 
 def linearized(fitted, observations, candidates, settings, shapes=None):
@@ -116,7 +119,7 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, size, untestable, fitted, keys)
+    return Linearized(problem, products, size, untestable, fitted, keys, unit_rad)
 
 
 def declared_geometry(model):
