@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import first_look, posterior
+from elastocal.diagnosis.search import _Searcher, first_look, posterior
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -86,11 +87,13 @@ def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_s
     assert posterior(problem).models[0].units == (0, 1, 2)
 
 
-def test_nothing_is_always_among_the_models_and_is_returned_beside_them():
+def test_nothing_is_always_among_the_models_however_improbable():
     problem = problem_of("two mechanisms")
     found, (nothing, _) = posterior(problem), first_look(problem)
     (empty,) = [model for model in found.models if not model.units]
+    assert found.nothing is empty
     assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
+    assert empty.pose_error_rad == nothing.pose_error_rad
     assert len(nothing.scales) == 0
 
 
@@ -106,8 +109,10 @@ def test_no_model_is_larger_than_the_settings_allow():
     assert max(len(model.units) for model in found.models) == 2
 
 
-def test_single_bayes_factors_are_those_of_the_models_with_one_unit():
+@pytest.mark.parametrize("smallest", [0, 3])
+def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     problem = problem_of("a faint one")
+    problem = replace(problem, units=tuple(replace(unit, smallest=smallest) for unit in problem.units))
     _, factors = first_look(problem)
     empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
     for number, unit in enumerate(problem.units):
@@ -130,6 +135,46 @@ def test_sizes_of_a_model_come_in_the_order_of_its_units():
     found = posterior(made_problem(rows, UNITS, tau=TAU)[0])
     best = next(model for model in found.models if model.units == (0, 3))
     assert best.scales[0] > best.scales[1] and len(best.scales) == 2
+
+
+def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
+    """Columns that nearly cancel, of mechanisms at one location each: no single one of them shows, nor any two."""
+    rows = made_rows(3, poses=14, candidates=6)
+    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
+    candidates = rows.candidates.copy()
+    candidates[:, :3] += np.outer(common, [1, 1, -2])
+    rows = replace(rows, candidates=candidates, residual=rows.residual + 1.5 * candidates[:, :3].sum(axis=1))
+    units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
+    units += [made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
+    best = max(posterior(problem, keys).models[0].log_odds for keys in ((), ("a",)))
+    # What is known and not tested is no matter.
+    found = posterior(problem, {"a", "b", "c", "gone"})
+    assert found.models[0].units == (0, 1, 2) and found.models[0].log_odds > best + 5
+
+
+def test_what_is_known_starts_a_search_with_the_better_of_its_shapes():
+    rows = made_rows(3, poses=14, candidates=6)
+    rows = replace(rows, residual=rows.residual + 1.5 * rows.candidates[:, 2])
+    bent = SimpleNamespace(key="bent")
+    units = [made_unit("bent", (1,), column, candidate=bent, shapes=(float(column),)) for column in (1, 2, 3)]
+    searcher = _Searcher(made_problem(rows, units, tau=TAU)[0])
+    searcher.start_from({"bent"})
+    assert set(searcher.measured) == {(1,)}
+    searcher.start_from(())
+    assert set(searcher.measured) == {(1,)}
+
+
+def test_no_unit_of_a_model_is_smaller_than_readings_can_show():
+    """Where the most probable size of a faint signal is below that."""
+    problem = problem_of("a faint one")
+    free = next(model for model in posterior(problem).models if model.units == (0,))
+    least = len(problem.settings.scales) - 1
+    assert free.scales[0] < problem.grid.scales[least]
+    held = replace(problem, units=tuple(replace(unit, smallest=least) for unit in problem.units))
+    found = posterior(held)
+    assert (0,) in [model.units for model in found.models]
+    assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
 
 
 def test_the_posterior_is_the_same_each_time():

@@ -10,6 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.search import Model, Posterior
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
     CLASS,
@@ -63,8 +64,9 @@ def test_one_mechanism_with_enough_of_the_probability_is_named():
     assert list(found.mechanisms) == ["offset", "payload"]
 
 
-@pytest.mark.parametrize(("probability", "verdict"), [(0.61, NAMED), (0.59, CLASS)])
-def test_what_is_enough_is_a_setting(probability, verdict):
+@pytest.mark.parametrize(("more", "verdict"), [(0.01, NAMED), (-0.01, CLASS)])
+def test_what_is_enough_is_a_setting(more, verdict):
+    probability = Settings().named_probability + more
     assert conclusion(((OFFSET_2,), probability), ((PAYLOAD,), 1 - probability)).verdict == verdict
 
 

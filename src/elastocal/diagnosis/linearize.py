@@ -358,7 +358,10 @@ def shapes_tried(candidate, fitted):
     if candidate.key in {effect.key for effect in fitted.model.effects}:
         (value,) = fitted.values_of(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
-        values = [value] if shape.tried < 2 else shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
+        values = [value]
+        if shape.tried > 1:
+            about = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
+            values = np.unique(np.clip(about, shape.lowest, shape.highest))
     return [(float(value),) for value in values]
 
 
@@ -387,7 +390,9 @@ def shapes_looked_at_closely(problem, alone):
             tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
             place = tried.index(best)
             below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
-            closer = [*shape.between(below, best, _SHAPES_CLOSER), *shape.between(best, above, _SHAPES_CLOSER)]
+            # The best may lie at an end of the range.
+            sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
+            closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
             found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
     return found
 
@@ -397,7 +402,7 @@ def lacking(candidate, sites, states):
     missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
-    for joint in candidate.joints if candidate.distinct_angles else ():
+    for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
         angles = len(np.unique(np.round(np.mod(states.joint_angles[:, joint - 1], 2 * np.pi), 3)))
         if angles < candidate.distinct_angles:
             return f"{angles} angles of joint {joint} where {candidate.distinct_angles} are needed"

@@ -28,6 +28,8 @@ OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "pla
 SHIFT, TURN = "shift", "turn"
 _AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
 _BASE_FEATURES = 6
+# Inputs that differ by less, in SI units or of their largest value, differ by rounding.
+_ROUNDING = 1e-9
 _SEED = 2007
 
 
@@ -92,7 +94,8 @@ def displacements(around, competitor, features, campaign=None):
         For each feature a displacement of one coordinate.
     """
     campaign, location = around if campaign is None else campaign, competitor.location
-    load, loaded = _relative_load(around, location, campaign), bool(_load(campaign, location).any())
+    load = _relative_load(around, location, campaign)
+    loaded = bool(np.abs(_load(campaign, location)).max(initial=0.0) > _ROUNDING)
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     count = features if location else _BASE_FEATURES
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
@@ -133,7 +136,8 @@ def _inputs(around, competitor, coordinate, campaign):
 def _scaled(values, known):
     known, values = (np.reshape(each, (len(each), -1)).astype(float) for each in (known, values))
     spread = np.abs(known - known.mean(axis=0)).max(axis=0, initial=0.0)
-    return ((values - known.mean(axis=0)) / np.where(spread > 0, spread, 1.0))[:, spread > 0]
+    differ = spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
+    return ((values - known.mean(axis=0)) / np.where(differ, spread, 1.0))[:, differ]
 
 
 def _angles(joints):
@@ -170,7 +174,7 @@ _INPUTS = {OWN: _own, NEIGHBOURS: _neighbours, TIME: _time, FORCE: _force, PLACE
 def _relative_load(around, location, campaign):
     """The load relative to the largest of the campaign, ndarray (S,)."""
     load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
-    return load / largest if largest else np.zeros(len(load))
+    return load / largest if largest > _ROUNDING else np.zeros(len(load))
 
 
 def _load(around, location):

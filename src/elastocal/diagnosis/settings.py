@@ -60,7 +60,6 @@ class Settings:
         0.65, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
-    testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
     linearizations: int = _setting(
         2, "times that the problem is linearised at most, each about the model found before; a third moves no verdict"
     )

@@ -34,4 +34,5 @@ def candidates(sites):
             for wave in (np.cos, np.sin)
         ]
 
-    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, distinct_angles=_SAMPLES_PER_PERIOD * _ORDER)]
+    distinct = _SAMPLES_PER_PERIOD * _ORDER
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, distinct_angles=distinct, turning=(last + 1,))]

@@ -135,6 +135,8 @@ class Candidate:
     place : str
         Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
         location are variants of its law, of which only one can hold.
+    turning : tuple of int
+        Joints with whose angles the law goes, counted from 1, where it belongs to no joint.
     """
 
     effect: str
@@ -148,6 +150,7 @@ class Candidate:
     distinct_angles: int = 0
     place: str = ""
     of_setup: bool = False
+    turning: tuple = ()
 
     @property
     def location(self):

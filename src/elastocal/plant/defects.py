@@ -545,7 +545,8 @@ def _temperature_gradient(robot, joints, size, draws):
 
 @_register("nest_eccentricity", "m", 1e-4, _nowhere)
 def _nest_eccentricity(robot, joints, size, draws):
-    return replace(robot, nest=EccentricNest(size)), {}
+    turns = robot.arm.stretches[-1].rotation.T @ robot.arm.axes[-1]
+    return replace(robot, nest=EccentricNest(size, int(np.argmax(np.abs(turns))))), {}
 
 
 # Outside of the catalogue
