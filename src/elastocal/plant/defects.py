@@ -379,7 +379,7 @@ def _transmission_order(robot, joints, size, draws):
 
     No higher than some twenty poses can show; `short_waves` are.
     """
-    order, phases = draws.integers(1, 4) + draws.uniform(0.25, 0.75), draws.uniform(0, 2 * np.pi, 2)
+    order, phases = draws.integers(2, 5) + draws.uniform(0.25, 0.75), draws.uniform(0, 2 * np.pi, 2)
     waves = ((order, size, phases[0]), (2.0 * order, 0.25 * size, phases[1]))
     return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
 
