@@ -71,9 +71,14 @@ def test_what_is_enough_is_a_setting(more, verdict):
 
 
 def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
-    """What the posterior still gives to "nothing" does not count against a name."""
+    """A name needs the probability that is asked for, of which "nothing" has its part, too."""
     found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))
-    assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
+    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
+
+
+def test_an_alarm_that_no_model_explains_better_than_nothing_does_is_unexplained():
+    found = conclusion(((OFFSET_2,), 0.02), ((PAYLOAD,), 0.01))
+    assert found.verdict == UNEXPLAINED and found.best.mechanisms == () and found.alternatives == {}
 
 
 def test_an_ambiguous_mechanism_is_a_class_of_the_credible_ones():
