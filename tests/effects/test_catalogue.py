@@ -334,7 +334,8 @@ def test_module_that_was_added_is_gone_with_its_file():
 def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
     sites = equipped(fanuc.chain)
     found = [candidate.key for candidate in declared_candidates(["payload", "force_bias"], sites)]
-    assert found == ["payload", "payload[mass]", "force_bias[base axes]", "force_bias[flange axes]"]
+    frames = [f"force_bias[{axes} axes{how}]" for how in ("", " in the pull") for axes in ("base", "flange")]
+    assert found == ["payload", "payload[mass]", *frames]
     assert declared_candidates([], sites) == []
 
 

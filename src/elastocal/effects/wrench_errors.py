@@ -49,7 +49,7 @@ def at_flange_and_in_pull(name, family, parameters, change):
         force = change(axis, wrench, lever)[:, :3]
         return _wrench(force, 0.0) + _wrench(0.0, np.cross(lever, force))
 
-    pulled = base_and_flange(name, family, parameters, in_pull, ", in the pull")
+    pulled = base_and_flange(name, family, parameters, in_pull, " in the pull")
     return [*base_and_flange(name, family, parameters, change), *pulled]
 
 
