@@ -37,13 +37,14 @@ def truth(*places, group="single", level=50.0, robot="gp180", setting="usual", *
     } | changes
 
 
-def effect(name, *joints, parameters=(), alternatives=()):
+def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
     """An effect of a verdict; a parameter is a name with its value and its standard error."""
     key = "@".join([name, "+".join(map(str, joints))] if joints else [name])
     return {
         "name": name,
         "joints": list(joints),
         "alternatives": list(alternatives),
+        "adopted": adopted,
         "parameters": [
             {"name": f"{key} {of}", "value": value, "std_error": error, "held": error == 0} for of, value, error in parameters
         ],

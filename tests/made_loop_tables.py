@@ -133,7 +133,13 @@ def experiment_rows(effect="link_elasticity", count=10):
 
 
 def effect_entry(
-    name="lost_motion", members=("lost_motion@3",), joints=(3,), parameters=("half_play",), alternatives=(), locations=None
+    name="lost_motion",
+    members=("lost_motion@3",),
+    joints=(3,),
+    parameters=("half_play",),
+    alternatives=(),
+    locations=None,
+    adopted=True,
 ):
     """An entry of the effects of verdict.json."""
     named = [
@@ -157,7 +163,8 @@ def effect_entry(
         "locations": [{"location": where, "probability": value} for where, value in locations],
         "parameters": named,
         "p_value": 0.002,
-        "heldout_gain": 0.24,
+        "heldout_gain": 0.24 if adopted else None,
+        "adopted": adopted,
         "alternatives": list(alternatives),
         "angle_to_nearest_deg": None,
     }
@@ -179,6 +186,7 @@ def fault_entry():
         ],
         "p_value": None,
         "heldout_gain": None,
+        "adopted": False,
         "alternatives": ["a load that is 1000 times larger"],
         "angle_to_nearest_deg": None,
         "evidence": [0.5, 1e-4],
@@ -199,8 +207,9 @@ def verdict_document(
 ):
     """Contents of verdict.json."""
     known, faulty = noise != "residual", any(effect["family"] == "data" for effect in effects)
+    adopted = any(effect["adopted"] for effect in effects)
     errors = {"mean_m": 1.1e-4, "rms_m": 1.2e-4, "p95_m": 2.0e-4, "max_m": 3.0e-4}
-    after = {name: (0.7 if effects and not faulty else 1.0) * value for name, value in errors.items()}
+    after = {name: (0.7 if adopted else 1.0) * value for name, value in errors.items()}
     return {
         "campaign": campaign,
         "verdict": word,
@@ -220,8 +229,8 @@ def verdict_document(
             "before": errors,
             "after": after,
             "noise_floor_rms_m": 5e-5 if known else None,
-            "reduction_ci95": list(reduction),
-            "reduction_std_error": 0.04,
+            "reduction_ci95": list(reduction) if adopted else [0.0, 0.0],
+            "reduction_std_error": 0.04 if adopted else 0.0,
             "poses": 10,
             "share_below_max": 0.74,
             "outside_range": {

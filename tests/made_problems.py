@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.diagnosis.hypotheses import Unit, prior_of
+from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
+from elastocal.diagnosis.other import OWN, Competitor
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
@@ -77,11 +78,12 @@ def made_rows(seed=0, poses=8, size=(3, 9), declared=4, candidates=6, joints=2, 
     return rows.drawn(rng)
 
 
-def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=None, shapes=()):
+def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=None, shapes=(), smallest=0):
     """A unit of some columns, each of plausible size one."""
     columns = np.atleast_1d(columns)
     signs = np.full(len(columns), signs, int)
-    return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior)
+    competitor = Competitor(location, OWN) if mechanism == OTHER else None
+    return Unit(mechanism, location, candidate, shapes, columns, np.ones(len(columns)), signs, log_prior, competitor, smallest)
 
 
 def made_problem(rows, units, settings=None, tau=None):

@@ -34,8 +34,8 @@ from elastocal.whitening import Whitening, whitening
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
-# Largest step that remains, in standard errors.
-_SETTLED = 1e-3
+# Largest step that remains, in standard errors; and that of a fit from which others start.
+_SETTLED, ON_THE_WAY = 1e-3, 0.1
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
 _LEAST_FALL = 0.1
 # Of the objective. In a fit of a thousand rows a thousandth of a standard error in one parameter makes half of that.
@@ -73,8 +73,8 @@ class Fit:
     whitener : Whitening
     residual : ndarray (M, rows)
         m and rad, base axes.
-    joint_jacobian : ndarray (M, rows, n)
-        Of each target with respect to the joints.
+    joint_jacobian : ndarray (M, rows, n) or None
+        Of each target with respect to the joints; None where there are too many to keep it.
     circumstances : Circumstances or None
         Of the states fitted; None where these are too many to keep it.
     converged : bool
@@ -127,12 +127,18 @@ class Fit:
                 around = circumstances(self.model, self.estimate, some.states)
             else:
                 around = at_states(self.circumstances, states)
-            plain = linearize(self.model, self.estimate, some, around).sensitivities
-            white = whitening(some, self.joint_jacobian[seen], self.noise)
-            yield seen, plain, white.apply(plain * np.sqrt(self.weights[seen])[:, None, None])
+            line = linearize(self.model, self.estimate, some, around)
+            white = whitening(some, self.jacobian_at(line, seen), self.noise)
+            yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+
+    def jacobian_at(self, line, seen):
+        """Jacobian of some observations with respect to the joints: as it was kept, or that of their `Linearization`."""
+        if self.joint_jacobian is None:
+            return line.coordinate_jacobian[..., : self.model.sites.joints]
+        return self.joint_jacobian[seen]
 
 
-def fit(model, observations, noise, start=None):
+def fit(model, observations, noise, start=None, reweighted=False, settled=_SETTLED):
     """Fit a model.
 
     Parameters
@@ -142,6 +148,10 @@ def fit(model, observations, noise, start=None):
     noise : Noise
     start : Estimate, optional
         Of this model; by `registered` without.
+    reweighted : bool
+        Whether the start comes of a fit: outliers lose weight from the first step on.
+    settled : float
+        Largest step that remains, in standard errors.
 
     Returns
     -------
@@ -150,11 +160,12 @@ def fit(model, observations, noise, start=None):
     few = sample_of(observations, _MOST_STARTED_FROM)
     if len(few) < len(observations):
         # Where all the readings lead is close to where some of them do.
-        start = fit(model, few, noise, start).estimate
+        start = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate
         around = _kept_circumstances(model, start, observations)
-        return _robustly(model, observations, around, noise, start, reweighted=True)
+        return _robustly(model, observations, around, noise, start, reweighted=True, settled=settled)
     start = registered(model, observations) if start is None else start
-    return _robustly(model, observations, _kept_circumstances(model, start, observations), noise, start)
+    around = _kept_circumstances(model, start, observations)
+    return _robustly(model, observations, around, noise, start, reweighted=reweighted, settled=settled)
 
 
 def _kept_circumstances(model, estimate, observations):
@@ -191,14 +202,16 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
     return _robustly(model, observations, around, noise, start, frozen).estimate
 
 
-def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False):
+def _robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False, settled=_SETTLED):
     """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
     (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where readings have errors in common there is none: weights
     come before whitening, which would carry an outlier into the readings beside it, and the estimate solves the weighted
-    equations (Preisser and Qaqish 1999). Against curvature a step is backtracked (Nocedal and Wright 2006, 3.1). The first step
-    gives all observations one weight, unless the start comes of reweighted steps already.
+    equations (Preisser and Qaqish 1999). A whitening belongs to the axes in which a step begins: residuals after the step
+    are turned into these, or a fit would turn frame and robot together on and on. Against curvature a step is backtracked
+    (Nocedal and Wright 2006, 3.1). The first step gives all observations one weight, unless the start comes of reweighted
+    steps already.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
@@ -214,7 +227,7 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
         """Half the weighted squares of the residual and of what has a prior."""
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
-    converged, scale, last = False, 1.0, np.zeros(len(plausible))
+    converged, scale, last, stuck = False, 1.0, np.zeros(len(plausible)), False
     readings = _Parts(model, observations, noise, around, plausible)
     readings.linearize(estimate)
     for step_number in range(_STEPS):
@@ -236,8 +249,8 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
             step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
-        settled = _SETTLED * (scale * deviation) + (deviation == 0)
-        converged = bool(step_number or reweighted) and bool((np.abs(step) <= settled).all())
+        small = settled * (scale * deviation) + (deviation == 0)
+        converged = bool(step_number or reweighted) and bool((np.abs(step) <= small).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break
@@ -261,9 +274,13 @@ def _robustly(model, observations, around, noise, estimate, frozen=False, reweig
         else:
             estimate = origin
             readings.linearize(estimate)
-            # The first step has another objective than those that follow: all observations count alike.
-            if step_number:
+            # A step goes by the loads of the step before, and the first one by weights that are all alike: once more by those
+            # of now.
+            if stuck:
                 break
+            stuck = True
+            continue
+        stuck = False
     return readings.fit(estimate, held, covariance, weights, converged)
 
 
@@ -291,8 +308,9 @@ class _Parts:
             self.around = [at_states(around, states) for states, _ in self.slices]
         self.coordinates = [None] * len(self.parts)
         self.whiteners = [None] * len(self.parts)
-        joints = model.sites.joints
-        self.jacobian = np.zeros((len(observations), observations.rows, joints))
+        # Of so many states that circumstances are not kept neither is this.
+        shape = len(observations), observations.rows, model.sites.joints
+        self.jacobian = None if around is None else np.zeros(shape)
         self.line = None
 
     def linearize(self, estimate):
@@ -308,6 +326,7 @@ class _Parts:
 
     def whiten(self):
         """Take loads and whitening at the present estimate."""
+        self.origin = self.estimate
         if self.whole:
             self.around = [self.line.circumstances]
             self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
@@ -317,7 +336,7 @@ class _Parts:
                 if self.noise.pose_rad or self.noise.joint_rad.any():
                     self._linearized(number, part)
                 else:
-                    self.whiteners[number] = whitening(part, self.jacobian[self.slices[number][1]], self.noise)
+                    self.whiteners[number] = whitening(part, None, self.noise)
 
     def normal_equations(self, weights):
         """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
@@ -327,7 +346,8 @@ class _Parts:
             line = self.line if self.whole else self._linearized(number, part)
             whitener, mine = self.whiteners[number], root[seen]
             right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
-            left = whitener.apply(line.sensitivities * mine[:, None, None]).reshape(len(right), -1)
+            left = _of_rotation_vectors(line.sensitivities, line.residual) * mine[:, None, None]
+            left = whitener.apply(left).reshape(len(right), -1)
             left *= self.plausible
             gram += left.T @ left
             along += left.T @ right
@@ -338,12 +358,23 @@ class _Parts:
         return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
 
     def squares(self, weights, estimate=None):
-        """Sum of squares of the whitened residual, each observation weighted as in `normal_equations`; of another estimate."""
+        """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
         residual = self.residual
         if estimate is not None:
             found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
             residual = np.concatenate(found)
+        residual = self._in_axes_of_step(residual, self.estimate if estimate is None else estimate)
         return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
+
+    def _in_axes_of_step(self, residual, estimate):
+        """A residual in the base axes of an estimate in those of the one by which it is whitened."""
+        turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
+        if (turn == np.eye(3)).all():
+            return residual
+        states, state = self.observations.states, self.observations.state
+        session = np.searchsorted(estimate.sessions, states.session[state])
+        vectors = residual.reshape(len(residual), -1, 3)
+        return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
 
     def fit(self, estimate, held, covariance, weights, converged):
         """The `Fit` of these readings."""
@@ -370,23 +401,40 @@ class _Parts:
         kept = self.around[number]
         if kept is not None:
             return kept
-        return circumstances(self.model, estimate or self.estimate, self.parts[number].states, self.coordinates[number])
+        states, coordinates = self.parts[number].states, None
+        if self.coordinates[number] is not None:
+            moved, displaced = self.coordinates[number]
+            coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
+            coordinates[:, moved] = displaced
+        return circumstances(self.model, estimate or self.estimate, states, coordinates)
 
     def _linearized(self, number, part):
         around = self._around(number)
         line = linearize(self.model, self.estimate, part, around)
         if self.around[number] is None:
-            self.coordinates[number] = displaced_coordinates(self.model, self.estimate, around)
+            displaced = displaced_coordinates(self.model, self.estimate, around)
+            moved = np.flatnonzero(displaced.any(axis=0))
+            self.coordinates[number] = moved, displaced[:, moved]
         else:
             self.around[number] = line.circumstances
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
-        self.jacobian[self.slices[number][1]] = jacobian
+        if self.jacobian is not None:
+            self.jacobian[self.slices[number][1]] = jacobian
         self.whiteners[number] = whitening(part, jacobian, self.noise)
         return line
 
     def _whitened(self, residual):
         pairs = zip(self.whiteners, self.slices, strict=True)
         return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
+
+
+def _of_rotation_vectors(sensitivities, residual):
+    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2)."""
+    if residual.shape[1] == 3:
+        return sensitivities
+    turned = sensitivities[:, 3:]
+    exact = turned + 0.5 * np.cross(residual[:, 3:, None], turned, axis=1)
+    return np.concatenate([sensitivities[:, :3], exact], axis=1)
 
 
 def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):

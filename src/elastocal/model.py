@@ -523,7 +523,8 @@ def _target_columns(rotation, mask, rows):
 def _shape_columns(effect, values, shapes, circumstances, jacobian, state):
     columns = np.zeros((*jacobian.shape[:2], len(shapes)))
     for number in range(len(shapes)):
-        step = _SHAPE_STEP * shapes[number]
+        shape = effect.shapes[number]
+        step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
         sides = []
         for sign in (1, -1):
             moved = shapes.copy()

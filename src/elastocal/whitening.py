@@ -53,8 +53,19 @@ def whitening(observations, jacobian, noise):
     -------
     Whitening
     """
+    if not noise.pose_rad and not noise.joint_rad.any():
+        return Whitening(tuple(_of_sensor_alone(observations, noise)))
     blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise)]
     return Whitening(tuple(blocks))
+
+
+def _of_sensor_alone(observations, noise):
+    """Blocks where nothing is correlated: one factor for all that are averages of as many repeats, held once."""
+    precision = np.diag(1.0 / np.repeat([noise.position_m, noise.orientation_rad], 3)[: observations.rows])
+    repeats = observations.states.repeats[observations.state]
+    for number in np.unique(repeats):
+        members = np.flatnonzero(repeats == number)[:, None]
+        yield members, np.broadcast_to(np.sqrt(number) * precision, (len(members), *precision.shape))
 
 
 def _covariances(observations, jacobian, noise):

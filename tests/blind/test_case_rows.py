@@ -50,8 +50,9 @@ def test_standard_error_is_the_verdicts_own():
         ([effect("payload")], (-0.14, -0.06), (True, True)),
         ([effect("payload")], (-0.25, 0.05), (True, False)),
         ([], (-0.14, -0.06), (False, False)),
-        ([effect("wrong_unit") | {"family": "data"}], (-0.14, -0.06), (False, False)),
-        ([effect("wrong_unit") | {"family": "data"}, effect("payload")], (-0.14, -0.06), (True, True)),
+        ([effect("payload", adopted=False)], (-0.14, -0.06), (False, False)),
+        ([effect("wrong_unit", adopted=False) | {"family": "data"}], (-0.14, -0.06), (False, False)),
+        ([effect("wrong_unit", adopted=False) | {"family": "data"}, effect("payload")], (-0.14, -0.06), (True, True)),
     ],
 )
 def test_an_adopted_effect_that_makes_it_worse_counts_whether_warned_of_or_not(effects, reduction, expected):

@@ -29,13 +29,13 @@ from elastocal.blind.cases import (
     write_manifest,
 )
 from elastocal.campaign import read_campaign
-from elastocal.plant.arm import arm_from_file
+from elastocal.plant.arm import LinkMass, arm_from_file
 from elastocal.plant.campaigns import schedule_of
 from elastocal.plant.defects import KINDS, with_defects
 from elastocal.plant.drives import Visits
 from elastocal.plant.physical_robot import seen_poses
 from elastocal.plant.sizing import Yardstick
-from elastocal.plant.weights import centre_std_m
+from elastocal.plant.weights import allowed_centre_std_m, centre_std_m
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 
@@ -201,6 +201,14 @@ def test_an_error_of_the_pose_is_common_to_its_readings_and_other_at_other_poses
     each = turn[np.unique(schedule.pose, return_index=True)[1]]
     # 180 draws: their standard deviation is within 20 % of what it is drawn with in all but one of a thousand seeds.
     assert each.std() == pytest.approx(1.5e-5, rel=0.2)
+
+
+def test_an_analyst_must_allow_centres_anywhere_in_their_links():
+    """As many times the relative error as a link is wide, a tenth of the arm, where the centre lies nearer to its joint."""
+    far, near = LinkMass(2, 100.0, (0.3, 0.0, 0.4), 0.1), LinkMass(2, 100.0, (0.0, 0.0, 0.05), 0.1)
+    assert allowed_centre_std_m(far, 2.5) == pytest.approx(0.1 * 0.5)
+    assert allowed_centre_std_m(near, 2.5) == pytest.approx(0.1 * 0.25)
+    assert allowed_centre_std_m(near, 0.2) == pytest.approx(0.1 * 0.05)
 
 
 def test_centres_off_the_line_lie_beyond_what_is_declared_and_three_kilonewtons_are_pulled():

@@ -29,7 +29,8 @@ def test_members_are_the_candidates_at_the_true_joints(kuka):
 
 
 def test_frames_of_a_load_error_are_variants_and_bands_of_orders_are_parts(kuka):
-    assert keys("force_bias", (), kuka.chain) == [["force_bias[base axes]"], ["force_bias[flange axes]"]]
+    frames = [[f"force_bias[{axes} axes{how}]"] for how in ("", " in the pull") for axes in ("base", "flange")]
+    assert keys("force_bias", (), kuka.chain) == frames
     (bands,) = keys("transmission_harmonic", (4,), kuka.chain)
     assert len(bands) == 7
 

@@ -84,7 +84,9 @@ def test_effects_that_make_held_out_errors_worse_count_against_all_that_were_ado
     worse = verdict("named", effect("payload"), before=1e-4, after=1.2e-4, reduction=(-0.22, -0.18), warnings=["held-out grew"])
     quantity = "effect adopted and held-out RMS worse by over two standard errors"
     fine = [(truth(("payload",)), PAYLOAD, oracle())] * 98
-    silent = [(truth(), silence(), oracle(1.0))] * 50
+    # What was found and not adopted is neither.
+    unsure = verdict("class", effect("payload", adopted=False), before=1e-4, after=1.2e-4, reduction=(-0.22, -0.18))
+    silent = [(truth(), silence(), oracle(1.0))] * 50 + [(truth(("payload",)), unsure, oracle())] * 5
     row = summary(*fine, *silent).loc[("proof", quantity)]
     assert (row.hits, row.cases, row.holds) == (0, 98, True)
     assert not summary(*fine, *silent, *[(truth(("payload",)), worse, oracle())] * 2).loc[("proof", quantity)].holds

@@ -10,7 +10,7 @@ from scipy.stats import binom
 from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.settings import Settings
 
 UNITS = (
@@ -88,14 +88,21 @@ def test_statistic_rises_and_p_value_falls_with_the_size_of_what_is_missing():
     assert not found[0].raised
 
 
-def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors():
-    """Of all models of one unit, each averaged over sizes and pose errors; signs of physics do not count."""
+@pytest.mark.parametrize("smallest", [0, 1, 2, 4])
+def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
+    """Of all models of one unit, each averaged over its sizes and pose errors; signs of physics do not count.
+
+    Sizes begin a step below the smallest.
+    """
     problem, products = signalled(0.3)
+    problem = replace(problem, units=(*problem.units[:2], replace(problem.units[2], smallest=smallest), *problem.units[3:]))
     found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
     # The sizes of the pose error that draws at zero can make likely: zero and the two next.
     some = problem.statistics.at(np.arange(3))
     log_pose = problem.log_pose[:3]
-    unsigned = [replace(unit, signs=np.zeros(len(unit.columns), int)) for unit in problem.units]
+    unsigned = [
+        replace(unit, signs=np.zeros(len(unit.columns), int), smallest=max(unit.smallest - 1, 0)) for unit in problem.units
+    ]
     nothing = evaluate(some, [], problem.grid, log_pose, []).log_evidence
     total = [
         evaluate(some, [unit], problem.grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of([unit])
@@ -111,6 +118,6 @@ def test_it_is_the_same_for_one_seed():
 
 def test_it_agrees_with_the_posterior_on_what_cannot_be_missed():
     problem, products = signalled(1.5)
-    found, nothing = posterior(problem)
+    found, (nothing, _) = posterior(problem), first_look(problem)
     assert alarm_of(problem, products, nothing.pose_error_rad, np.random.default_rng(9)).raised
     assert found.models[0].units == (2,)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
 
-from elastocal.diagnosis.averaging import averaged
+from elastocal.diagnosis.averaging import averaged, expected_to_help, squares_explained
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.search import Model, Posterior
 
@@ -117,3 +117,77 @@ def test_models_that_hold_next_to_nothing_are_left_out(made):
     found = [posterior_of(best, *rest) for rest in ((), [((0, 1), [0.3, 1.0], 0.0, 0.001)])]
     one, other = (averaged(line, each, each.models[0], OWNERS) for each in found)
     assert one == other
+
+
+def most_probable(rows, problem, model):
+    """Coefficients of a model, dense: at its sizes, and at the pose error that is then most probable."""
+    columns = np.concatenate([np.zeros(0, int), *(problem.units[number].columns for number in model.units)])
+    deviations = np.repeat(model.scales, [len(problem.units[number].columns) for number in model.units])
+    W, y = rows.candidates[:, columns] * deviations, rows.residual - rows.expected
+    densities = []
+    for tau, log_pose in zip(TAU, problem.log_pose, strict=True):
+        covariance = rows.marginal_covariance(tau) + W @ W.T
+        densities.append(log_pose - 0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * y @ np.linalg.solve(covariance, y))
+    found = np.zeros(rows.candidates.shape[1])
+    found[columns] = regression(rows, TAU[int(np.argmax(densities))], columns, deviations)[0][4:]
+    return found
+
+
+def projected_gram(rows):
+    """Of the columns without what declared parameters can make of them, at no pose error, dense."""
+    return rows.candidates.T @ np.linalg.solve(rows.marginal_covariance(0.0), rows.candidates)
+
+
+def expected_square(rows, problem, found, model):
+    """Of the error of predictions with a model's displacement, in expectation over all models: written out."""
+    gram = projected_gram(rows)
+    mine = most_probable(rows, problem, model) if model else np.zeros(len(gram))
+    errors = [most_probable(rows, problem, other) - mine for other in found.models]
+    return sum(p * error @ gram @ error for p, error in zip(found.probabilities, errors, strict=True))
+
+
+@pytest.mark.parametrize("best", [0.25, 0.45, 0.55, 0.9])
+@pytest.mark.parametrize("beside", [(), (1,), (1, 2), (2,)])
+def test_a_model_is_expected_to_help_where_the_expected_square_of_the_error_falls(made, best, beside):
+    rows, line = made
+    rest = [(beside, [0.3, 1.0][: len(beside)], 0.0, 0.6 * (1 - best)), ((0, 1), [0.3, 0.3], 0.0, 0.4 * (1 - best))]
+    found = posterior_of(((0,), [0.3], 0.0, best), *rest)
+    for model in found.models:
+        falls = expected_square(rows, line.problem, found, model) < expected_square(rows, line.problem, found, None)
+        assert expected_to_help(line.problem, found, model) == (falls and len(model.units) > 0)
+
+
+def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
+    """The whole of an effect is twice its mean at a probability of a half."""
+    _, line = made
+    for probability, helps in ((0.49, False), (0.51, True)):
+        found = posterior_of(((0,), [0.3], 0.0, probability), ((), [], 0.0, 1 - probability))
+        assert expected_to_help(line.problem, found, found.models[0]) == helps
+
+
+def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():
+    """Two names of one displacement: either may be adopted, as the readings at hand cannot tell between them."""
+    rows = made_rows(1, poses=12)
+    candidates = rows.candidates.copy()
+    candidates[:, 2] = candidates[:, 0]
+    rows = replace(rows, candidates=candidates, residual=rows.residual + 0.5 * candidates[:, 0])
+    problem, _ = made_problem(rows, (made_unit("a", (1,), 0), made_unit("b", (1,), 2)), tau=TAU)
+    found = posterior_of(((0,), [0.3], 0.0, 0.3), ((1,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.4))
+    assert expected_to_help(problem, found, found.models[0]) and expected_to_help(problem, found, found.models[1])
+    apart = posterior_of(((0,), [0.3], 0.0, 0.3), ((), [], 0.0, 0.7))
+    assert not expected_to_help(problem, apart, apart.models[0])
+
+
+def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_makes(made):
+    """Of its units together: of a mechanism at two locations their columns add up before they are squared."""
+    rows, _ = made
+    units = (UNITS[0], made_unit("a", (2,), 2), UNITS[2])
+    problem, _ = made_problem(rows, units, tau=TAU)
+    model = Model((0, 1, 2), 0.0, np.array([0.3, 1.0, 0.1]), 0.0)
+    coefficients, gram = most_probable(rows, problem, model), projected_gram(rows)
+    expected = {}
+    for mechanism, columns in (("a", [0, 1, 2]), ("other", [3, 4])):
+        some = np.zeros(len(coefficients))
+        some[columns] = coefficients[columns]
+        expected[mechanism] = some @ gram @ some
+    assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)

@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal, norm
 
 from elastocal.diagnosis.evidence import (
     Grid,
+    Joint,
     added_evidence,
     blocks_of,
     condition,
@@ -173,7 +174,7 @@ def test_added_evidence_is_that_of_the_model_with_each_unit_added_at_each_size()
     statistics = statistics_of(rows.products, TAU)
     conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
     blocks = blocks_of(conditioned.gram, UNITS, [1, 2])
-    found = added_evidence(conditioned, blocks, GRID, statistics.freedom, len(UNITS))
+    found = added_evidence(conditioned, blocks, GRID, statistics.freedom, UNITS)
     assert found.shape == (3, 3, 5) and np.isneginf(found[:, 0]).all()
     constant = None
     for place, tau in enumerate(TAU):
@@ -264,6 +265,54 @@ def test_weights_of_sizes_are_log_normal_about_the_center_and_sum_to_one():
 def test_weights_of_the_pose_error_are_those_of_the_settings():
     weights = np.exp(pose_weights(np.array([0.0, 1.0, 2.0, 3.0]), replace(SETTINGS, pose_error_probability=0.3)))
     np.testing.assert_allclose(weights, [0.7, 0.1, 0.1, 0.1])
+
+
+def test_sizes_below_the_smallest_of_a_unit_weigh_nothing_and_those_above_as_before():
+    whole, some = (np.exp(GRID.of(made_unit("a", (1,), 0, smallest=smallest))) for smallest in (0, 2))
+    np.testing.assert_allclose(whole, np.exp(GRID.log_weights))
+    assert not some[:2].any() and some.sum() == pytest.approx(1.0)
+    np.testing.assert_allclose(some[2:] / some[-1], whole[2:] / whole[-1])
+
+
+def test_evidence_is_averaged_over_the_sizes_that_a_unit_may_have():
+    """Of a small signal, for which the sizes left out are the likely ones: wherever the search for the sizes starts."""
+    rows = quiet(1, (0.02, -0.01))
+    unit = replace(UNITS[0], smallest=3)
+    left = Grid(GRID.scales[3:], GRID.log_weights[3:] - logsumexp(GRID.log_weights[3:]))
+    expected = brute_log_bayes_factor(rows, [unit], left)
+    for start in SETTINGS.scales:
+        found = evaluated(rows, [unit], [start])
+        assert found.log_evidence - evaluated(rows, ()).log_evidence == pytest.approx(expected, abs=1e-8)
+        assert found.scales[0] >= GRID.scales[3]
+    assert expected < brute_log_bayes_factor(rows, [unit]) - 1.0
+    # Without it the model is the smaller one all the same.
+    assert found.without[0] == pytest.approx(evaluated(rows, ()).log_evidence, abs=1e-8)
+
+
+def test_added_evidence_of_a_unit_is_none_at_sizes_that_it_may_not_have():
+    statistics = statistics_of(quiet(8, SIGNALS["a"]).products, TAU)
+    units = [*UNITS[:2], replace(UNITS[2], smallest=2)]
+    conditioned = condition(statistics, UNITS[0].columns, np.full(2, 0.3), LOG_POSE)
+    every, some = (
+        added_evidence(conditioned, blocks_of(conditioned.gram, UNITS, [1, 2]), GRID, statistics.freedom, listed)
+        for listed in (UNITS, units)
+    )
+    np.testing.assert_array_equal(some[:, 1], every[:, 1])
+    assert np.isneginf(some[:, 2, :2]).all()
+    shift = -logsumexp(GRID.log_weights[2:])
+    np.testing.assert_allclose(some[:, 2, 2:], every[:, 2, 2:] + shift)
+
+
+def test_moments_are_averaged_over_the_sizes_that_a_unit_may_have():
+    """As without a restriction on a grid of those sizes alone."""
+    statistics = statistics_of(quiet(16, (0.03, -0.02)).products, TAU)
+    base = statistics.log_likelihood + LOG_POSE
+    unit = replace(UNITS[0], smallest=2)
+    left = Grid(GRID.scales[2:], GRID.log_weights[2:] - logsumexp(GRID.log_weights[2:]))
+    ((mean, variance),) = Joint(statistics, [unit], GRID, base, np.array([3])).moments()
+    ((expected, spread),) = Joint(statistics, [UNITS[0]], left, base, np.array([1])).moments()
+    np.testing.assert_allclose(mean, expected)
+    np.testing.assert_allclose(variance, spread)
 
 
 def test_log_sum_exp_is_scipys():

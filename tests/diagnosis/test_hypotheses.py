@@ -9,6 +9,7 @@ from support import UR10, robot_of
 from synthetic import equipped
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
+from elastocal.diagnosis.other import FORCE, NEIGHBOURS, OWN, PLACE, SHIFT, TURN, Competitor
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
 
@@ -24,7 +25,7 @@ def every_model(units):
 
 
 def made_units():
-    """Three mechanisms: at three locations, one of which has three laws; at two; and at one."""
+    """Three mechanisms: at three locations, one of which has three laws; at two; and at one. A competitor of two laws."""
     third = float(np.log(1 / 3))
     return (
         made_unit("harmonic", (1,), 0),
@@ -33,12 +34,15 @@ def made_units():
         made_unit("offset", (1,), 5),
         made_unit("offset", (2,), 6),
         made_unit("link_weight", (), 7),
+        made_unit(OTHER, (1,), 8, log_prior=float(np.log(1 / 2))),
+        made_unit(OTHER, (1,), 9, log_prior=float(np.log(1 / 2))),
     )
 
 
 def test_probabilities_of_all_models_sum_to_one():
     units, prior = made_units(), prior_of(made_units(), SETTINGS)
     nothing = (1 - SETTINGS.mechanism_probability) ** 2 * (1 - SETTINGS.gravity_probability)
+    nothing *= 1 - SETTINGS.other_probability
     total = sum(nothing * np.exp(prior.log_odds_of(model)) for model in every_model(units))
     assert total == pytest.approx(1.0, abs=1e-12)
 
@@ -47,7 +51,9 @@ def test_each_mechanism_is_there_with_the_probability_of_the_settings():
     units, prior = made_units(), prior_of(made_units(), SETTINGS)
     odds = [({unit.mechanism for unit in model}, np.exp(prior.log_odds_of(model))) for model in every_model(units)]
     total, known = sum(value for _, value in odds), SETTINGS.mechanism_probability
-    for mechanism, probability in (("harmonic", known), ("offset", known), ("link_weight", 0.5)):
+    other = SETTINGS.other_probability
+    assert known < other < 0.5
+    for mechanism, probability in (("harmonic", known), ("offset", known), ("link_weight", 0.5), (OTHER, other)):
         there = sum(value for mechanisms, value in odds if mechanism in mechanisms)
         assert there / total == pytest.approx(probability)
 
@@ -93,20 +99,46 @@ def catalogue():
 
 
 def test_units_of_the_catalogue_have_columns_of_their_own_that_share_out_all(catalogue):
-    tried = [(c, (value,)) for c in catalogue for value in (0.1, 0.5)[: len(c.shapes) or 1]]
-    tried = [(c, values if c.shapes else ()) for c, values in tried]
-    tried += [(c, (0.5,)) for c in catalogue if c.shapes]
-    features = [((1,), 40), ((), 48)]
+    tried = [(c, (value,)) for c in catalogue for shape in c.shapes for value in shape.values(3)]
+    tried += [(c, ()) for c in catalogue if not c.shapes]
+    features = [
+        (Competitor((1,), OWN), 40),
+        (Competitor((1,), NEIGHBOURS), 40),
+        (Competitor((), FORCE, SHIFT), 24),
+        (Competitor((), FORCE, TURN), 24),
+        (Competitor((), PLACE, TURN), 24),
+    ]
     units = units_of(tried, features, SETTINGS)
     columns = np.concatenate([unit.columns for unit in units])
     np.testing.assert_array_equal(np.sort(columns), np.arange(len(columns)))
-    assert [unit.location for unit in units if unit.mechanism == OTHER] == [(1,), ()]
+    against = [unit for unit in units if unit.mechanism == OTHER]
+    assert [(unit.competitor, len(unit.columns)) for unit in against] == features
+    assert not any(unit.competitor for unit in units if unit.candidate)
     # Laws and shapes at one location share its probability.
-    for mechanism in {unit.mechanism for unit in units} - {OTHER}:
+    for mechanism in {unit.mechanism for unit in units}:
         for place in {unit.location for unit in units if unit.mechanism == mechanism}:
             mine = [unit.log_prior for unit in units if (unit.mechanism, unit.location) == (mechanism, place)]
             assert np.exp(mine).sum() == pytest.approx(1.0), (mechanism, place)
     assert len({unit.key for unit in units}) == len(units)
+
+
+def test_laws_share_a_location_alike_and_shapes_of_a_law_by_the_part_of_the_range_that_they_stand_for(catalogue):
+    """Where shapes are denser each has less: three near each other do not make their law more probable than the others."""
+    growth = {c.key: c for c in catalogue if c.effect == "thermal_growth"}
+    by_temperature, by_time = growth["thermal_growth[temperature]"], growth["thermal_growth[time]"]
+    lags = (1000.0, 8000.0, 7900.0, 8100.0)
+    units = units_of([(by_temperature, ()), *((by_time, (lag,)) for lag in lags)], [], SETTINGS)
+    found = np.exp([unit.log_prior for unit in units])
+    assert by_temperature.location == by_time.location
+    assert found[0] == pytest.approx(0.5)
+    np.testing.assert_allclose(found[1:], 0.5 * by_time.shapes[0].shares(lags))
+    assert found[2] < 0.1 * found[1] and found[3] > 5 * found[2]
+
+
+def test_a_shape_that_is_tried_alone_has_all_of_its_law(catalogue):
+    (column,) = (c for c in catalogue if c.key == "link_elasticity[column]")
+    (unit,) = units_of([(column, (0.59,))], [], SETTINGS)
+    assert unit.log_prior == 0.0
 
 
 def test_plausible_sizes_fall_with_the_order_of_a_harmonic_and_signs_are_those_of_physics(catalogue):

@@ -9,8 +9,16 @@ from scipy.stats import chi2, ncx2
 from synthetic import NOISE, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.linearize import declared_geometry, lacking, linearized, shapes_tried
-from elastocal.diagnosis.linearize import testable as which_are_testable
+from elastocal.diagnosis.linearize import (
+    declared_geometry,
+    lacking,
+    linearized,
+    shapes_looked_at_closely,
+    shapes_tried,
+    smallest_shown,
+)
+from elastocal.diagnosis.other import competitors
+from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting import fit
 from elastocal.model import residuals
@@ -40,7 +48,7 @@ def with_effect(campaign, key, values):
 
 
 def unit_of(found, key):
-    return next(unit for unit in found.problem.units if unit.key == key)
+    return next(unit for unit in found.problem.units if unit.candidate and unit.candidate.key == key)
 
 
 @pytest.mark.parametrize("key", ["joint_offset@2", "joint_tilt@2", "link_elasticity@3"])
@@ -112,10 +120,16 @@ def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
     assert found.declared_size == 1.0
 
 
-def test_the_competitor_is_at_every_joint_and_at_the_base_always(campaign):
-    found = problem_of(campaign, keys=KEYS[:1])
-    places = [unit.location for unit in found.problem.units if unit.mechanism == OTHER]
-    assert places == [(1,), (2,), (3,), (4,), (5,), (6,), ()]
+def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
+    loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
+    quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
+    found = problem_of(campaign, quiet, KEYS[:1])
+    assert loud < {unit.key for unit in found.problem.units}
+    against = [unit.competitor for unit in found.problem.units if unit.mechanism == OTHER]
+    assert against == competitors(campaign.declared.circumstances)
+    assert {each.location for each in against} == {(1,), (2,), (3,), (4,), (5,), (6,), ()}
+    columns = [len(unit.columns) for unit in found.problem.units if unit.mechanism == OTHER and unit.location]
+    assert set(columns) == {SETTINGS.other_features}
 
 
 def test_candidates_without_their_covariate_are_untestable_with_the_reason(kuka):
@@ -139,6 +153,16 @@ def test_too_few_angles_of_a_joint_test_no_harmonic_of_it(kuka):
     assert told == f"3 angles of joint 4 where {candidate.distinct_angles} are needed"
 
 
+@pytest.mark.parametrize("angles", [3, 7, 8])
+def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
+    """A law that belongs to no joint and goes with the angle of one."""
+    states = made_states(6, 30, seed=4)
+    states.joint_angles[:, 5] = np.arange(30) % angles * 0.4
+    campaign = planted(kuka, {}, states=states, targets=HAND)
+    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model.sites, states)
+    assert told == ("" if angles == 8 else f"{angles} angles of joint 6 where 8 are needed")
+
+
 def test_what_is_too_small_to_be_seen_at_its_plausible_size_is_untestable(kuka):
     """Readings a thousand times as noisy show no offset."""
     campaign = planted(kuka, {}, seed=5)
@@ -148,28 +172,148 @@ def test_what_is_too_small_to_be_seen_at_its_plausible_size_is_untestable(kuka):
     assert not any(unit.candidate for unit in found.problem.units)
 
 
-def test_a_testable_unit_would_be_found_with_a_power_of_a_half(campaign):
-    """Non-centrality equal to the critical value of a chi-square of one degree of freedom."""
+def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_half(campaign):
+    """Non-centrality equal to the critical value of a chi-square of one degree of freedom, at each of the sizes."""
     problem = problem_of(campaign).problem
-    gram = problem.statistics.gram.copy()
+    gram, scales = problem.statistics.gram.copy(), SETTINGS.scales
     units = [unit for unit in problem.units if unit.candidate]
     critical = chi2.isf(SETTINGS.alarm_level / len(units), 1)
-    assert ncx2.sf(critical, 1, critical) == pytest.approx(SETTINGS.testable_power, abs=0.01)
-    for factor, expected in ((1.01, True), (0.99, False)):
-        largest = np.linalg.eigvalsh(gram[0][np.ix_(units[0].columns, units[0].columns)])[-1]
-        scaled = replace(problem.statistics, gram=gram * factor * critical / largest)
-        assert which_are_testable(scaled, units, SETTINGS)[0] == expected
+    assert ncx2.sf(critical, 1, critical) == pytest.approx(0.5, abs=0.01)
+    largest = np.linalg.eigvalsh(gram[0][np.ix_(units[0].columns, units[0].columns)])[-1]
+    for place, scale in enumerate(scales):
+        for factor, shown in ((1.01, place), (0.99, place + 1)):
+            scaled = replace(problem.statistics, gram=gram * factor * critical / largest / scale**2)
+            assert smallest_shown(scaled, units, SETTINGS)[0] == shown
+
+
+def test_units_know_the_smallest_size_that_readings_show(campaign):
+    """Ten times as noisy, sizes ten times as large; none left where even the plausible size does not show."""
+    smallest = {}
+    for factor in (1.0, 10.0):
+        noisy = replace(campaign.declared, noise=campaign.declared.noise.scaled(factor))
+        found = problem_of(campaign, noisy).problem
+        np.testing.assert_array_equal(
+            [unit.smallest for unit in found.units], smallest_shown(found.statistics, found.units, SETTINGS)
+        )
+        smallest[factor] = {unit.key: unit.smallest for unit in found.units}
+    both = smallest[1.0].keys() & smallest[10.0].keys()
+    grown = np.array([smallest[10.0][key] - smallest[1.0][key] for key in both])
+    # Two sizes are a factor of ten; at the lower end of the sizes there are fewer.
+    assert set(grown) <= {0, 1, 2} and (grown == 2).any()
 
 
 def test_shapes_are_tried_over_their_range_and_as_fitted(campaign):
-    shaped = next(candidate for candidate in campaign.all_candidates if candidate.shapes)
+    shaped = next(candidate for candidate in campaign.all_candidates if candidate.shapes and not candidate.shapes[0].tried)
     (shape,) = shaped.shapes
     tried = [value for (value,) in shapes_tried(shaped, campaign.declared)]
-    assert tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
+    assert len(tried) == 3 and tried == sorted(tried) and shape.lowest < tried[0] and tried[-1] < shape.highest
     model, start = with_effect(campaign, shaped.key, 0.0)
     fitted = replace(campaign.declared, model=model, estimate=start)
     assert shapes_tried(shaped, fitted) == [(shape.start,)]
     assert shapes_tried(campaign.candidates["joint_offset@3"], campaign.declared) == [()]
+
+
+@pytest.mark.parametrize("when", [0.63, 1 / 12, 0.9])
+def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(campaign, when):
+    """Itself among them, or the fit could only become worse; each of its values has a share of the prior."""
+    step = campaign.candidates["setup_step"]
+    model, start = with_effect(campaign, "setup_step", 0.0)
+    start.shapes[-1][:] = when
+    tried = [value for (value,) in shapes_tried(step, replace(campaign.declared, model=model, estimate=start))]
+    (shape,) = step.shapes
+    assert np.isclose(tried, when).any() and len(tried) >= 4
+    assert min(tried) >= shape.lowest and max(tried) <= shape.highest
+    assert np.ptp(tried) < 0.5 / 12
+    assert (shape.shares(tried) > 0).all()
+
+
+def looked_at(problem, alone):
+    return {key: [value for (value,) in values] for key, values in shapes_looked_at_closely(problem, np.array(alone)).items()}
+
+
+@pytest.fixture(scope="module")
+def bent(campaign):
+    """The problem of two laws with a shape that is tried at several values, one with a single one, and one without."""
+    keys = ("setup_step", "thermal_growth[time]", "link_elasticity@3", "joint_offset@3")
+    return problem_of(campaign, keys=keys).problem
+
+
+def factors(problem, sizes):
+    """Log Bayes factors of units alone: those given for a candidate at one of its shapes, nothing for all others."""
+    found = np.zeros(len(problem.units))
+    for (key, place), size in sizes.items():
+        numbers = [n for n, unit in enumerate(problem.units) if unit.candidate and unit.candidate.key == key]
+        found[numbers[place]] = size
+    return found
+
+
+def test_no_shape_is_looked_at_more_closely_where_none_matters(bent):
+    assert looked_at(bent, factors(bent, {})) == {}
+    assert looked_at(bent, factors(bent, {("setup_step", 5): 4.9})) == {}
+    # Nor where something else is far better.
+    assert looked_at(bent, factors(bent, {("setup_step", 5): 30.0, ("joint_offset@3", 0): 60.0})) == {}
+
+
+def test_the_shapes_of_the_best_candidates_are_looked_at_more_closely_about_the_best_value_of_each(bent):
+    sizes = {("setup_step", 5): 30.0, ("setup_step", 6): 25.0, ("thermal_growth[time]", 1): 28.0, ("joint_offset@3", 0): 29.0}
+    found = looked_at(bent, factors(bent, sizes))
+    assert set(found) == {"setup_step", "thermal_growth[time]"}
+    twelfths = np.arange(1, 12) / 12
+    closer = np.linspace(5 / 12, 7 / 12, 9)[1:-1]
+    np.testing.assert_allclose(found["setup_step"], np.unique(np.round([*twelfths, *closer], 12)))
+    lags = np.geomspace(900.0, 36000.0, 5)
+    closer = np.geomspace(lags[1], lags[3], 9)
+    np.testing.assert_allclose(found["thermal_growth[time]"], closer)
+
+
+@pytest.mark.parametrize(
+    ("key", "place", "best", "ends"),
+    [
+        ("setup_step", 0, 1 / 12, (1 / 12, 2 / 12)),
+        ("setup_step", 10, 11 / 12, (10 / 12, 11 / 12)),
+        ("link_elasticity@3", 0, 0.3, (0.0, 0.6)),
+    ],
+)
+def test_the_best_shape_stays_among_those_looked_at_wherever_it_lies(bent, key, place, best, ends):
+    (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
+    assert np.isclose(values, best).sum() == 1 and values == sorted(values)
+    inside = [value for value in values if ends[0] < value < ends[1]]
+    assert len(inside) >= 3 and (np.diff(values) > 1e-6).all()
+
+
+def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_at(campaign):
+    """A fit tries its own value alone, which is nowhere near the middle of the range."""
+    key = "thermal_growth[time]"
+    model, start = with_effect(campaign, key, 0.0)
+    start.shapes[-1][:] = 1300.0
+    fitted = replace(campaign.declared, model=model, estimate=start)
+    problem = problem_of(campaign, fitted, (key, "joint_offset@3")).problem
+    (values,) = looked_at(problem, factors(problem, {(key, 0): 30.0})).values()
+    below, above = np.geomspace(900.0, 1300.0, 5)[1:-1], np.geomspace(1300.0, 36000.0, 5)[1:-1]
+    np.testing.assert_allclose(values, [*below, 1300.0, *above])
+
+
+def test_a_step_is_found_closer_to_where_it_was_by_a_closer_look(kuka):
+    """Between two of the values tried: a better Bayes factor, at a value nearer to the true one."""
+    states = made_states(6, 60, seed=9)
+    campaign = planted(kuka, {}, seed=7, states=states, fitted_frames=True)
+    true = 0.5 + 1 / 24
+    moved = campaign.observations.position.copy()
+    moved[states.row[campaign.observations.state] > 1 + true * 59] += [4e-4, 0.0, 0.0]
+    observations = replace(campaign.observations, position=moved)
+    candidates = [campaign.candidates["setup_step"]]
+    fitted = fit(campaign.declared.model, observations, campaign.declared.noise)
+    first = linearized(fitted, observations, candidates, SETTINGS).problem
+    alone = first_look(first)[1]
+    closer = shapes_looked_at_closely(first, alone)
+    then = linearized(fitted, observations, candidates, SETTINGS, closer).problem
+    again = first_look(then)[1]
+    near, nearer = (problem.units[np.argmax(found)].shapes[0] for problem, found in ((first, alone), (then, again)))
+    assert abs(nearer - true) < abs(near - true) and abs(nearer - true) < 0.02
+    assert again.max() > alone.max() + 3
+    # Of the prior each has its part.
+    shares = np.exp([unit.log_prior for unit in then.units if unit.mechanism == "setup_step"])
+    assert shares.sum() == pytest.approx(1.0) and len(shares) == len(closer["setup_step"]) == 17
 
 
 def test_the_prior_of_a_declared_parameter_is_kept(kuka):

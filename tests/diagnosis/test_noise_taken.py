@@ -1,5 +1,7 @@
 """A campaign that declares far less noise than its readings have: sizes of effects stay what they are in mm and mrad."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_folders import PLAN, made_folder, made_table
@@ -48,3 +50,19 @@ def test_noise_that_is_far_too_small_is_a_warning(diagnosed):
     told = [[line for line in diagnosed[level].document["warnings"] if "scatter" in line] for level in (6e-5, 1e-6)]
     assert not told[0] and len(told[1]) == 1
     assert "the noise that is declared" in told[1][0]
+
+
+@pytest.mark.parametrize("error_rad", [0.0, 3e-4])
+def test_an_error_that_all_readings_of_a_pose_share_is_noise_of_the_model_and_said(error_rad, kuka, config_folder, tmp_path):
+    """Joints that stand otherwise in each pose than they report, by the same in all of its readings."""
+    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
+    drawn = error_rad * np.random.default_rng(3).standard_normal((max(table["pose"]) + 1, 6))
+    table |= {f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1] for joint in range(1, 7)}
+    case, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    found = diagnose(case, Settings(), 1)
+    said = [line for line in found.document["warnings"] if "err together" in line]
+    assert found.document["verdict"] == "adequate"
+    assert len(said) == (error_rad > 0)
+    # To the steps of its grid, of which neighbours differ by a factor of two.
+    assert found.final.noise.pose_rad == pytest.approx(error_rad, rel=0.8)
+    assert found.document["noise"]["pose_rad"] == found.final.noise.pose_rad

@@ -1,4 +1,4 @@
-"""The competitor: smooth random displacements, the same each time, of the size that their prior says."""
+"""The competitor: smooth random displacements by one cause each, the same each time, of the size that their prior says."""
 
 from dataclasses import replace
 
@@ -7,10 +7,28 @@ import pytest
 from support import SEVEN_JOINTS, robot_of
 from synthetic import circumstances_on, made_states
 
-from elastocal.diagnosis.other import BASE_M, BASE_RAD, JOINT_RAD, displacements, locations
-from elastocal.sites import sites_of
+from elastocal.diagnosis.other import (
+    BASE_M,
+    BASE_RAD,
+    FORCE,
+    JOINT_RAD,
+    NEIGHBOURS,
+    OWN,
+    PLACE,
+    SHIFT,
+    TIME,
+    TURN,
+    Competitor,
+    competitors,
+    displacements,
+)
+from elastocal.effects.protocol import at_states
+from elastocal.robot import Mass
 
 FEATURES = 40
+AT_A_JOINT = [Competitor((4,), law) for law in (OWN, NEIGHBOURS, TIME)]
+AT_THE_BASE = [Competitor((), law, motion) for law in (FORCE, TIME, PLACE) for motion in (SHIFT, TURN)]
+EVERY = AT_A_JOINT + AT_THE_BASE
 
 
 def around(count=60, force=500.0, **changes):
@@ -22,61 +40,186 @@ def waves(found):
     return np.array([next(iter(law.values())) for law in found])
 
 
-def test_it_acts_at_every_joint_and_at_the_base():
-    assert locations(sites_of(robot_of(SEVEN_JOINTS))) == [*((joint,) for joint in range(1, 8)), ()]
+def named(competitor):
+    return f"{competitor.location} {competitor.name}"
 
 
-@pytest.mark.parametrize("joint", [1, 4, 7])
-def test_a_joint_is_displaced_by_about_its_size_in_any_state(joint):
+def test_it_acts_by_each_law_at_every_joint_and_at_the_base():
+    expected = [Competitor((joint,), law) for joint in range(1, 8) for law in (OWN, NEIGHBOURS, TIME)]
+    assert competitors(around()) == [*expected, *AT_THE_BASE]
+
+
+def test_names_tell_the_laws_of_a_location_apart():
+    listed = competitors(around())
+    assert len({(each.location, each.name) for each in listed}) == len(listed)
+
+
+def test_laws_of_which_a_campaign_has_no_inputs_are_left_out():
+    """Without a load no force; in rows that are all but one, of unknown time, no time."""
+    still = {competitor.law for competitor in competitors(around(force=0.0)) if not competitor.location}
+    assert still == {TIME, PLACE}
+    alone = around(1, time_s=None, temperature_c=None)
+    assert competitors(alone) == []
+
+
+@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
+def test_a_joint_is_displaced_by_about_its_size_in_any_state(competitor):
     """Unloaded all features are of use: their squares sum to a chi-square-like spread about the square of the size."""
     states = around(400, force=0.0)
-    found = displacements(states, (joint,), FEATURES)
-    assert len(found) == FEATURES and all(set(law) == {joint - 1} for law in found)
+    found = displacements(states, competitor, FEATURES)
+    assert len(found) == FEATURES and all(set(law) == {3} for law in found)
     squares = (waves(found) ** 2).sum(axis=0)
-    assert np.mean(squares) == pytest.approx(JOINT_RAD**2, rel=0.15)
+    assert np.mean(squares) == pytest.approx(JOINT_RAD**2, rel=0.25)
     assert squares.max() < 2 * JOINT_RAD**2
 
 
-def test_half_of_the_features_vanish_without_the_load():
-    states = around(60, force=500.0)
-    states.wrench[:20] = 0.0
-    states = circumstances_on(robot_of(SEVEN_JOINTS), replace(made_states(7, 60, seed=1), wrench=states.wrench))
-    found = waves(displacements(states, (2,), FEATURES))
+@pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
+def test_half_of_the_features_vanish_without_the_load(competitor):
+    wrench = made_states(7, 60, seed=1).wrench
+    wrench[:20] = 0.0
+    states = around(wrench=wrench)
+    found = waves(displacements(states, competitor, FEATURES))
     zero = ~found[:, :20].any(axis=1)
     assert zero.sum() == FEATURES // 2 and found[zero][:, 20:].any(axis=1).all()
 
 
-def test_the_base_moves_in_all_its_six_directions():
+@pytest.mark.parametrize("law", [FORCE, TIME, PLACE])
+@pytest.mark.parametrize(("motion", "size", "mine"), [(SHIFT, BASE_M, slice(0, 3)), (TURN, BASE_RAD, slice(3, 6))])
+def test_the_base_shifts_or_turns_in_all_three_directions_by_about_its_size(law, motion, size, mine):
     states = around()
-    found = displacements(states, (), FEATURES)
     by_coordinate = {}
-    for law in found:
-        ((coordinate, values),) = law.items()
-        by_coordinate.setdefault(coordinate, []).append(np.abs(values).max())
-    assert set(by_coordinate) == set(states.sites.base)
-    largest = [max(by_coordinate[coordinate]) for coordinate in states.sites.base]
-    assert all(0.1 * BASE_M < size < 2 * BASE_M for size in largest[:3])
-    assert all(0.1 * BASE_RAD < size < 2 * BASE_RAD for size in largest[3:])
+    for made in displacements(states, Competitor((), law, motion), FEATURES):
+        ((coordinate, values),) = made.items()
+        by_coordinate.setdefault(coordinate, []).append(values)
+    assert list(by_coordinate) == list(states.sites.base[mine])
+    first, second, third = (np.array(values) for values in by_coordinate.values())
+    assert all(0.1 * size < np.abs(values).max() < 2 * size for values in (first, second, third))
+    # Each goes its own way.
+    assert np.abs(first - second).max() > 0.1 * size and np.abs(first - third).max() > 0.1 * size
 
 
-def test_it_is_the_same_each_time_and_another_one_at_each_joint():
+# What each law may depend on beside the load: everything else may change and it stays as it is.
+CHANGED = {
+    "the joint's own angle": lambda states: replace(states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[3]),
+    "the angle beside": lambda states: replace(states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[4]),
+    "an angle further off": lambda states: replace(states, joint_angles=states.joint_angles + 0.3 * np.eye(7)[6]),
+    "its approach": lambda states: replace(states, approach=states.approach * np.where(np.arange(7) == 3, -1.0, 1.0)),
+    "the time": lambda states: replace(states, time_s=states.time_s[::-1].copy()),
+    "the temperature": lambda states: replace(states, temperature_c=states.temperature_c[::-1].copy()),
+    "the row": lambda states: replace(states, progress=states.progress[::-1].copy()),
+}
+DEPENDS = {
+    (4, OWN): {"the joint's own angle", "its approach"},
+    (4, NEIGHBOURS): {"the joint's own angle", "the angle beside"},
+    (4, TIME): {"the time", "the temperature", "the row"},
+    (0, TIME): {"the time", "the temperature", "the row"},
+    (0, FORCE): set(),
+}
+
+
+@pytest.mark.parametrize("what", CHANGED)
+@pytest.mark.parametrize(("joint", "law"), DEPENDS)
+def test_a_law_goes_by_its_own_cause_alone(joint, law, what):
+    """Unloaded, or the load of a joint would change with the angles; the force on the base does not."""
+    states = around(force=500.0 if law == FORCE else 0.0)
+    moved = CHANGED[what](states)
+    competitor = Competitor((joint,), law) if joint else Competitor((), law, SHIFT)
+    one, other = (waves(displacements(each, competitor, FEATURES, states)) for each in (states, moved))
+    assert (np.abs(one - other).max() > 0.02 * min(JOINT_RAD, BASE_M)) == (what in DEPENDS[joint, law])
+
+
+@pytest.mark.parametrize("motion", [SHIFT, TURN])
+def test_each_coordinate_of_the_base_goes_by_the_load_along_it(motion):
+    """The force of the pull and of the weight along each axis, and the moment about it: of the first half of the features."""
     states = around()
-    one, again, other = (waves(displacements(states, (joint,), FEATURES)) for joint in (2, 2, 3))
-    np.testing.assert_array_equal(one, again)
+    competitor = Competitor((), FORCE, motion)
+    mine = states.sites.base[:3] if motion == SHIFT else states.sites.base[3:]
+    for changed in mine:
+        total = states.total.copy()
+        total[:, changed] = total[::-1, changed]
+        moved = replace(states)
+        vars(moved)["total"] = total
+        pairs = zip(*(displacements(each, competitor, FEATURES, states) for each in (states, moved)), strict=True)
+        differ = {at for one, other in pairs for at in one if np.abs(one[at] - other[at]).max() > 0.02 * BASE_M}
+        assert differ == {changed}
+
+
+def test_a_coordinate_without_an_input_is_not_displaced():
+    """Of a load that always pulls down the foot feels a force along one axis alone."""
+    wrench = np.zeros((60, 6))
+    wrench[:, 2] = -np.linspace(0, 500, 60)
+    found = displacements(around(wrench=wrench), Competitor((), FORCE, SHIFT), FEATURES)
+    moved = {coordinate for law in found for coordinate, values in law.items() if values.any()}
+    assert moved == {around().sites.base[2]}
+    # As many columns as others have, of which units are numbered by those of one state.
+    assert len(found) == len(displacements(around(), Competitor((), FORCE, SHIFT), FEATURES))
+
+
+def test_own_law_and_neighbours_go_by_the_torque_and_the_place_by_where_the_end_is():
+    """Of the same function, by the inputs of the campaign: doubled loads, and an end elsewhere."""
+    states = around()
+    loaded = replace(states, wrench=2.0 * states.wrench)
+    for law in (OWN, NEIGHBOURS):
+        one, other = (waves(displacements(each, Competitor((4,), law), FEATURES, states)) for each in (states, loaded))
+        # Those that are multiplied by the load come after.
+        assert np.abs(one - other)[: FEATURES // 2].max() > 0.02 * JOINT_RAD
+    turned = states.joint_angles.copy()
+    turned[:, 1] += 0.3
+    moved = circumstances_on(robot_of(SEVEN_JOINTS), replace(made_states(7, 60, seed=1), joint_angles=turned))
+    one, other = (waves(displacements(each, Competitor((), PLACE), FEATURES, states)) for each in (states, moved))
+    assert np.abs(one - other).max() > 0.02 * BASE_RAD
+
+
+@pytest.mark.parametrize("competitor", EVERY, ids=named)
+def test_it_is_the_same_each_time(competitor):
+    states = around()
+    np.testing.assert_array_equal(*(waves(displacements(states, competitor, FEATURES)) for _ in range(2)))
+
+
+@pytest.mark.parametrize("law", [OWN, NEIGHBOURS, TIME])
+def test_it_is_another_one_at_each_joint_and_by_each_law(law):
+    """At joints with the same inputs, too: those of time."""
+    states = around(force=0.0)
+    one, other = (waves(displacements(states, Competitor((joint,), law), FEATURES)) for joint in (2, 3))
     assert np.abs(one - other).max() > 0.1 * JOINT_RAD
+    elsewhere = waves(displacements(states, Competitor((2,), OWN if law == NEIGHBOURS else NEIGHBOURS), FEATURES))
+    assert np.abs(one - elsewhere).max() > 0.1 * JOINT_RAD
+
+
+@pytest.mark.parametrize("competitor", EVERY, ids=named)
+def test_it_is_the_same_function_of_some_of_the_states(competitor):
+    """Normalised by the campaign: what is made in parts is what is made at once."""
+    states = around()
+    whole = waves(displacements(states, competitor, FEATURES))
+    part = waves(displacements(at_states(states, slice(10, 25)), competitor, FEATURES, states))
+    np.testing.assert_allclose(part, whole[:, 10:25], rtol=0, atol=1e-12 * JOINT_RAD)
 
 
 def test_it_is_smooth_in_the_angles():
     """A hundredth of a radian changes it by a few hundredths of its size."""
     states = around(force=0.0)
     moved = replace(states, joint_angles=states.joint_angles + 0.01)
-    one, other = (waves(displacements(each, (3,), FEATURES)) for each in (states, moved))
+    one, other = (waves(displacements(each, Competitor((3,), NEIGHBOURS), FEATURES, states)) for each in (states, moved))
     change = np.sqrt(((one - other) ** 2).sum(axis=0))
     assert 0 < change.max() < 0.15 * JOINT_RAD
 
 
 def test_what_is_constant_or_absent_is_no_input():
-    """A campaign without times and temperatures, or all at one of them, has the same competitor."""
+    """A campaign without times and temperatures, or all at one of them that no mean of binary numbers hits, is the same."""
     bare = around(time_s=None, temperature_c=None)
-    constant = around(time_s=np.full(60, 7.0), temperature_c=None)
-    np.testing.assert_array_equal(*(waves(displacements(states, (1,), FEATURES)) for states in (bare, constant)))
+    constant = around(time_s=np.full(60, 0.1), temperature_c=np.full(60, 21.3))
+    np.testing.assert_array_equal(
+        *(waves(displacements(states, Competitor((1,), TIME), FEATURES)) for states in (bare, constant))
+    )
+
+
+def test_a_torque_of_rounding_is_neither_an_input_nor_a_load():
+    """The axis of joint 1 stands upright by way of a turn: the weight that hangs on it turns it by rounding alone."""
+    upright = "Ry(90deg) Tx(-0.4) Rx(q1) Tz(0.1) Ry(q2) Tx(-0.7) Ry(q3) Tx(-0.6) [hand]"
+    robot = replace(robot_of(upright), masses=(Mass(2, 80.0, (0.3, 0.0, 0.1), 0.1),))
+    states = circumstances_on(robot, made_states(3, 60, seed=2, force=0.0))
+    torque = np.abs(states.total[:, 0])
+    assert 0 < torque.max() < 1e-9 and np.abs(states.total[:, 1]).max() > 10.0
+    weightless = circumstances_on(robot_of(upright), made_states(3, 60, seed=2, force=0.0))
+    one, other = (waves(displacements(each, Competitor((1,), OWN), FEATURES)) for each in (states, weightless))
+    np.testing.assert_array_equal(one, other)

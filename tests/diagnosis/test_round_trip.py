@@ -1,16 +1,21 @@
 """A diagnosis as files and back: one writer, one reader, and the same verdict from either."""
 
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_folders import PLAN, made_folder, made_table
+from planted import planted
 
 from elastocal.diagnosis import tables
 from elastocal.diagnosis.confounding import angles_between
-from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.diagnose import _effect_steps, diagnose
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.refit import fit_with_sizes, selected
+from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.loop.whole import cases_in
@@ -46,6 +51,73 @@ def faulty(kuka, config_folder, tmp_path_factory):
     diagnosis = diagnose(case, Settings(), 1)
     assert diagnosis.evidence is None
     return diagnosis, held_out
+
+
+@pytest.fixture(scope="module")
+def unsure(kuka, config_folder, tmp_path_factory):
+    """A diagnosis that names an effect which is not expected to make predictions better."""
+    case, held_out = cases_of(tmp_path_factory.mktemp("unsure"), config_folder / "robots", kuka, offset=1e-3)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("elastocal.diagnosis.diagnose.expected_to_help", lambda problem, posterior, model: False)
+        return diagnose(case, Settings(), 1), held_out
+
+
+def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_declared(unsure, kuka, tmp_path):
+    diagnosis, held_out = unsure
+    (entry,) = diagnosis.document["effects"]
+    assert diagnosis.document["verdict"] == "named" and entry["name"] == "joint_offset" and not entry["adopted"]
+    # What it would be is said all the same.
+    assert abs(entry["parameters"][0]["value"] - 1e-3) < 1e-4
+    assert [step.kind for step in diagnosis.steps] == ["frames", "declared"] and diagnosis.final is diagnosis.declared
+    assert any("stays as declared" in warning for warning in diagnosis.document["warnings"])
+    verdict = judge(diagnosis, held_out, 1).document
+    assert verdict["heldout"]["before"] == verdict["heldout"]["after"] and verdict["effects"][0]["heldout_gain"] is None
+    facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
+    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    back = tables.diagnosis_from(diagnosis.case, facts, steps)
+    assert [step.kind for step in back.steps] == ["frames", "declared"]
+    assert not any(effect["adopted"] for effect in judge(back, held_out, 1).document["effects"])
+    # And the next experiment can be planned.
+    assert propose(diagnosis, kuka.joint_limits, Settings(), np.random.default_rng(0)).best == ("joint_offset",)
+
+
+def test_an_effect_that_is_expected_to_help_is_adopted(found):
+    diagnosis, _ = found
+    assert [entry["adopted"] for entry in diagnosis.document["effects"]] == [True]
+    assert [step.kind for step in diagnosis.steps] == ["frames", "declared", "effect"]
+    assert not any("stays as declared" in warning for warning in diagnosis.document["warnings"])
+
+
+@pytest.mark.parametrize(
+    ("most", "steps"),
+    [
+        (4, ["transmission_harmonic", "joint_offset", "payload"]),
+        (3, ["transmission_harmonic", "joint_offset", "payload"]),
+        (2, ["transmission_harmonic", "2 further effects"]),
+    ],
+)
+def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_many_the_rest_together(kuka, most, steps):
+    """A wave, a smaller offset and a still smaller payload; the last step is the final model, and each has those before it."""
+    sizes = {"payload": [5.0, 0, 0, 0], "transmission_harmonic@2[orders 1-2]": [0, 0, 1e-3, 0], "joint_offset@3": [6e-4]}
+    campaign = planted(kuka, sizes, seed=1, poses=40)
+    candidates = [campaign.candidates[key] for key in sizes]
+    line = linearized(campaign.declared, campaign.observations, candidates, Settings())
+    names, met = {key.split("@")[0] for key in sizes}, posterior(line.problem)
+    mechanisms = [{line.problem.units[number].mechanism for number in model.units} for model in met.models]
+    best = SimpleNamespace(named=tuple(sorted(names)), model=mechanisms.index(names))
+    found = SimpleNamespace(linearized=line, posterior=met, conclusion=SimpleNamespace(best=best))
+    chosen = selected(line, met.models[best.model])
+    final = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, chosen)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("elastocal.diagnosis.diagnose._MOST_STEPS", most)
+        case = SimpleNamespace(observations=campaign.observations)
+        made = _effect_steps(case, campaign.declared, final, found)
+    assert [step.name for step in made] == [f"+ {name}" for name in steps] and made[-1].fitted is final
+    known = len(campaign.declared.model.effects)
+    counts = [len(step.fitted.model.effects) - known for step in made]
+    assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])
+    misfit = [(step.fitted.whitened(step.fitted.residual) ** 2).sum() for step in made]
+    assert misfit == sorted(misfit, reverse=True)
 
 
 @pytest.mark.parametrize("kind", ["found", "faulty"])
@@ -111,7 +183,7 @@ def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path
 def test_bayes_factors_of_the_table_are_those_of_single_units(found):
     diagnosis, _ = found
     columns, problem = tables.candidate_columns(diagnosis), diagnosis.evidence.linearized.problem
-    factors = single_log_bayes_factors(problem)
+    factors = first_look(problem)[1]
     number = next(n for n, unit in enumerate(problem.units) if unit.key == "joint_offset@2")
     place = columns["candidate"].index("joint_offset@2")
     assert columns["log_bayes_factor"][place] == factors[number]

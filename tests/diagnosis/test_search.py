@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import posterior, single_log_bayes_factors
+from elastocal.diagnosis.search import _Searcher, first_look, posterior
 from elastocal.diagnosis.settings import Settings
 
 TAU = [0.0, 0.3, 0.9]
@@ -57,7 +58,7 @@ def enumerated(problem):
 def test_posterior_is_that_of_all_models(signal, seed):
     """To 0.02 in every probability, and models that were not met hold less than 2 % together."""
     problem = problem_of(signal, seed)
-    expected, (found, _) = enumerated(problem), posterior(problem)
+    expected, found = enumerated(problem), posterior(problem)
     assert found.probabilities.sum() == pytest.approx(1.0)
     mine = dict(zip((model.units for model in found.models), found.probabilities, strict=True))
     assert len(mine) == len(found.models)
@@ -68,7 +69,7 @@ def test_posterior_is_that_of_all_models(signal, seed):
 
 @pytest.mark.parametrize(("signal", "best"), [("nothing", ()), ("one", (0,)), ("one mechanism everywhere", (0, 1, 2))])
 def test_the_most_probable_model_is_the_one_that_made_the_readings(signal, best):
-    found, _ = posterior(problem_of(signal))
+    found = posterior(problem_of(signal))
     assert found.models[0].units == best
     assert (np.diff(found.probabilities) <= 0).all()
     assert [model.log_odds for model in found.models] == sorted((m.log_odds for m in found.models), reverse=True)
@@ -83,31 +84,36 @@ def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_s
     rows = replace(rows, candidates=candidates, residual=rows.residual + candidates[:, :3].sum(axis=1))
     units = (*UNITS[:3], made_unit("tilt", (1,), 3), made_unit("tilt", (2,), 4))
     problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
-    assert posterior(problem)[0].models[0].units == (0, 1, 2)
+    assert posterior(problem).models[0].units == (0, 1, 2)
 
 
-def test_nothing_is_always_among_the_models_and_is_returned_beside_them():
-    found, nothing = posterior(problem_of("two mechanisms"))
+def test_nothing_is_always_among_the_models_however_improbable():
+    problem = problem_of("two mechanisms")
+    found, (nothing, _) = posterior(problem), first_look(problem)
     (empty,) = [model for model in found.models if not model.units]
+    assert found.nothing is empty
     assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
+    assert empty.pose_error_rad == nothing.pose_error_rad
     assert len(nothing.scales) == 0
 
 
 def test_no_model_has_two_laws_at_one_location():
-    found, _ = posterior(problem_of("two mechanisms", settings=replace(Settings(), kept_models=10**6)))
+    found = posterior(problem_of("two mechanisms", settings=replace(Settings(), kept_models=10**6)))
     for model in found.models:
         places = [(UNITS[number].mechanism, UNITS[number].location) for number in model.units]
         assert len(set(places)) == len(places)
 
 
 def test_no_model_is_larger_than_the_settings_allow():
-    found, _ = posterior(problem_of("one mechanism everywhere", settings=replace(Settings(), largest_model=2)))
+    found = posterior(problem_of("one mechanism everywhere", settings=replace(Settings(), largest_model=2)))
     assert max(len(model.units) for model in found.models) == 2
 
 
-def test_single_bayes_factors_are_those_of_the_models_with_one_unit():
+@pytest.mark.parametrize("smallest", [0, 3])
+def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     problem = problem_of("a faint one")
-    factors = single_log_bayes_factors(problem)
+    problem = replace(problem, units=tuple(replace(unit, smallest=smallest) for unit in problem.units))
+    _, factors = first_look(problem)
     empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
     for number, unit in enumerate(problem.units):
         one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
@@ -119,19 +125,59 @@ def test_the_pose_error_of_a_model_is_the_one_of_the_readings(tau):
     rows = made_rows(6, poses=100, candidates=10)
     noisy = rows.drawn(np.random.default_rng(8), tau)
     problem, _ = made_problem(noisy, UNITS, tau=TAU)
-    found, nothing = posterior(problem)
+    found, (nothing, _) = posterior(problem), first_look(problem)
     assert nothing.pose_error_rad == found.models[0].pose_error_rad == tau
 
 
 def test_sizes_of_a_model_come_in_the_order_of_its_units():
     rows = made_rows(0, poses=14, candidates=10)
     rows = replace(rows, residual=rows.residual + 2.0 * rows.candidates[:, 0] + rows.candidates[:, 3:5] @ [0.4, -0.6])
-    found, _ = posterior(made_problem(rows, UNITS, tau=TAU)[0])
+    found = posterior(made_problem(rows, UNITS, tau=TAU)[0])
     best = next(model for model in found.models if model.units == (0, 3))
     assert best.scales[0] > best.scales[1] and len(best.scales) == 2
 
 
+def test_a_search_that_knows_a_good_model_finds_it_whatever_leads_there():
+    """Columns that nearly cancel, of mechanisms at one location each: no single one of them shows, nor any two."""
+    rows = made_rows(3, poses=14, candidates=6)
+    common = 30 * np.random.default_rng(4).standard_normal(len(rows.pose))
+    candidates = rows.candidates.copy()
+    candidates[:, :3] += np.outer(common, [1, 1, -2])
+    rows = replace(rows, candidates=candidates, residual=rows.residual + 1.5 * candidates[:, :3].sum(axis=1))
+    units = [made_unit(name, (1,), column, candidate=SimpleNamespace(key=name)) for column, name in enumerate("abc")]
+    units += [made_unit("d", (1,), 3), made_unit("e", (1,), 4)]
+    problem, _ = made_problem(rows, units, replace(Settings(), beam=1, patience=1), TAU)
+    best = max(posterior(problem, keys).models[0].log_odds for keys in ((), ("a",)))
+    # What is known and not tested is no matter.
+    found = posterior(problem, {"a", "b", "c", "gone"})
+    assert found.models[0].units == (0, 1, 2) and found.models[0].log_odds > best + 5
+
+
+def test_what_is_known_starts_a_search_with_the_better_of_its_shapes():
+    rows = made_rows(3, poses=14, candidates=6)
+    rows = replace(rows, residual=rows.residual + 1.5 * rows.candidates[:, 2])
+    bent = SimpleNamespace(key="bent")
+    units = [made_unit("bent", (1,), column, candidate=bent, shapes=(float(column),)) for column in (1, 2, 3)]
+    searcher = _Searcher(made_problem(rows, units, tau=TAU)[0])
+    searcher.start_from({"bent"})
+    assert set(searcher.measured) == {(1,)}
+    searcher.start_from(())
+    assert set(searcher.measured) == {(1,)}
+
+
+def test_no_unit_of_a_model_is_smaller_than_readings_can_show():
+    """Where the most probable size of a faint signal is below that."""
+    problem = problem_of("a faint one")
+    free = next(model for model in posterior(problem).models if model.units == (0,))
+    least = len(problem.settings.scales) - 1
+    assert free.scales[0] < problem.grid.scales[least]
+    held = replace(problem, units=tuple(replace(unit, smallest=least) for unit in problem.units))
+    found = posterior(held)
+    assert (0,) in [model.units for model in found.models]
+    assert all((model.scales >= problem.grid.scales[least]).all() for model in found.models)
+
+
 def test_the_posterior_is_the_same_each_time():
-    one, other = (posterior(problem_of("two mechanisms"))[0] for _ in range(2))
+    one, other = (posterior(problem_of("two mechanisms")) for _ in range(2))
     assert [model.units for model in one.models] == [model.units for model in other.models]
     np.testing.assert_array_equal(one.probabilities, other.probabilities)

@@ -10,6 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.search import Model, Posterior
+from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import (
     ADEQUATE,
     CLASS,
@@ -63,15 +64,21 @@ def test_one_mechanism_with_enough_of_the_probability_is_named():
     assert list(found.mechanisms) == ["offset", "payload"]
 
 
-@pytest.mark.parametrize(("probability", "verdict"), [(0.61, NAMED), (0.59, CLASS)])
-def test_what_is_enough_is_a_setting(probability, verdict):
+@pytest.mark.parametrize(("more", "verdict"), [(0.01, NAMED), (-0.01, CLASS)])
+def test_what_is_enough_is_a_setting(more, verdict):
+    probability = Settings().named_probability + more
     assert conclusion(((OFFSET_2,), probability), ((PAYLOAD,), 1 - probability)).verdict == verdict
 
 
 def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
-    """What the posterior still gives to "nothing" does not count against a name."""
+    """A name needs the probability that is asked for, of which "nothing" has its part, too."""
     found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))
-    assert found.verdict == NAMED and found.best.mechanisms == ("offset",)
+    assert found.verdict == CLASS and found.best.mechanisms == ("offset",)
+
+
+def test_an_alarm_that_no_model_explains_better_than_nothing_does_is_unexplained():
+    found = conclusion(((OFFSET_2,), 0.02), ((PAYLOAD,), 0.01))
+    assert found.verdict == UNEXPLAINED and found.best.mechanisms == () and found.alternatives == {}
 
 
 def test_an_ambiguous_mechanism_is_a_class_of_the_credible_ones():

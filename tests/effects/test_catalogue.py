@@ -23,12 +23,13 @@ import elastocal.effects
 from elastocal.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.effects.protocol import Shape
 from elastocal.kinematics import poses
 from elastocal.model import circumstances, linearize
 
 # The table of the design, without the data family: that is no physics.
 TABLE = {
-    "geometry": "joint_offset, link_geometry, tracker_scale",
+    "geometry": "joint_offset, link_geometry, nest_eccentricity, tracker_scale",
     "gravity": "link_weight, payload, compensator_torque",
     "transmission": "transmission_harmonic, transmission_ratio, transmission_order, motor_eccentricity, bearing_runout",
     "elastic": "link_elasticity, joint_tilt, base_compliance, cross_compliance, "
@@ -84,6 +85,7 @@ def test_keys_are_unique_and_readable(chain):
         ("link_geometry", "@1 @2 @3 @4 @5 @6"),
         ("link_weight", "@2 @3 @4 @5 " + " ".join(f"@{joint}[off_the_line]" for joint in range(2, 6))),
         ("payload", " [mass]"),
+        ("nest_eccentricity", ""),
         ("compensator_torque", "@2 @2[first_order]"),
         ("compensator_stiffness", "@2"),
         ("link_elasticity", "[column] @1 @2 @3 @6 @1+2+3+6[one_section]"),
@@ -136,7 +138,42 @@ def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
             assert parameter.unit in UNITS, (candidate.key, parameter)
             assert 0 < parameter.plausible < np.inf
         for shape in candidate.shapes:
-            assert shape.unit and 0 < shape.lowest < shape.start < shape.highest
+            # A geometric series of values never comes to zero, evenly spaced ones may.
+            assert shape.unit and (shape.lowest >= 0 if shape.tried else shape.lowest > 0)
+            assert shape.lowest < shape.start < shape.highest
+
+
+def test_a_law_that_needs_distinct_angles_says_of_which_joints(chain):
+    """Or readings at too few angles would pass for a test of it."""
+    found = [c for c in candidates_on(equipped(chain)).values() if c.distinct_angles]
+    assert {"nest_eccentricity", "bearing_runout"} <= {candidate.effect for candidate in found}
+    assert all(candidate.joints or candidate.turning for candidate in found)
+
+
+TRIED = Shape("when", "1", 0.5, 0.0, 1.0, tried=11), Shape("lag", "s", 3600.0, 900.0, 36000.0)
+
+
+@pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_shapes_share_their_range_by_which_of_them_is_nearest(shape, count):
+    """On the scale on which they are spread: counted over a fine grid, whatever their order."""
+    scale = (lambda value: value) if shape.tried else np.log
+    every = np.linspace(scale(shape.lowest), scale(shape.highest), 100_001)
+    values = np.random.default_rng(count).uniform(shape.lowest, shape.highest, count)
+    nearest = np.argmin(np.abs(every[:, None] - scale(values)), axis=1)
+    found = shape.shares(values)
+    np.testing.assert_allclose(found, np.bincount(nearest, minlength=count) / len(every), atol=2e-5)
+    assert found.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
+def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_them(shape):
+    found = shape.between(0.2, 0.8, 7) if shape.tried else shape.between(1000.0, 4000.0, 7)
+    steps = np.diff(found) if shape.tried else np.diff(np.log(found))
+    ends = (0.2, 0.8, 0.5) if shape.tried else (1000.0, 4000.0, 2000.0)
+    assert len(found) == 7 and ends[0] < found[0] and found[-1] < ends[1]
+    np.testing.assert_allclose(steps, steps[0])
+    np.testing.assert_allclose(found[3], ends[2])
 
 
 def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
@@ -297,7 +334,8 @@ def test_module_that_was_added_is_gone_with_its_file():
 def test_declared_effects_are_all_their_candidates_in_the_order_declared(fanuc):
     sites = equipped(fanuc.chain)
     found = [candidate.key for candidate in declared_candidates(["payload", "force_bias"], sites)]
-    assert found == ["payload", "payload[mass]", "force_bias[base axes]", "force_bias[flange axes]"]
+    frames = [f"force_bias[{axes} axes{how}]" for how in ("", " in the pull") for axes in ("base", "flange")]
+    assert found == ["payload", "payload[mass]", *frames]
     assert declared_candidates([], sites) == []
 
 

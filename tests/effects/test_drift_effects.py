@@ -187,11 +187,25 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
     np.testing.assert_array_equal(progress_of(without, (1, 21)), np.ones(5))
 
 
+# Between two of the values that are tried, nearer to the second.
+SPACING, WHEN = 1 / 12, 0.655
+
+
+def test_steps_are_tried_at_every_twelfth_of_a_campaign_but_its_ends(fanuc):
+    """None of them a shift of all readings but a few; the one nearest to a step has all but a 24th on the right side."""
+    (when,) = candidate_on(fanuc.chain, "setup_step").shapes
+    np.testing.assert_allclose(when.values(3), np.arange(1, 12) / 12)
+    assert (when.lowest, when.highest) == pytest.approx((1 / 12, 11 / 12))
+
+
 def test_moved_setup_is_found_without_a_clock(fanuc):
-    """A step of 0.3 mm in the middle of 40 readings is fitted where it is, and leaves a misfit where it is not."""
+    """A step of 0.3 mm in the middle of 40 readings is fitted where it is, and leaves a misfit where it is not.
+
+    Of the values that are tried the nearest is as good as the true one but for the reading between them.
+    """
     candidate = candidate_on(fanuc.chain, "setup_step")
     model = made_model(fanuc.chain, compliance=fanuc.compliance, effects=(candidate,))
-    true = replace(made_estimate(model, seed=17), coefficients=(np.array([3e-4, 0, 0, 0, 0, 0]),), shapes=(np.array([0.63]),))
+    true = replace(made_estimate(model, seed=17), coefficients=(np.array([3e-4, 0, 0, 0, 0, 0]),), shapes=(np.array([WHEN]),))
     states = replace(made_states(6, 40, seed=18), time_s=None)
     seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(19), position_m=20e-6)
     noise = replace(NOISE, position_m=20e-6)
@@ -200,8 +214,8 @@ def test_moved_setup_is_found_without_a_clock(fanuc):
         start = replace(true, coefficients=(np.zeros(6),), shapes=(np.array([when]),))
         found = fit(model, seen, noise, start)
         misfit.append((found.whitened(found.residual) ** 2).sum())
-        if abs(when - 0.63) < 0.02:
+        if abs(when - WHEN) < SPACING / 2:
             deviation = np.sqrt(found.covariance[-7, -7])
             assert abs(found.estimate.coefficients[0][0] - 3e-4) < 4 * deviation < 1e-4
     best = candidate.shapes[0].values(3)[int(np.argmin(misfit))]
-    assert abs(best - 0.63) < 0.02 and np.median(misfit) > min(misfit) + 100
+    assert abs(best - WHEN) < SPACING / 2 and np.median(misfit) > min(misfit) + 100

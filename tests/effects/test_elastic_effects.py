@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from support import OTHER_CHAINS, PinocchioPoint, chain_of
 from synthetic import candidate_on, circumstances_on, displacements, made_states
 
@@ -64,7 +65,7 @@ def test_link_elasticity_is_the_extended_model_without_its_stretching(kuka_exten
         spring = axes @ beam @ axes.T
         expected = load[:, 6 + 6 * number : 12 + 6 * number] @ spring.T
         made = displacements(
-            candidate_on(kuka_extended.chain, f"link_elasticity@{link}" if link else "link_elasticity[column]"), around
+            candidate_on(kuka_extended.chain, f"link_elasticity@{link}" if link else "link_elasticity[column]"), around, 0.0
         )
         total = made[0] / (tube.youngs_modulus_Pa * second) + made[1] / (tube.shear_modulus_Pa * 2 * second)
         found = total[:, list(around.sites.link_end[link])]
@@ -79,7 +80,7 @@ def test_links_bend_by_the_formulas_of_the_cantilever():
     states.joint_angles[:] = 0.0
     states.wrench[:] = [[0, 10, 0, 0, 0, 0], [0, 0, 10, 0, 0, 0], [0, 0, 0, 3, 0, 5], [7, 0, 0, 0, 0, 0]]
     around = circumstances_on(chain, states)
-    made = displacements(candidate_on(chain, "link_elasticity@1"), around)[..., list(around.sites.link_end[1])]
+    made = displacements(candidate_on(chain, "link_elasticity@1"), around, 0.0)[..., list(around.sites.link_end[1])]
     bent = [
         [0, 10 * 8 / 3, 0, 0, 0, 10 * 4 / 2],
         [0, 0, 10 * 8 / 3, 0, -10 * 4 / 2, 0],
@@ -90,6 +91,27 @@ def test_links_bend_by_the_formulas_of_the_cantilever():
     twisted = np.zeros((4, 6))
     twisted[2, 3] = 3 * 2
     np.testing.assert_allclose(made[1], twisted, atol=1e-13)
+
+
+@pytest.mark.parametrize("taper", [0.0, 0.3, 0.6])
+def test_links_that_get_thinner_bend_as_the_equation_of_the_beam_integrated(taper):
+    """EI and GJ of a thin wall go with the cube of the diameter: curvature and twist, integrated twice and once."""
+    length = 2.0
+    chain = chain_of("Rz(q1) Tx(2) [end]")
+    states = made_states(1, 3)
+    states.joint_angles[:] = 0.0
+    states.wrench[:] = [[0, 10, 0, 0, 0, 0], [0, 0, 0, 0, 0, 5], [0, 0, 0, 3, 0, 0]]
+    around = circumstances_on(chain, states)
+    made = displacements(candidate_on(chain, "link_elasticity@1"), around, taper)[..., list(around.sites.link_end[1])]
+
+    def softer(place):
+        return (1 - taper * place / length) ** -3
+
+    for number, moment in enumerate((lambda place: 10 * (length - place), lambda place: 5.0)):
+        turn = quad(lambda place, moment=moment: moment(place) * softer(place), 0, length)[0]
+        shift = quad(lambda place, moment=moment: (length - place) * moment(place) * softer(place), 0, length)[0]
+        np.testing.assert_allclose(made[0, number], [0, shift, 0, 0, 0, turn], rtol=1e-7, atol=1e-12)
+    np.testing.assert_allclose(made[1, 2], [0, 0, 0, 3 * quad(softer, 0, length)[0], 0, 0], rtol=1e-7, atol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["fanuc", *OTHER_CHAINS])
@@ -107,8 +129,8 @@ def test_links_of_one_section_bend_all_as_each_by_itself(fanuc):
     around = circumstances_on(fanuc.chain, made_states(6, 5, seed=10))
     known = candidates_on(around.sites)
     each = [known[key] for key in ("link_elasticity[column]", *(f"link_elasticity@{link}" for link in (1, 2, 3, 6)))]
-    found = displacements(known["link_elasticity@1+2+3+6[one section]"], around)
-    np.testing.assert_allclose(found, sum(displacements(candidate, around) for candidate in each), rtol=1e-12)
+    found = displacements(known["link_elasticity@1+2+3+6[one section]"], around, 0.2)
+    np.testing.assert_allclose(found, sum(displacements(candidate, around, 0.2) for candidate in each), rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", ["fanuc", *OTHER_CHAINS])
@@ -198,8 +220,9 @@ def test_elastic_effects_are_reciprocal(effect, name, fanuc):
     first, second = circumstances_on(chain, one), circumstances_on(chain, other)
     for candidate in candidates_on(first.sites).values():
         if candidate.effect == effect:
-            there = (displacements(candidate, first) * second.load).sum(axis=2)
-            back = (displacements(candidate, second) * first.load).sum(axis=2)
+            start = [shape.start for shape in candidate.shapes]
+            there = (displacements(candidate, first, *start) * second.load).sum(axis=2)
+            back = (displacements(candidate, second, *start) * first.load).sum(axis=2)
             np.testing.assert_allclose(there, back, rtol=1e-9, atol=1e-9)
             assert np.abs(there).max() > 0
 
@@ -209,7 +232,8 @@ def test_loads_do_work_on_what_gives_way(effect, fanuc):
     around = circumstances_on(fanuc.chain, made_states(6, 30, seed=9))
     for candidate in candidates_on(around.sites).values():
         if candidate.effect == effect:
-            assert ((displacements(candidate, around) * around.load).sum(axis=2) >= 0).all()
+            made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
+            assert ((made * around.load).sum(axis=2) >= 0).all()
 
 
 @pytest.mark.parametrize("name", ["fanuc", "ur10", "fixed rotations"])

@@ -12,6 +12,8 @@ from elastocal.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.kinematics import poses
 from elastocal.model import circumstances, predict
+from elastocal.plant.tracker import EccentricNest
+from elastocal.robot import Mass, MeasuringPoint
 from elastocal.sites import sites_of
 
 GRAVITY = 9.80665
@@ -113,6 +115,24 @@ def test_payload_hangs_at_the_flange_whatever_target_sits_there(fanuc):
     np.testing.assert_array_equal(ours, theirs)
 
 
+@pytest.mark.parametrize(
+    ("known", "expected"),
+    [
+        ({"payload_kg": 210.0}, 0.15 * 210),
+        # A sixth of the arm's own mass is what arms carry.
+        ({"masses": (600.0, 300.0, 0.0)}, 0.15 * 900 / 6),
+        ({"payload_kg": 20.0, "masses": (600.0, 300.0)}, 0.15 * 20),
+        ({}, 10.0),
+    ],
+)
+def test_plausible_payload_is_a_share_of_what_the_robot_carries_as_far_as_that_is_known(fanuc, known, expected):
+    masses = tuple(Mass(2 + link, mass, (0.0, 0.0, 0.0), 0.1) for link, mass in enumerate(known.get("masses", ())))
+    sites = replace(sites_of(fanuc.chain), masses=masses, payload_kg=known.get("payload_kg"))
+    tool, alone = (c for c in candidates_on(sites).values() if c.effect == "payload")
+    assert [p.plausible for p in tool.parameters] == pytest.approx([expected, *[0.2 * expected] * 3])
+    assert [p.plausible for p in alone.parameters] == pytest.approx([expected])
+
+
 def compensator(q, stiffness, crank, length, rest, start):
     """Torque of a spring between a crank on the joint and the frame."""
     distance = np.sqrt(crank**2 + length**2 + 2 * crank * length * np.cos(start + q))
@@ -185,3 +205,47 @@ def test_link_geometry_is_the_chain_with_other_dimensions(wrong, key, values):
     found = predicted(chain_of(ARM.format(**RIGHT)), key, values, states)
     for ours, theirs in zip(found, poses(other, states.joint_angles, other.end_effector), strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-14)
+
+
+# The last joint turns about each axis in turn, in both senses, with a link behind it that is turned against it.
+WRISTS = {
+    "about x": "Tz(0.4) Rz(q1) Tx(0.3) Ry(q2) Tx(0.5) Rx(-q3) Tx(0.1) Rz(40deg) Ty(0.05) [end]",
+    "about y": "Tz(0.4) Rz(q1) Tx(0.3) Rx(q2) Tx(0.5) Ry(q3) Rx(-70deg) Tx(0.1) [end]",
+    "about z": "Tz(0.4) Ry(q1) Tx(0.3) Ry(-q2) Tx(0.5) Rz(q3) Tx(0.1) Ry(25deg) [end]",
+}
+
+
+@pytest.mark.parametrize("name", WRISTS)
+def test_reflector_in_an_eccentric_nest_circles_twice_a_turn_across_the_last_joint(name):
+    """Exact, in the frame that turns with the joint; nothing turns."""
+    chain = chain_of(WRISTS[name])
+    states = made_states(3, 7, seed=8, span=3.0)
+    values = np.array([2e-4, -1e-4, 3e-4, 5e-5])
+    position, rotation = predicted(chain, "nest_eccentricity", values, states)
+    still = poses(chain, states.joint_angles, chain.end_effector)
+    wrist = next(index for index, t in enumerate(chain.transforms) if t.coordinate == 2)
+    behind = poses(chain, states.joint_angles, MeasuringPoint("behind", wrist + 1))[1]
+    across = [axis for axis in range(3) if axis != chain.transforms[wrist].axis]
+    twice = 2 * states.joint_angles[:, 2]
+    circle = np.zeros((7, 3))
+    circle[:, across[0]] = values[0] * np.cos(twice) + values[1] * np.sin(twice)
+    circle[:, across[1]] = values[2] * np.cos(twice) + values[3] * np.sin(twice)
+    np.testing.assert_allclose(position - still[0], np.einsum("sij,sj->si", behind, circle), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(rotation, still[1], rtol=0, atol=1e-14)
+
+
+def test_eccentric_nest_of_the_plant_is_in_the_catalogue(fanuc):
+    states = made_states(6, 7, seed=9, span=3.0)
+    still = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)
+    expected = EccentricNest(1e-4).moved(*still, states.joint_angles[:, 5])
+    names = [p.name for p in candidate_on(fanuc.chain, "nest_eccentricity").parameters]
+    values = [1e-4 if name in ("cos_y_2q", "sin_z_2q") else 0.0 for name in names]
+    np.testing.assert_allclose(predicted(fanuc.chain, "nest_eccentricity", values, states)[0], expected, rtol=0, atol=1e-14)
+
+
+def test_nest_is_no_candidate_where_the_last_joint_does_not_turn():
+    """A reflector that a slide carries keeps its side to the tracker: there is no angle that it could circle with."""
+    scara = chain_of("Tz(0.4) Rz(q1) Tx(0.4) Rz(q2) Tx(0.3) Tz(-q3) [end]")
+    assert not any(c.effect == "nest_eccentricity" for c in candidates_on(sites_of(scara)).values())
+    turning = chain_of("Tz(0.4) Rz(q1) Tx(0.4) Tz(-q2) Tx(0.3) Rz(q3) [end]")
+    assert any(c.effect == "nest_eccentricity" for c in candidates_on(sites_of(turning)).values())

@@ -79,6 +79,28 @@ def test_misaligned_force_is_the_force_turned_by_a_small_angle(case, frame):
 
 
 @pytest.mark.parametrize("frame", ["base axes", "flange axes"])
+@pytest.mark.parametrize("held_by", ["base axes", "flange axes"])
+def test_misaligned_force_in_a_pull_makes_the_moment_of_its_lever(case, frame, held_by):
+    """A pull at a place of the flange, or at one that stays where it is while the flange turns: both levers are found."""
+    chain, states, flange, turned = case
+    lever = direction(held_by, flange, np.array([0.1, 0.4, -0.2]))
+    states.wrench[:, 3:] = np.cross(lever, states.wrench[:, :3])
+    angle = 1e-8 * np.array([3.0, -7.0, 2.0])
+    force = Rotation.from_rotvec(direction(frame, flange, angle)).apply(states.wrench[:, :3])
+    expected = turned(np.concatenate([force, np.cross(lever, force)], axis=1) - states.wrench)
+    found = made_by(chain, f"force_misalignment[{frame} in the pull]", angle, states)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def test_moments_that_no_pull_makes_stay_as_they_are(case):
+    chain, states, _, _ = case
+    at_flange, in_pull = (
+        made_by(chain, f"force_misalignment[base axes{how}]", [1e-3, 2e-3, 3e-3], states) for how in ("", " in the pull")
+    )
+    np.testing.assert_array_equal(at_flange, in_pull)
+
+
+@pytest.mark.parametrize("frame", ["base axes", "flange axes"])
 def test_other_application_point_adds_the_moment_of_the_shifted_force(case, frame):
     chain, states, flange, turned = case
     shift = np.array([0.02, -0.01, 0.03])

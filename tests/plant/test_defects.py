@@ -11,8 +11,9 @@ from elastocal.effects.protocol import circumstances_of
 from elastocal.errors import InputError
 from elastocal.kinematics import poses_and_jacobians
 from elastocal.observations import States
+from elastocal.plant.campaigns import schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
-from elastocal.plant.physical_robot import seen_poses
+from elastocal.plant.physical_robot import seen_poses, specimen
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import rotation_vector
 from elastocal.plant.weights import declared_masses, on_stretches
@@ -201,8 +202,8 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
 
 
 @pytest.mark.parametrize("joint", [1, 4])
-def test_a_runout_moves_what_turns_with_the_joint_by_the_circle_of_its_axis(weightless, schedule, joint):
-    """And by its lean: at the joint itself by no more than the size."""
+def test_a_runout_moves_what_turns_with_the_joint_to_and_fro_once_and_twice_a_turn(weightless, schedule, joint):
+    """And by its lean: at the joint itself by its shifts alone, across each other, once a turn the one and twice the other."""
     bad = with_defects(weightless, [Defect("bearing_runout", (joint,), 3e-5, 2)])
     # Under a load the levers change too.
     bare = schedule.load == 0
@@ -214,4 +215,48 @@ def test_a_runout_moves_what_turns_with_the_joint_by_the_circle_of_its_axis(weig
     near = change[:, names.index("4DoF")]
     assert (near > 0).all()
     if joint == 4:
-        np.testing.assert_allclose(near, 3e-5, rtol=1e-3)
+        # (cos(q - a)^2 + cos(2 q - b)^2): one, and waves of 2 q and 4 q with amplitudes of a half.
+        angle = schedule.angle[bare, 3]
+        waves = np.column_stack([*(wave(order * angle) for order in (2, 4) for wave in (np.cos, np.sin))])
+        found, left = np.linalg.lstsq(waves, (near / 3e-5) ** 2 - 1.0)[:2]
+        assert len(angle) > 6 and left < 1e-5
+        np.testing.assert_allclose(np.linalg.norm(found.reshape(2, 2), axis=1), 0.5, rtol=1e-2)
+
+
+def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
+    """Across the axis of the last joint, whichever that is of the target's frame, and of the flange's target alone."""
+    robot = specimen(arm, 4, weighs=False)
+    schedule = schedule_of(arm, small, 2)
+    bad = with_defects(robot, [Defect("nest_eccentricity", (), 1e-4, 1)])
+    change = seen_poses(bad, schedule)[0] - seen_poses(robot, schedule)[0]
+    assert not change[:, :-1].any()
+    np.testing.assert_allclose(np.linalg.norm(change[:, -1], axis=1), 1e-4, rtol=1e-6)
+    sites = sites_of(analysed(name).chain)
+    states = States(
+        session=0 * schedule.pose,
+        pose=schedule.pose,
+        load=schedule.load,
+        joint_angles=schedule.angle,
+        wrench=schedule.shown_wrench,
+        repeats=1 + 0 * schedule.pose,
+    )
+    # Where the loaded arm has yielded to the target's frame is turned a little.
+    bare = schedule.load == 0
+    (candidate,) = effects()["nest_eccentricity"].candidates(sites)
+    given = circumstances_of(sites, robot.compliance, states)
+    coordinates = np.zeros((len(schedule.pose), sites.chain.coordinates))
+    coordinates[:, : sites.joints] = schedule.angle
+    jacobian = poses_and_jacobians(sites.chain, coordinates, sites.chain.end_effector)[2][:, :3]
+    columns = [sum(jacobian[..., at] * law[at][:, None] for at in law)[bare].ravel() for law in candidate.displacement(given)]
+    found = np.linalg.lstsq(np.column_stack(columns), change[bare, -1].ravel())[0]
+    left = change[bare, -1].ravel() - np.column_stack(columns) @ found
+    assert np.linalg.norm(left) < 1e-3 * np.linalg.norm(change[bare, -1])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_order_of_a_transmission_lies_between_low_integers_and_its_double_with_it(weightless, seed):
+    """Higher ones no campaign of some twenty poses can show."""
+    bad = with_defects(weightless, [Defect("transmission_order", (2,), 8e-5, seed)])
+    ((order, size, _), (double, less, _)) = bad.drives[-1].waves
+    assert 2.25 <= order <= 4.75 and 0.25 <= order % 1 <= 0.75
+    assert (double, size, less) == pytest.approx((2 * order, 8e-5, 2e-5))

@@ -71,8 +71,10 @@ def test_an_error_of_the_pose_is_the_same_in_all_its_readings(visits):
     assert np.unique(turn[:, 0]).size == 25
 
 
-def test_a_runout_comes_back_after_a_turn_and_is_opposite_after_half(visits):
-    law = Runout(2, 1e-5, 0.3)
-    half = Visits(visits.angle + np.pi, visits.approach, visits.pose, visits.time_s, 5)
-    np.testing.assert_allclose(law(half), -law(visits), atol=1e-18)
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_runout_comes_back_after_each_period_and_is_opposite_after_half_of_one(visits, order):
+    law = Runout(2, order, 1e-5, 0.3)
+    for periods, sign in ((0.5, -1), (1.0, 1)):
+        later = Visits(visits.angle + periods * 2 * np.pi / order, visits.approach, visits.pose, visits.time_s, 5)
+        np.testing.assert_allclose(law(later), sign * law(visits), atol=1e-18)
     assert 0.9e-5 < np.abs(law(visits)).max() <= 1e-5

@@ -75,10 +75,12 @@ def test_a_stand_that_is_knocked_turns_all_later_readings_about_itself(targets):
     np.testing.assert_allclose(found[later] - position[later], wanted, atol=1e-7)
 
 
-def test_an_eccentric_nest_circles_twice_a_turn_of_the_tool():
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_an_eccentric_nest_circles_twice_a_turn_of_the_tool_across_its_axis(axis):
     angle = np.array([0.0, np.pi / 4, np.pi / 2, np.pi])
-    moved = EccentricNest(1e-4).moved(np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)), angle)
-    np.testing.assert_allclose(moved, 1e-4 * np.array([[0, 1, 0], [0, 0, 1], [0, -1, 0], [0, 1, 0]]), atol=1e-18)
+    moved = EccentricNest(1e-4, axis).moved(np.zeros((4, 3)), np.broadcast_to(np.eye(3), (4, 3, 3)), angle)
+    first, second = np.eye(3)[(axis + 1) % 3], np.eye(3)[(axis + 2) % 3]
+    np.testing.assert_allclose(moved, 1e-4 * np.array([first, second, -first, first]), atol=1e-18)
 
 
 def test_the_trackers_own_frame_keeps_distances_and_turns_all_alike(targets):

@@ -57,6 +57,8 @@ CAMPAIGNS = {
     "class": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt", "link_elasticity"])]),
     "class with a related mechanism": verdict_document(CLASS, [effect_entry(alternatives=["other"])]),
     "several": verdict_document(SEVERAL, [effect_entry(), effect_entry("payload", ["payload"], (), ["mass"])]),
+    "named, not adopted": verdict_document(NAMED, [effect_entry(adopted=False)]),
+    "class, not adopted": verdict_document(CLASS, [effect_entry(alternatives=["joint_tilt"], adopted=False)]),
     "unexplained": verdict_document(UNEXPLAINED, sets=[({"other": ["joint 2"]}, 0.9), ({}, 0.1)]),
     "not_testable": verdict_document(NOT_TESTABLE, sets=[({}, 1.0)]),
     "fault of the data": verdict_document(NAMED, [fault_entry()], ["the fit of the final model did not converge"]),
@@ -86,7 +88,7 @@ DIALECT = re.compile(
 
 
 def facts_of(verdict, **changed):
-    found = [effect["name"] for effect in verdict["effects"] if effect["family"] != "data"]
+    found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
     given = {
         "steps": step_rows(effects=found, controls=["joint_offset@4"] if found else []),
         "splits": split_rows(changed=bool(found)),
@@ -185,6 +187,25 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     assert not any("extrapolated" in advice for advice in what_to_do(CAMPAIGNS["named"], []))
     assert "Use the declared model" in what_to_do(CAMPAIGNS["adequate"], [])[0]
     assert "loose target" in what_to_do(CAMPAIGNS["unexplained"], [])[0]
+
+
+@pytest.mark.parametrize("campaign", ["named, not adopted", "class, not adopted"])
+def test_an_effect_that_is_not_adopted_is_named_and_no_correction_is_spoken_of(campaign):
+    facts = facts_of(CAMPAIGNS[campaign])
+    assert "lost motion (backlash) of joint 3" in " ".join(facts["sentences"])
+    assert facts["now"][0].startswith("Use the declared model until more is known")
+    assert "off by 120 µm RMS" in plainly(facts["now"][0])
+    assert not any("corrected model" in advice or "trust the correction" in advice for advice in facts["now"])
+    assert facts["held_out_sentence"].startswith("On 10 poses that were not fitted the declared model leaves")
+    assert [effect["adopted"] for effect in facts["effects"]] == [False] and facts["effects"][0]["gain"] == ""
+    assert [row["kind"] for row in facts["steps"]["rows"]] == ["frames", "declared"] and facts["controls"] == ""
+    assert not facts["splits"]["changed"]
+    # An experiment is what resolves it.
+    assert any("next experiment" in advice for advice in what_to_do(CAMPAIGNS[campaign], experiment_rows()))
+
+
+def test_an_effect_that_is_adopted_is_said_to_be_part_of_the_model():
+    assert [effect["adopted"] for effect in facts_of(CAMPAIGNS["named"])["effects"]] == [True]
 
 
 @pytest.mark.parametrize("campaign", CAMPAIGNS)

@@ -96,7 +96,7 @@ def _errors(verdict):
     before, after = held["before"]["rms_m"], held["after"]["rms_m"]
     reduction, std_error = 1.0 - after / before, held["reduction_std_error"]
     warned = any("held-out" in warning for warning in verdict["warnings"])
-    adopted = any(effect.get("family") != "data" for effect in verdict["effects"])
+    adopted = any(effect.get("adopted", False) for effect in verdict["effects"])
     worse = reduction + _STD_ERRORS * std_error < 0.0
     return {
         "before_rms_m": before,

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting import fit
 from elastocal.loop.case import noise_from
@@ -87,7 +87,7 @@ def _with_effects(declared, case, effects):
     for effect, joints in effects:
         listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
         problem = linearized(declared, case.observations, listed, settings).problem
-        factors = single_log_bayes_factors(problem)
+        factors = first_look(problem)[1]
         # Each at the shape that fits best.
         best = {}
         for number, unit in enumerate(problem.units):

@@ -183,7 +183,7 @@ def _of_errors(cases, seed):
         low, high = _bootstrapped((removed, removable), _share, stream(seed, "blind", f"removed at {level:g}", 0))
         row = {"hits": None, "cases": len(part), "rate": float(_share(removed, removable)), "low": low, "high": high}
         yield _named(f"share of the oracle's fall of the held-out mean square that is reached, at {level:g}", row, None)
-    adopted = cases[cases.found != NONE]
+    adopted = cases[cases.adopted]
     yield _rated("effect adopted and held-out RMS worse by over two standard errors", adopted.worse, ("worse", None))
 
 

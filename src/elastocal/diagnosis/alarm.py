@@ -3,7 +3,8 @@
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
 distribution is that of simulated readings of the same design, at the pose error that fits best, with the pose error averaged
 over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
-no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw.
+no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw. Sizes begin a step
+below those of the posterior: what lies between may be seen, and its probability does not matter to a test.
 
 References
 ----------
@@ -11,7 +12,7 @@ References
 .. [2] Good, I. J. (1992). The Bayes/non-Bayes compromise: a brief review. JASA 87, 597-606.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -88,7 +89,9 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
             log_prior = prior.log_odds_of([problem.units[number]])
             terms = []
-            for scale, log_weight in zip(grid.scales, grid.log_weights, strict=True):
+            unit = problem.units[number]
+            weights = grid.of(replace(unit, smallest=max(unit.smallest - 1, 0)))
+            for scale, log_weight in zip(grid.scales[np.isfinite(weights)], weights[np.isfinite(weights)], strict=True):
                 widened = 1.0 + scale**2 * values[:, place]
                 gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
                 occam = -0.5 * np.log(widened).sum(axis=1)[:, None]

@@ -53,9 +53,7 @@ def averaged(linearized, posterior, best, owners):
     -------
     Averaged
     """
-    likely = [
-        (m, p) for m, p in zip(posterior.models, posterior.probabilities, strict=True) if p >= _LEAST_PROBABILITY or m is best
-    ]
+    likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
     moments, exact = {}, None
     for model, probability in likely:
@@ -72,6 +70,57 @@ def averaged(linearized, posterior, best, owners):
             shift[name] = float(center - exact[name][0])
             std_error[name] = float(np.sqrt(weight @ (variance + (mean - center) ** 2)))
     return Averaged(shift, std_error)
+
+
+def expected_to_help(problem, posterior, model):
+    """Whether predictions are expected to be better with a model than without it, at poses like those of the readings.
+
+    With d the displacement that a model predicts and E d its mean over all models, the expected square of the error falls from
+    E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds d'd. Readings that were held out take no part.
+
+    Parameters
+    ----------
+    problem : Problem
+    posterior : Posterior
+    model : search.Model
+        Of the posterior.
+
+    Returns
+    -------
+    bool
+    """
+    gram = problem.statistics.gram[0]
+    mean, mine = np.zeros(len(gram)), _predicted(problem, model)
+    for other, probability in _likely(posterior, model):
+        mean += probability * _predicted(problem, other)
+    return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
+
+
+def _likely(posterior, best):
+    """Models that count, and the best, with their probabilities."""
+    pairs = zip(posterior.models, posterior.probabilities, strict=True)
+    return [(model, probability) for model, probability in pairs if probability >= _LEAST_PROBABILITY or model is best]
+
+
+def squares_explained(problem, model):
+    """Sum of squares of the whitened displacements that each mechanism of a model makes, dict of str to float."""
+    coefficients, gram, found = _predicted(problem, model), problem.statistics.gram[0], {}
+    for mechanism in {problem.units[number].mechanism for number in model.units}:
+        units = [problem.units[number] for number in model.units if problem.units[number].mechanism == mechanism]
+        columns = np.concatenate([unit.columns for unit in units])
+        found[mechanism] = float(coefficients[columns] @ gram[np.ix_(columns, columns)] @ coefficients[columns])
+    return found
+
+
+def _predicted(problem, model):
+    """Coefficients of all columns in a model at its most probable sizes, in plausible sizes, ndarray (K,)."""
+    coefficients = np.zeros(problem.statistics.gram.shape[1])
+    if model.units:
+        units = [problem.units[number] for number in model.units]
+        joint = _joint(problem, units, model)
+        columns = np.concatenate([unit.columns for unit in units])
+        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[np.argmax(joint.by_pose_error)]
+    return coefficients
 
 
 def _moments(linearized, model, equations, owners):
@@ -98,8 +147,10 @@ def _moments(linearized, model, equations, owners):
 
 def _coefficients(problem, units, model):
     """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
-    if not units:
-        return []
+    return _joint(problem, units, model).moments() if units else []
+
+
+def _joint(problem, units, model):
     places = np.searchsorted(problem.grid.scales, model.scales)
     base = problem.statistics.log_likelihood + problem.log_pose
-    return Joint(problem.statistics, units, problem.grid, base, places).moments()
+    return Joint(problem.statistics, units, problem.grid, base, places)

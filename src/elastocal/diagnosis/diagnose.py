@@ -7,16 +7,19 @@ import numpy as np
 from elastocal.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
-from elastocal.diagnosis.averaging import Averaged, averaged
-from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
+from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
-from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
-from elastocal.fitting import fit
+from elastocal.fitting import ON_THE_WAY, fit
 from elastocal.hygiene import faults
 from elastocal.loop.declared import estimated_noise
 from elastocal.model import joint_compliances
 from elastocal.random_streams import stream
+
+# Mechanisms that are added one at a time, each by a fit; of more, only the first.
+_MOST_STEPS = 4
 
 
 @dataclass(frozen=True)
@@ -44,17 +47,17 @@ class Evidence:
     ----------
     linearized : Linearized
     posterior : Posterior
-    nothing : search.Model
-        The declared model alone.
     alarm : Alarm
     conclusion : Conclusion
+    adopted : bool
+        Whether the effects found enter the model.
     """
 
     linearized: object
     posterior: object
-    nothing: object
     alarm: Alarm
     conclusion: object
+    adopted: bool
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,8 @@ def diagnose(case, settings, seed, progress=None):
         found, final = _explained(case, declared, settings, seed, tell)
         if not found.conclusion.best.named:
             steps[-1] = replace(steps[-1], fitted=final)
-        steps += _effect_steps(case, declared, final, found)
+        if found.adopted:
+            steps += _effect_steps(case, declared, final, found)
     document = _document(case, noise, steps[1].fitted, final, found, known, settings, warnings)
     return Diagnosis(case, tuple(steps), found, document)
 
@@ -126,42 +130,51 @@ def diagnose(case, settings, seed, progress=None):
 def _explained(case, declared, settings, seed, tell):
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
-    about, before = declared, None
+    about, searched = searched_part(declared, case.observations, settings)
+    before = None
     for round_number in range(settings.linearizations):
-        problem = linearized(about, case.observations, candidates, settings)
-        found, nothing = posterior(problem.problem)
+        problem = linearized(about, searched, candidates, settings)
+        nothing, alone = first_look(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
+        # The alarm comes before the readings choose at which shapes to look more closely: it would no longer be exact.
+        closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
+        if closer:
+            problem = linearized(about, searched, candidates, settings, closer)
+        found = posterior(problem.problem, {effect.key for effect in about.model.effects})
         conclusion = concluded(problem.problem, found, alarm)
-        evidence = Evidence(problem, found, nothing, alarm, conclusion)
-        tell(_told(conclusion, alarm))
         named, taken = conclusion.best.named, about.noise
-        model = found.models[conclusion.best.model] if named else nothing
+        model = found.models[conclusion.best.model] if named else found.nothing
+        tell(_told(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
-        if named or off:
-            about = final = fit_with_sizes(declared, case.observations, noise, selected(problem, model))
         small = not named or alarm.statistic < settings.relinearize_above
-        if not off and (small or named == before or abs(mean_square(final) - 1.0) < settings.linear_misfit):
+        if named or off:
+            chosen, near = selected(problem, model), about if before else None
+            about = fit_with_sizes(declared, searched, noise, chosen, near, settled=ON_THE_WAY)
+        if not off and (small or named == before or abs(mean_square(about) - 1.0) < settings.linear_misfit):
             break
         before = named
-    if not named:
-        final = declared if taken is declared.noise else fit(case.model, case.observations, noise, declared.estimate)
-    return evidence, final
+    if named:
+        final = fit_with_sizes(declared, case.observations, noise, chosen, about)
+    else:
+        final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
+    adopted = bool(named) and expected_to_help(problem.problem, found, model)
+    return Evidence(problem, found, alarm, conclusion, adopted), final
 
 
 def _effect_steps(case, declared, final, found):
-    """One step for each mechanism, the most probable first, each with those before it."""
-    conclusion = found.conclusion
-    names = sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name])
-    if not names:
-        return []
-    chosen = selected(found.linearized, found.posterior.models[conclusion.best.model])
-    steps = [Step(f"+ {names[-1]}", "effect", final)]
-    for number in range(len(names) - 1, 0, -1):
-        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in names[:number]))
+    """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
+    model = found.posterior.models[found.conclusion.best.model]
+    chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
+    names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
+    alone = names if len(names) <= _MOST_STEPS else names[:1]
+    last = names[-1] if len(alone) == len(names) else f"{len(names) - len(alone)} further effects"
+    steps = [Step(f"+ {last}", "effect", final)]
+    for number in range(len(alone) - (len(alone) == len(names)), 0, -1):
+        some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
-        steps.insert(0, Step(f"+ {names[number - 1]}", "effect", fitted))
+        steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))
     return steps
 
 
@@ -177,8 +190,12 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
         entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
+        entries = [entry | {"adopted": found.adopted} for entry in entries]
+        if entries and not found.adopted:
+            said.append("what was found is too uncertain to make predictions better: the model stays as declared")
         said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
-        misfit = _misfit(found, found.nothing)
+        misfit = _misfit(found)
+        said += _pose_error_warnings(final.noise, found.linearized)
     said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
@@ -207,11 +224,11 @@ def _told(conclusion, alarm):
     return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
 
 
-def _misfit(found, nothing):
+def _misfit(found):
     """Mean square of the residual over that of the noise: declared, and with the most probable model."""
-    problem = found.linearized.problem
-    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.mechanisms else nothing
-    return {"before": mean_square_left(problem, nothing), "after": mean_square_left(problem, best)}
+    problem, models = found.linearized.problem, found.posterior.models
+    best = models[found.conclusion.best.model] if found.conclusion.best.mechanisms else found.posterior.nothing
+    return {"before": mean_square_left(problem, found.posterior.nothing), "after": mean_square_left(problem, best)}
 
 
 def _noise_facts(measured, left):
@@ -230,12 +247,21 @@ def _noise_warnings(measured, left, settings):
     factor = left.position_m / measured.position_m
     if factor < settings.relinearize_noise:
         return []
-    said = "their repeats scatter" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"readings scatter about the model {factor:.2g} times as much as {said}"]
+    said = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
+    return [f"readings scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
+
+
+def _pose_error_warnings(left, linearized):
+    if left.pose_rad < linearized.pose_std_error_rad:
+        return []
+    return [
+        f"readings of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a pose do"
+        " not show: new poses will err as much"
+    ]
 
 
 def _averages(declared, found):
-    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.nothing
+    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.posterior.nothing
     owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
     return averaged(found.linearized, found.posterior, best, owners)
 

@@ -53,6 +53,17 @@ class Grid:
     scales: np.ndarray
     log_weights: np.ndarray
 
+    def of(self, unit):
+        """Logarithms of the weights for one unit: its smallest size and those above share them, ndarray (S,)."""
+        return self._from[unit.smallest]
+
+    @cached_property
+    def _from(self):
+        """Weights from each size on, ndarray (S, S)."""
+        places = np.arange(len(self.scales))
+        weights = np.where(places < places[:, None], -np.inf, self.log_weights)
+        return weights - log_sum_exp(weights, axis=1)[:, None]
+
 
 def scale_weights(scales, settings):
     """Logarithms of the prior weights of sizes: log-normal pieces below and above the most likely size.
@@ -229,7 +240,7 @@ def _decomposed(units, chosen, part_of):
     return Blocks(tuple(members), tuple(values), tuple(vectors), tuple(columns))
 
 
-def added_evidence(conditioned, blocks, grid, freedom, count):
+def added_evidence(conditioned, blocks, grid, freedom, units):
     """Log evidence of a model with each of some units added, at every size of that unit.
 
     Parameters
@@ -240,15 +251,15 @@ def added_evidence(conditioned, blocks, grid, freedom, count):
         Of the conditioned Gram matrix.
     grid : Grid
     freedom : int
-    count : int
-        Number of all units.
+    units : sequence of Unit
+        All of them.
 
     Returns
     -------
-    ndarray (T, count, S)
+    ndarray (T, number of units, S)
         -inf for units that are not in the blocks.
     """
-    found = np.full((len(conditioned.squares), count, len(grid.scales)), -np.inf)
+    found = np.full((len(conditioned.squares), len(units), len(grid.scales)), -np.inf)
     variances = grid.scales**2
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         along = conditioned.along[:, columns]
@@ -258,7 +269,7 @@ def added_evidence(conditioned, blocks, grid, freedom, count):
         occam = -0.5 * np.log(widened).sum(axis=2)
         likelihood = log_likelihood(conditioned.squares[:, None, None] - gains, freedom)
         found[:, members] = conditioned.log_occam[:, None, None] + occam + likelihood
-    return found + grid.log_weights
+    return found + np.array([grid.of(unit) for unit in units])
 
 
 @dataclass(frozen=True)
@@ -309,7 +320,7 @@ def evaluate(statistics, units, grid, log_pose, start):
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
-    places = [int(np.argmin(np.abs(grid.scales - size))) for size in start]
+    places = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
     present = Joint(statistics, units, grid, base, np.array(places))
     for _ in range(_MOST_ASCENTS):
         profiles = present.profiles()
@@ -374,7 +385,8 @@ class Joint:
     def __init__(self, statistics, units, grid, base, places):
         self.units, self.grid, self.base, self.places = units, grid, base, places
         self.freedom = statistics.freedom
-        self.scales, self.log_weights = grid.scales[places], grid.log_weights[places]
+        self.scales, self.weights = grid.scales[places], [grid.of(unit) for unit in units]
+        self.log_weights = np.array([weights[place] for weights, place in zip(self.weights, places, strict=True)])
         columns = np.concatenate([unit.columns for unit in units])
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
         deviations = np.repeat(self.scales, np.diff(self.starts))
@@ -414,7 +426,8 @@ class Joint:
 
     def _log_weights_of(self, number):
         """Prior weights of all sizes as they are, but for those of one unit: none for size zero, and all of its grid."""
-        return np.concatenate([[0.0], self.grid.log_weights]) + self.log_weights.sum() - self.log_weights[number]
+        others = np.delete(self.log_weights, number).sum()
+        return np.concatenate([[0.0], self.weights[number]]) + others
 
     def _given_the_others(self):
         """What each unit sees with the others integrated out: number, and eigenvalues and eigenvectors of its Gram matrix, its

@@ -220,6 +220,7 @@ def fault_entry(fault):
         "parameters": [value | {"std_error": None} for value in fault["parameters"]],
         "p_value": None,
         "heldout_gain": None,
+        "adopted": False,
         "alternatives": list(fault["alternatives"]),
         "angle_to_nearest_deg": None,
         "evidence": [float(value) if np.isfinite(value) else None for value in fault["evidence"]],

@@ -33,6 +33,10 @@ class Unit:
         Sign that physics gives each parameter, 0 where it may have either.
     log_prior : float
         Logarithm of its share among the variants at its location.
+    competitor : Competitor or None
+        Of `OTHER`.
+    smallest : int
+        Place in the grid of sizes of the smallest that the readings could show.
     """
 
     mechanism: str
@@ -43,11 +47,13 @@ class Unit:
     sizes: np.ndarray
     signs: np.ndarray
     log_prior: float = 0.0
+    competitor: object = None
+    smallest: int = 0
 
     @property
     def key(self):
         """Unique name: key of the candidate, with the shape values."""
-        name = self.candidate.key if self.candidate else f"{OTHER}{list(self.location)}"
+        name = self.candidate.key if self.candidate else f"{OTHER}{list(self.location)} {self.competitor.name}"
         return name + "".join(f" {shape:.3g}" for shape in self.shapes)
 
 
@@ -107,8 +113,9 @@ def prior_of(units, settings):
     Prior
     """
     odds, counts = {}, {}
+    special = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}
     for mechanism in dict.fromkeys(unit.mechanism for unit in units):
-        probability = settings.gravity_probability if mechanism == "link_weight" else settings.mechanism_probability
+        probability = special.get(mechanism, settings.mechanism_probability)
         odds[mechanism] = float(np.log(probability / (1.0 - probability)))
         locations = len({unit.location for unit in units if unit.mechanism == mechanism})
         numbers = np.arange(1, locations + 1)
@@ -126,8 +133,8 @@ def units_of(tested, features, settings):
     ----------
     tested : sequence of (Candidate, sequence of float)
         With shape values.
-    features : sequence of (tuple, int)
-        Location and number of columns of each unit of `OTHER`.
+    features : sequence of (Competitor, int)
+        Laws of `OTHER`, with their numbers of columns.
     settings : Settings
 
     Returns
@@ -137,9 +144,10 @@ def units_of(tested, features, settings):
     start, units, laws = 0, [], {}
     for candidate, _ in tested:
         laws.setdefault((candidate.effect, candidate.location), []).append(candidate.key)
+    shares = _shares_of_shapes(tested)
     for candidate, shapes in tested:
         keys = laws[candidate.effect, candidate.location]
-        share = 1.0 / len(set(keys)) / keys.count(candidate.key)
+        share = 1.0 / len(set(keys)) * shares[candidate.key, tuple(shapes)]
         columns = np.arange(start, start + len(candidate.parameters))
         values = tuple(float(shape) for shape in shapes)
         sizes = np.array([p.plausible * p.order**-settings.harmonic_decay for p in candidate.parameters])
@@ -147,8 +155,21 @@ def units_of(tested, features, settings):
         log_share = float(np.log(share))
         units.append(Unit(candidate.effect, candidate.location, candidate, values, columns, sizes, signs, log_share))
         start += len(columns)
-    for location, count in features:
-        columns = np.arange(start, start + count)
-        units.append(Unit(OTHER, location, None, (), columns, np.ones(count), np.zeros(count, int)))
+    at = [each.location for each, _ in features]
+    for each, count in features:
+        columns, log_share = np.arange(start, start + count), -float(np.log(at.count(each.location)))
+        units.append(Unit(OTHER, each.location, None, (), columns, np.ones(count), np.zeros(count, int), log_share, each))
         start += count
     return tuple(units)
+
+
+def _shares_of_shapes(tested):
+    """Prior share of each shape of a candidate: of the range of what bends it, the part nearest to it."""
+    tried = {}
+    for candidate, shapes in tested:
+        tried.setdefault(candidate.key, (candidate, []))[1].append(tuple(shapes))
+    found = {}
+    for key, (candidate, values) in tried.items():
+        shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
+        found |= {(key, value): share for value, share in zip(values, shares, strict=True)}
+    return found

@@ -18,6 +18,12 @@ from elastocal.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
 _SHAPES_TRIED = 3
+# Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
+# a step is looked for within a quarter of the spacing to either side.
+_SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
+# A candidate is looked at more closely whose log odds come so near to those of the best and whose log Bayes factor is so large:
+# below, its shape hardly matters.
+_NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
 # Declared parameters without a prior of their own get one this many times their plausible size: it decides nothing, and keeps
 # well posed what the readings do not determine.
 _WIDE = 10.0
@@ -39,6 +45,8 @@ class Linearized:
     about : Fit
     candidates : frozenset of str
         Keys of all candidates: parameters of the fit that they own are coefficients of units here.
+    pose_std_error_rad : float
+        With which the readings of one pose tell a joint angle.
     """
 
     problem: object
@@ -47,9 +55,10 @@ class Linearized:
     untestable: dict
     about: object
     candidates: frozenset
+    pose_std_error_rad: float
 
 
-def linearized(fitted, observations, candidates, settings):
+def linearized(fitted, observations, candidates, settings, shapes=None):
     """Gather what the readings say of a fit and of all candidates.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is
@@ -62,24 +71,26 @@ def linearized(fitted, observations, candidates, settings):
     observations : Observations
     candidates : sequence of Candidate
     settings : Settings
+    shapes : dict of str to list of tuple, optional
+        Values of the shape of some candidates, by their keys, instead of `shapes_tried`.
 
     Returns
     -------
     Linearized
     """
-    fitted, observations = selected(fitted, observations, spread_poses(observations, settings.searched_observations))
     around, sites = fitted.circumstances, fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
-    tested = [(c, shapes) for c in candidates if c.key not in untestable for shapes in shapes_tried(c, fitted)]
-    places = other.locations(sites)
-    features = [len(other.displacements(at_states(around, slice(1)), at, settings.other_features, around)) for at in places]
-    units = units_of(tested, list(zip(places, features, strict=True)), settings)
+    tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
+    tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
+    against = other.competitors(around)
+    features = [len(other.displacements(at_states(around, slice(1)), at, settings.other_features, around)) for at in against]
+    units = units_of(tested, list(zip(against, features, strict=True)), settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
-    source = _Source(fitted, observations, around, tested, places, units, found, values, settings)
+    source = _Source(fitted, observations, around, tested, against, units, found, values, settings)
     width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
@@ -101,13 +112,13 @@ def linearized(fitted, observations, candidates, settings):
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
         products = summed(source.blocks(parts), triangle[:-1, :-1], sample, deviation, present, grid)
     statistics = statistics_of(products, grid)
-    kept = testable(statistics, units, settings)
-    shown = tuple(unit for unit, good in zip(units, kept, strict=True) if good)
+    smallest = smallest_shown(statistics, units, settings)
+    shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n < len(settings.scales))
     small = {unit.candidate.key for unit in units if unit.candidate} - {u.candidate.key for u in shown if u.candidate}
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, size, untestable, fitted, keys)
+    return Linearized(problem, products, size, untestable, fitted, keys, unit_rad)
 
 
 def declared_geometry(model):
@@ -180,10 +191,11 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
     return best[1]
 
 
-def testable(statistics, units, settings):
-    """Which units at their plausible size would be found with a power of at least one half, were each the only candidate.
+def smallest_shown(statistics, units, settings):
+    """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
-    A test for one direction among all units reaches that where the non-centrality is the critical value.
+    A test for one direction among all units reaches that where the non-centrality is the critical value. A smaller effect is
+    there or not, and the readings are the same: it counts as not there.
 
     Parameters
     ----------
@@ -193,15 +205,13 @@ def testable(statistics, units, settings):
 
     Returns
     -------
-    ndarray of bool
-        True throughout for the competitor.
+    ndarray of int
+        Place among the sizes; their number where even the largest, the plausible one, is too small to be seen.
     """
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
-    largest = []
-    for unit in units:
-        gram = statistics.gram[0][np.ix_(unit.columns, unit.columns)]
-        largest.append(np.inf if unit.candidate is None else np.linalg.eigvalsh(gram)[-1])
-    return np.array(largest) >= critical
+    grams = (statistics.gram[0][np.ix_(unit.columns, unit.columns)] for unit in units)
+    largest = np.array([np.linalg.eigvalsh(gram)[-1] for gram in grams])
+    return np.searchsorted(np.array(settings.scales) ** 2, critical / np.maximum(largest, 1e-9 * critical))
 
 
 @dataclass(frozen=True)
@@ -225,8 +235,7 @@ class _Source:
     campaign : Circumstances
         By which the competitor's inputs are normalised.
     tested : list of (Candidate, tuple)
-    places : list of tuple
-        Of the competitor.
+    against : list of Competitor
     units : tuple of Unit
         Of both.
     found : ndarray of bool
@@ -240,7 +249,7 @@ class _Source:
     observations: object
     campaign: object
     tested: list
-    places: list
+    against: list
     units: tuple
     found: np.ndarray
     values: np.ndarray
@@ -252,7 +261,7 @@ class _Source:
         for states, seen in parts:
             some = part_at(self.observations, states, seen)
             line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.circumstances, states))
-            jacobian, root = fitted.joint_jacobian[seen], np.sqrt(fitted.weights[seen])
+            jacobian, root = fitted.jacobian_at(line, seen), np.sqrt(fitted.weights[seen])
             yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_readings), root)
 
     def declared_part(self, parts):
@@ -273,7 +282,7 @@ class _Source:
         sizes = np.concatenate([unit.sizes for unit in self.units])
         for line, some, jacobian, white in self.lines(parts):
             around, features = line.circumstances, self.settings.other_features
-            waves = [_Fixed(other.displacements(around, place, features, self.campaign)) for place in self.places]
+            waves = [_Fixed(other.displacements(around, each, features, self.campaign)) for each in self.against]
             laws = [*self.tested, *((made, ()) for made in waves)]
             made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
             made *= sizes
@@ -293,6 +302,22 @@ def _white(whitener, root):
         return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
 
     return white
+
+
+def searched_part(fitted, observations, settings):
+    """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+    settings : Settings
+
+    Returns
+    -------
+    Fit, Observations
+    """
+    return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
 
 
 def selected(fitted, observations, chosen):
@@ -315,18 +340,61 @@ def selected(fitted, observations, chosen):
     elif not chosen.all():
         around = at_states(around, chosen)
     seen = chosen[observations.state]
-    parts = {name: getattr(fitted, name)[seen] for name in ("weights", "residual", "joint_jacobian")}
+    kept = {name: getattr(fitted, name) for name in ("weights", "residual", "joint_jacobian")}
+    parts = {name: None if values is None else values[seen] for name, values in kept.items()}
     return replace(fitted, circumstances=around, **parts), some
 
 
 def shapes_tried(candidate, fitted):
-    """Values of the shape of a candidate over its range, and that of the fit where it has the candidate; list of tuple."""
+    """Values of the shape of a candidate over its range, list of tuple.
+
+    Where the fit has the candidate, its value alone; or, where a search must try many lest it step over the law, which is a law
+    that no fit can follow, values close to that of the fit.
+    """
     if not candidate.shapes:
         return [()]
-    if candidate.key in {effect.key for effect in fitted.model.effects}:
-        return [tuple(fitted.values_of(candidate.key)[1].tolist())]
     (shape,) = candidate.shapes
-    return [(float(value),) for value in shape.values(_SHAPES_TRIED)]
+    values = shape.values(_SHAPES_TRIED)
+    if candidate.key in {effect.key for effect in fitted.model.effects}:
+        (value,) = fitted.values_of(candidate.key)[1].tolist()
+        reach = _CLOSER_STILL * np.diff(values[:2]).sum()
+        values = [value]
+        if shape.tried > 1:
+            about = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
+            values = np.unique(np.clip(about, shape.lowest, shape.highest))
+    return [(float(value),) for value in values]
+
+
+def shapes_looked_at_closely(problem, alone):
+    """Values of the shapes of the best candidates, closer to each other about the best value of each.
+
+    Parameters
+    ----------
+    problem : Problem
+    alone : ndarray
+        Log Bayes factor of each unit alone.
+
+    Returns
+    -------
+    dict of str to list of tuple
+        By the keys of candidates; empty where no shape matters.
+    """
+    units = problem.units
+    odds = alone + [problem.prior.log_odds_of([unit]) for unit in units]
+    found = {}
+    for number in np.argsort(-odds):
+        unit = units[number]
+        near = odds[number] > odds.max() - _NEAR_THE_BEST and alone[number] > _WORTH_A_LOOK
+        if near and unit.shapes and unit.candidate.key not in found:
+            (shape,), (best,) = unit.candidate.shapes, unit.shapes
+            tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
+            place = tried.index(best)
+            below, above = [shape.lowest, *tried][place], [*tried, shape.highest][place + 1]
+            # The best may lie at an end of the range.
+            sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
+            closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
+            found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
+    return found
 
 
 def lacking(candidate, sites, states):
@@ -334,7 +402,7 @@ def lacking(candidate, sites, states):
     missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
-    for joint in candidate.joints if candidate.distinct_angles else ():
+    for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():
         angles = len(np.unique(np.round(np.mod(states.joint_angles[:, joint - 1], 2 * np.pi), 3)))
         if angles < candidate.distinct_angles:
             return f"{angles} angles of joint {joint} where {candidate.distinct_angles} are needed"

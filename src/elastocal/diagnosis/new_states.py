@@ -246,7 +246,7 @@ class Instrument:
         In the parameters of whose products information is stated.
     laws : list of (Candidate, tuple)
         In the order of the columns, but for features of the competitor, which follow.
-    features : list of (tuple, ndarray of int)
+    features : list of (Competitor, ndarray of int)
         Location of each unit of the competitor, and its columns.
     columns : ndarray of int (U,)
         Of the statistics, in the order of laws and features.
@@ -314,8 +314,8 @@ class Instrument:
         count = sum(len(columns) for _, columns in self.features)
         waves = [
             law
-            for place, columns in self.features
-            for law in other.displacements(around, place, self.linearized.problem.settings.other_features, campaign)
+            for each, columns in self.features
+            for law in other.displacements(around, each, self.linearized.problem.settings.other_features, campaign)
         ]
         made = effect_columns([*self.laws, (_Known(waves), ())] if count else self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
@@ -396,7 +396,7 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     for number in sorted(numbers, key=lambda number: problem.units[number].candidate is None):
         unit = problem.units[number]
         if unit.candidate is None:
-            features.append((unit.location, unit.columns))
+            features.append((unit.competitor, unit.columns))
         else:
             laws.append((unit.candidate, unit.shapes))
         columns.append(unit.columns)

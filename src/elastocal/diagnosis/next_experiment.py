@@ -355,8 +355,8 @@ def _ambiguous(evidence, settings):
     reached = np.cumsum([h.probability for h in there])
     credible = there[: int(np.searchsorted(reached, settings.credible * reached[-1])) + 1]
     names = [conclusion.best.mechanisms, *(h.mechanisms for h in credible if h != conclusion.best)][:_HYPOTHESES]
-    # Where the verdict names one mechanism, another one beside it does not make the name ambiguous.
-    instead = [name for name in names[1:] if not set(name) >= set(names[0]) or OTHER in name]
+    # Where the verdict names one mechanism, whatever else is beside it does not make the name ambiguous.
+    instead = [name for name in names[1:] if not set(name) >= set(names[0])]
     if len(names) < 2 or (conclusion.verdict == NAMED and not instead):
         return {}, NOTHING_AMBIGUOUS
     units = evidence.linearized.problem.units

@@ -1,14 +1,19 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
-A displacement is a random function of angles, load, approach and time, a sum of random Fourier features [1]_ with normal
-coefficients: an approximate Gaussian process. Half of the features are multiplied by the load, so that they vanish without it.
-Alone it means that the residual is *unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not
-used to predict.
+A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
+approximate Gaussian process. A function of everything at once would fit nothing better than chance does, so that each law has
+the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach; the angles of the
+joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features
+are multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a
+mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 References
 ----------
 .. [1] Rahimi, A. and Recht, B. (2007). Random features for large-scale kernel machines. NIPS 20.
+.. [2] Duvenaud, D., Nickisch, H. and Rasmussen, C. E. (2011). Additive Gaussian processes. NIPS 24.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,28 +24,65 @@ from elastocal.random_streams import stream
 JOINT_RAD, BASE_M, BASE_RAD = 2e-4, 1e-4, 1e-4
 # Length scales of the features in units of the inputs, which are of size one: from smooth to as many waves as poses can show.
 _LENGTH_SCALES = (0.7, 3.0)
-_BASE_FEATURES = 8
+OWN, NEIGHBOURS, TIME, FORCE, PLACE = "own", "neighbours", "time", "force", "place"
+SHIFT, TURN = "shift", "turn"
+_AT_A_JOINT, _AT_THE_BASE = (OWN, NEIGHBOURS, TIME), (FORCE, TIME, PLACE)
+_BASE_FEATURES = 6
+# Inputs that differ by less, in SI units or of their largest value, differ by rounding.
+_ROUNDING = 1e-9
 _SEED = 2007
 
 
-def locations(sites):
-    """Where the competitor acts: each joint, and the base.
+@dataclass(frozen=True)
+class Competitor:
+    """One law at one location.
+
+    Attributes
+    ----------
+    location : tuple of int
+        Joint counted from 1; empty for the base.
+    law : str
+        By what it goes: "own", "neighbours" or "time" at a joint; "force", "time" or "place" at the base.
+    motion : {"turn", "shift"}
+        Joints turn; the base does either.
+    """
+
+    location: tuple
+    law: str
+    motion: str = TURN
+
+    @property
+    def name(self):
+        """Tells the laws of one location apart."""
+        return self.law if self.location else f"{self.law} {self.motion}"
+
+
+def competitors(campaign):
+    """Laws of which a campaign has inputs, at each joint and at the base.
+
+    Parameters
+    ----------
+    campaign : Circumstances
 
     Returns
     -------
-    list of tuple of int
-        Joint counted from 1; empty for the base.
+    list of Competitor
     """
-    return [*((joint + 1,) for joint in range(sites.joints)), ()]
+    joints = range(campaign.sites.joints)
+    every = [Competitor((joint + 1,), law) for joint in joints for law in _AT_A_JOINT]
+    every += [Competitor((), law, motion) for law in _AT_THE_BASE for motion in (SHIFT, TURN)]
+    return [
+        each for each in every if any(_inputs(campaign, each, at, campaign).shape[1] for at in _coordinates(campaign, each))
+    ]
 
 
-def displacements(around, location, features, campaign=None):
-    """Random displacements at one location, per unit of their coefficients in plausible sizes.
+def displacements(around, competitor, features, campaign=None):
+    """Random displacements by one law, per unit of their coefficients in plausible sizes.
 
     Parameters
     ----------
     around : Circumstances
-    location : tuple of int
+    competitor : Competitor
     features : int
         At a joint.
     campaign : Circumstances, optional
@@ -51,48 +93,88 @@ def displacements(around, location, features, campaign=None):
     list of dict of int to ndarray (S,)
         For each feature a displacement of one coordinate.
     """
-    campaign = around if campaign is None else campaign
-    inputs, load = _inputs(around, campaign), _relative_load(around, location, campaign)
-    loaded = bool(_load(campaign, location).any())
-    draws = stream(_SEED, OTHER, "random Fourier features", location[0] if location else 0)
-    if location:
-        return [{location[0] - 1: JOINT_RAD * wave} for wave in _waves(inputs, load, features, draws, loaded)]
-    sizes = dict(zip(around.sites.base, (BASE_M,) * 3 + (BASE_RAD,) * 3, strict=True))
-    return [
-        {coordinate: size * wave}
-        for coordinate, size in sizes.items()
-        for wave in _waves(inputs, load, _BASE_FEATURES, draws, loaded)
-    ]
+    campaign, location = around if campaign is None else campaign, competitor.location
+    load = _relative_load(around, location, campaign)
+    loaded = bool(np.abs(_load(campaign, location)).max(initial=0.0) > _ROUNDING)
+    draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
+    count = features if location else _BASE_FEATURES
+    size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
+    found = []
+    for coordinate in _coordinates(around, competitor):
+        inputs = _inputs(around, competitor, coordinate, campaign)
+        found += [{coordinate: size * wave} for wave in _waves(inputs, load, count, draws, loaded)]
+    return found
+
+
+def _coordinates(around, competitor):
+    """Coordinates of the sites that a law displaces."""
+    if competitor.location:
+        return [competitor.location[0] - 1]
+    return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
 def _waves(inputs, load, count, draws, loaded):
-    """Features (count, S) whose squares sum to about one; the second half times the load."""
+    """Features (count, S) whose squares sum to about one, the second half times the load; none of them without an input."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, count))
     frequency = draws.standard_normal((inputs.shape[1], count)) / lengths
     waves = np.sqrt(2.0 / count) * np.cos(inputs @ frequency + draws.uniform(0, 2 * np.pi, count))
     if loaded:
         waves[:, count // 2 :] *= load[:, None]
-    return waves.T
+    return waves.T if inputs.shape[1] else np.zeros_like(waves.T)
 
 
-def _inputs(around, campaign):
-    """Angles as points of a circle, load, sense of approach and time, each of size about one, ndarray (S, D)."""
-    parts = [np.cos(around.joint_angles), np.sin(around.joint_angles)]
-    for name in ("wrench", "approach", "time_s", "temperature_c"):
-        known = getattr(campaign, name)
-        if known is not None:
-            known = np.reshape(known, (len(campaign.joint_angles), -1)).astype(float)
-            values = np.reshape(getattr(around, name), (len(around.joint_angles), -1)).astype(float)
-            spread = np.abs(known - known.mean(axis=0)).max(axis=0)
-            parts.append(((values - known.mean(axis=0)) / np.where(spread > 0, spread, 1.0))[:, spread > 0])
-    return np.concatenate(parts, axis=1)
+def _inputs(around, competitor, coordinate, campaign):
+    """Inputs of a law for one of its coordinates, each of size about one, ndarray (S, D).
+
+    Angles as points of a circle, all about their mean. What is constant or absent in the campaign is left out.
+    """
+    parts = [_scaled(value(around), value(campaign)) for value in _INPUTS[competitor.law](coordinate, campaign)]
+    return np.concatenate([np.zeros((len(around.joint_angles), 0)), *parts], axis=1)
+
+
+def _scaled(values, known):
+    known, values = (np.reshape(each, (len(each), -1)).astype(float) for each in (known, values))
+    spread = np.abs(known - known.mean(axis=0)).max(axis=0, initial=0.0)
+    differ = spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
+    return ((values - known.mean(axis=0)) / np.where(differ, spread, 1.0))[:, differ]
+
+
+def _angles(joints):
+    """Points of a circle for some joints, counted from 0."""
+    return [lambda around, j=j, wave=wave: wave(around.joint_angles[:, j]) for j in joints for wave in (np.cos, np.sin)]
+
+
+def _own(joint, campaign):
+    approach = [lambda around: around.approach[:, joint]] if campaign.approach is not None else []
+    return [*_angles([joint]), lambda around: around.total[:, joint], *approach]
+
+
+def _neighbours(joint, campaign):
+    beside = [other for other in (joint - 1, joint, joint + 1) if 0 <= other < campaign.sites.joints]
+    return [*_angles(beside), lambda around: around.total[:, joint]]
+
+
+def _time(coordinate, campaign):
+    names = ("time_s", "temperature_c", "progress")
+    return [lambda around, name=name: getattr(around, name) for name in names if getattr(campaign, name) is not None]
+
+
+def _force(coordinate, campaign):
+    return [lambda around: around.total[:, coordinate]]
+
+
+def _place(coordinate, campaign):
+    return [lambda around: around.motion.position[0].T]
+
+
+_INPUTS = {OWN: _own, NEIGHBOURS: _neighbours, TIME: _time, FORCE: _force, PLACE: _place}
 
 
 def _relative_load(around, location, campaign):
     """The load relative to the largest of the campaign, ndarray (S,)."""
     load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
-    return load / largest if largest else np.zeros(len(load))
+    return load / largest if largest > _ROUNDING else np.zeros(len(load))
 
 
 def _load(around, location):

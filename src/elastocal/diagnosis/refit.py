@@ -54,7 +54,7 @@ def selected(linearized, model):
     return Selected(tuple(effects), linearized.declared_size)
 
 
-def fit_with_sizes(declared, observations, noise, chosen, larger=None):
+def fit_with_sizes(declared, observations, noise, chosen, near=None, **options):
     """Fit the declared model with the effects of a selected one.
 
     Parameters
@@ -65,8 +65,10 @@ def fit_with_sizes(declared, observations, noise, chosen, larger=None):
     noise : Noise
         Of readings and poses, as the selected model leaves it.
     chosen : Selected
-    larger : Fit, optional
-        Of the same model with more effects: the search then starts from its values.
+    near : Fit, optional
+        With other effects: the search then starts from its values of those that are the same.
+    **options
+        Of `fitting.fit`.
 
     Returns
     -------
@@ -82,12 +84,12 @@ def fit_with_sizes(declared, observations, noise, chosen, larger=None):
     effects = [candidate for candidate, _ in chosen.effects]
     start = declared.estimate.with_effects(effects)
     start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
-    if larger is not None:
-        values = [larger.values_of(effect.key) for effect in (*known, *effects)]
-        start = replace(
-            larger.estimate, coefficients=tuple(linear for linear, _ in values), shapes=tuple(bent for _, bent in values)
-        )
-    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start)
+    if near is not None:
+        met = {effect.key for effect in near.model.effects}
+        values = zip((*known, *effects), start.coefficients, strict=True)
+        coefficients = tuple(near.values_of(effect.key)[0] if effect.key in met else value for effect, value in values)
+        start = replace(near.estimate, coefficients=coefficients, shapes=start.shapes)
+    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start, near is not None, **options)
 
 
 def mean_square_left(problem, model):

@@ -10,6 +10,7 @@ References
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from heapq import nlargest
 
 import numpy as np
@@ -51,7 +52,7 @@ class Problem:
     prior: object
     settings: object
 
-    @property
+    @cached_property
     def grid(self):
         """Sizes of a unit."""
         return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
@@ -98,9 +99,14 @@ class Posterior:
     models: tuple
     probabilities: np.ndarray
 
+    @property
+    def nothing(self):
+        """The declared model alone."""
+        return next(model for model in self.models if not model.units)
 
-def single_log_bayes_factors(problem):
-    """Log Bayes factor of each unit alone against the declared model.
+
+def first_look(problem):
+    """The declared model alone, and each unit alone against it.
 
     Parameters
     ----------
@@ -108,30 +114,34 @@ def single_log_bayes_factors(problem):
 
     Returns
     -------
-    ndarray (number of units,)
+    nothing : Model
+    log_bayes_factors : ndarray (number of units,)
     """
-    met, prior = _Searcher(problem).met, problem.prior
-    return np.array([met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)])
+    searcher, prior = _Searcher(problem), problem.prior
+    met = searcher.met
+    single = [met[(number,)] - prior.log_odds_of([unit]) for number, unit in enumerate(problem.units)]
+    return searcher.measure(()), np.array(single)
 
 
-def posterior(problem):
+def posterior(problem, known=()):
     """Search the models.
 
     Parameters
     ----------
     problem : Problem
+    known : collection of str, optional
+        Keys of the candidates of a good model, from which the search starts, too.
 
     Returns
     -------
-    posterior : Posterior
-    nothing : Model
-        The declared model alone.
+    Posterior
     """
     searcher = _Searcher(problem)
-    nothing = searcher.measure(())
+    searcher.measure(())
     searcher.start_from_whole_mechanisms()
+    searcher.start_from(known)
     searcher.grow()
-    return searcher.weigh(), nothing
+    return searcher.weigh()
 
 
 def likely_pose_errors(statistics, units, settings):
@@ -151,7 +161,7 @@ def likely_pose_errors(statistics, units, settings):
     problem = Problem(statistics, tuple(units), None, settings)
     conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
     blocks = conditioned.blocks_of(units, range(len(units)))
-    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, len(units))
+    found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, units)
     empty = evaluate(statistics, [], problem.grid, problem.log_pose, ())
     likely = _likely(found, log_sum_exp(log_sum_exp(found, axis=0), axis=1), empty)
     likely[0] = True
@@ -195,7 +205,7 @@ class _Searcher:
         deviations = np.repeat(sizes, [len(units[n].columns) for n in model])
         conditioned = condition(self.statistics, columns, deviations, self.log_pose)
         blocks = conditioned.blocks_of(units, open_units)
-        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, len(units))
+        by_pose_error = added_evidence(conditioned, blocks, self.grid, self.statistics.freedom, units)
         found = log_sum_exp(by_pose_error, axis=0)
         total = log_sum_exp(found, axis=1)
         # What the sizes already in the model are worth as they are, against their average: the same for all extensions.
@@ -253,19 +263,32 @@ class _Searcher:
             if 1 < len(whole) <= self.problem.settings.largest_model:
                 self.measure(whole)
 
+    def start_from(self, known):
+        """Meet the model of some candidates, each with the best of its shapes."""
+        best = {}
+        for number, unit in enumerate(self.problem.units):
+            if unit.candidate and unit.candidate.key in known:
+                place = unit.mechanism, unit.location
+                best[place] = max(best.get(place, (number,)), (number,), key=self.met.get)
+        if best:
+            self.measure(tuple(sorted(number for (number,) in best.values())))
+
     def grow(self):
         """Extend the best models that have not been, in rounds, until rounds bring nothing better."""
-        settings, idle = self.problem.settings, 0
+        settings, idle, rising = self.problem.settings, 0, False
         while idle < settings.patience:
             best = max(self.met.values())
             waiting = [m for m, odds in self.met.items() if m not in self.extended and odds > best - _NEGLIGIBLE]
             if not waiting:
                 break
-            for model in nlargest(settings.beam, waiting, key=self.met.get):
+            # While the best gets better, it alone is followed; where it does not, there is time for others.
+            for model in nlargest(1 if rising else settings.beam, waiting, key=self.met.get):
                 if model not in self.measured:
                     self.measure(model)
                 self.extend(model)
-            idle = 0 if max(self.met.values()) > best + _BETTER else idle + 1
+            gained = max(self.met.values()) - best
+            rising = gained > _BETTER
+            idle = 0 if rising else idle + 1
 
     def weigh(self):
         """Evaluate the best models in full."""

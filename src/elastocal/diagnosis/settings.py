@@ -25,12 +25,15 @@ class Settings:
         "draws of the null distribution; (1 + exceedances) / (1 + draws) is exact (Davison and Hinkley 1997, 4.2)",
     )
     mechanism_probability: float = _setting(
-        0.03,
-        "prior probability of each mechanism; smaller ones name more, but what they state fits development cases less",
+        0.02,
+        "prior probability of each mechanism, of which there are some thirty: what it states fits development cases best",
     )
     gravity_probability: float = _setting(
         0.5,
         "prior probability of link_weight where no masses are declared: every arm has weight; what is open is whether it shows",
+    )
+    other_probability: float = _setting(
+        0.05, "prior probability of what the catalogue does not have: more than of any one mechanism, less than of all together"
     )
     further_location: float = _setting(
         0.5, "ratio of the geometric prior on the number of locations of a mechanism: one defect at five joints is one finding"
@@ -52,14 +55,11 @@ class Settings:
     )
     pose_error_probability: float = _setting(0.5, "prior probability that the readings of a pose have an error in common")
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
-    other_features: int = _setting(
-        40, "random Fourier features at each joint; twice as many change no verdict of the development cases"
-    )
+    other_features: int = _setting(16, "random Fourier features of each law at each joint; few inputs need no more")
     named_probability: float = _setting(
-        0.6, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
+        0.65, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
-    testable_power: float = _setting(0.5, "least power at plausible size with which a mechanism counts as testable")
     linearizations: int = _setting(
         2, "times that the problem is linearised at most, each about the model found before; a third moves no verdict"
     )
@@ -73,7 +73,7 @@ class Settings:
         " errors are in units of the noise taken, so that plausible sizes mean nothing where it is far off",
     )
     searched_observations: int = _setting(
-        30_000,
+        20_000,
         "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
     )

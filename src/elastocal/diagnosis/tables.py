@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.diagnosis.confounding import angles_between, nearest_angles
 from elastocal.diagnosis.diagnose import Diagnosis, Step
-from elastocal.diagnosis.search import single_log_bayes_factors
+from elastocal.diagnosis.search import first_look
 from elastocal.fitting import fit
 from elastocal.loop.case import noise_facts, noise_from
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
@@ -159,7 +159,7 @@ def candidate_columns(diagnosis):
     rows = []
     if evidence:
         problem = evidence.linearized.problem
-        factors = single_log_bayes_factors(problem)
+        factors = first_look(problem)[1]
         inclusion = np.zeros(len(problem.units))
         for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
             inclusion[list(model.units)] += probability

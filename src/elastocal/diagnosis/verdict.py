@@ -82,8 +82,8 @@ def concluded(problem, posterior, alarm):
     Conclusion
         adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for. class: one
         mechanism, but which of some, or whether a related one, remains ambiguous. several: more than one mechanism.
-        unexplained: something acts that the catalogue does not have. not_testable: the readings can test no mechanism of
-        the robot, and nothing of the set-up shows.
+        unexplained: something acts that the catalogue does not have, or that no model explains better than "nothing" does.
+        not_testable: the readings can test no mechanism of the robot, and nothing of the set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
@@ -97,13 +97,15 @@ def concluded(problem, posterior, alarm):
         return Conclusion(ADEQUATE, hypotheses, nothing, {}, mechanisms)
     # The alarm has decided that something is missing; the posterior says what: nothing of the catalogue, one mechanism or more.
     there = [h for h in hypotheses if h.mechanisms]
+    if nothing.probability >= settings.credible:
+        return Conclusion(UNEXPLAINED, hypotheses, nothing, {}, mechanisms)
     weights = [sum(h.probability for h in there if h.kind == kind) for kind in (UNEXPLAINED, CLASS, SEVERAL)]
     kind = (UNEXPLAINED, CLASS, SEVERAL)[int(np.argmax(weights))]
     best = next(h for h in there if h.kind == kind)
     if kind == UNEXPLAINED:
         return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
     total = sum(weights)
-    if kind == CLASS and OTHER not in best.mechanisms and best.probability >= settings.named_probability * total:
+    if kind == CLASS and OTHER not in best.mechanisms and best.probability >= settings.named_probability:
         return Conclusion(NAMED, hypotheses, best, dict.fromkeys(best.named, ()), mechanisms)
     credible = _credible(there, settings.credible * total)
     return Conclusion(kind, hypotheses, best, {name: _instead_of(name, best, credible) for name in best.named}, mechanisms)

@@ -4,7 +4,7 @@ Catalogue row 21. The bias is fixed in base axes, or in the flange where the sen
 """
 
 from elastocal.effects.protocol import Parameter
-from elastocal.effects.wrench_errors import base_and_flange
+from elastocal.effects.wrench_errors import at_flange_and_in_pull
 
 NAME, FAMILY = "force_bias", "load"
 WORDS = "zero error of the force sensor"
@@ -13,4 +13,4 @@ _PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 
 def candidates(sites):
     """One candidate for each frame in which the sensor can sit."""
-    return base_and_flange(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.push(wrench))
+    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench, lever: axis.push(wrench))

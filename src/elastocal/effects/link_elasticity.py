@@ -1,13 +1,15 @@
 """A link that bends and twists: a cantilever between two joints.
 
 Catalogue row 5, Euler-Bernoulli and St Venant: with the wrench at the far end in a frame with x along the link,
-y = F_y l^3/3EI + M_z l^2/2EI, r_z = F_y l^2/2EI + M_z l/EI, likewise in the other plane, r_x = M_x l/GJ. Linear in 1/EI
-and 1/GJ. Stretching is some hundred times less than bending and left out.
+y = F_y l^3 a/EI + M_z l^2 b/EI, r_z = F_y l^2 b/EI + M_z l c/EI, likewise in the other plane, r_x = M_x l c/GJ. Linear in 1/EI
+and 1/GJ at the near end. A uniform link has a, b, c = 1/3, 1/2, 1; one whose diameter falls linearly by a share t to its far
+end, thin-walled, the integrals of (1 - s)^2, 1 - s and 1 over (1 - t s)^3. Stretching is some hundred times less than bending
+and left out.
 """
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.protocol import Candidate, Parameter, Shape
 
 NAME, FAMILY = "link_elasticity", "elastic"
 WORDS = "elastic bending and torsion"
@@ -16,6 +18,9 @@ DETAIL_WORDS = {"one section": "all of one cross-section"}
 # One per mille of the bending compliance of a solid steel rod of 0.1 m is 1e-9; thin-walled cast arms reach 1e-6.
 _PARAMETERS = tuple(Parameter(name, "1/(N m^2)", 3e-7, sign=1) for name in ("bending_1_over_EI", "torsion_1_over_GJ"))
 _SHORTEST_M = 0.05
+# Arms get thinner towards the wrist.
+_TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
 def candidates(sites):
@@ -29,29 +34,37 @@ def candidates(sites):
 
 
 def _candidate(sites, links, detail):
-    def displacement(circumstances):
+    def displacement(circumstances, taper):
         bent, twisted = {}, {}
         for link in links:
-            bending, torsion = _deflection(sites, link, circumstances.total)
+            bending, torsion = _deflection(sites, link, circumstances.total, taper)
             bent |= bending
             twisted |= torsion
         return [bent, twisted]
 
     joints = tuple(k for k in links if k)
-    return Candidate(NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), place=detail)
+    return Candidate(NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), (_TAPER,), place=detail)
 
 
-def _deflection(sites, link, load):
+def _deflection(sites, link, load, taper):
     """Displacement of the far end of a link for a unit of 1/EI and of 1/GJ."""
+    shift_by_force, by_either, turn_by_moment = _flexibilities(taper)
     coordinates = sites.link_end[link]
     length = np.linalg.norm(sites.link_vectors_m[link])
     along = sites.link_vectors_m[link] / length
     force, moment = np.split(load[:, coordinates], 2, axis=1)
     across, twist = force - np.outer(force @ along, along), np.outer(moment @ along, along)
     bending = moment - twist
-    shift = length**3 / 3 * across + length**2 / 2 * np.cross(bending, along)
-    turn = length**2 / 2 * np.cross(along, across) + length * bending
+    shift = shift_by_force * length**3 * across + by_either * length**2 * np.cross(bending, along)
+    turn = by_either * length**2 * np.cross(along, across) + turn_by_moment * length * bending
     return (
         dict(zip(coordinates, np.concatenate([shift, turn], axis=1).T, strict=True)),
-        dict(zip(coordinates[3:], (length * twist).T, strict=True)),
+        dict(zip(coordinates[3:], (turn_by_moment * length * twist).T, strict=True)),
     )
+
+
+def _flexibilities(taper):
+    """a, b and c of a link whose diameter falls by a share."""
+    places = 0.5 * (1.0 + _NODES)
+    softer = 0.5 * _WEIGHTS / (1.0 - taper * places) ** 3
+    return [float(softer @ (1.0 - places) ** power) for power in (2, 1, 0)]

@@ -9,7 +9,9 @@ from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "payload", "gravity"
 WORDS = "weight of an undeclared payload"
-_PARAMETERS = (Parameter("mass", "kg", 10.0), *(Parameter(f"moment_{axis}", "kg m", 2.0) for axis in "xyz"))
+# A cable package or a forgotten gripper: some share of what the robot may carry, with its centre so far from the flange. Where
+# the rated load is not known, an arm carries about a sixth of its own mass; and where that is not known either, this.
+_SHARE_OF_RATED, _RATED_OVER_MASS, _LEVER_M, _USUAL_KG = 0.15, 1 / 6, 0.2, 10.0
 
 
 def displacement(circumstances):
@@ -30,7 +32,19 @@ def candidates(sites):
     def mass(circumstances):
         return displacement(circumstances)[:1]
 
+    plausible = _plausible_kg(sites)
+    parameters = (
+        Parameter("mass", "kg", plausible),
+        *(Parameter(f"moment_{axis}", "kg m", _LEVER_M * plausible) for axis in "xyz"),
+    )
     return [
-        Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement),
-        Candidate(NAME, FAMILY, (), "mass", _PARAMETERS[:1], mass),
+        Candidate(NAME, FAMILY, (), "", parameters, displacement),
+        Candidate(NAME, FAMILY, (), "mass", parameters[:1], mass),
     ]
+
+
+def _plausible_kg(sites):
+    if sites.payload_kg is not None:
+        return _SHARE_OF_RATED * sites.payload_kg
+    total = sum(mass.mass_kg for mass in sites.masses)
+    return _SHARE_OF_RATED * _RATED_OVER_MASS * total if total else _USUAL_KG

@@ -86,9 +86,27 @@ class Shape:
             return np.linspace(self.lowest, self.highest, self.tried)
         return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
 
+    def between(self, below, above, count):
+        """Values inside of an interval, evenly spaced as those that a search tries, ndarray (count,)."""
+        return (np.linspace if self.tried else np.geomspace)(below, above, count + 2)[1:-1]
+
+    def shares(self, values):
+        """How much of the range each of some values stands for: the part nearest to it, ndarray of sum one."""
+        scale = (lambda value: value) if self.tried else np.log
+        places = scale(np.asarray(values, float))
+        order = np.argsort(places)
+        inner = 0.5 * (places[order][1:] + places[order][:-1])
+        edges = np.concatenate(
+            [[scale(self.lowest)], np.clip(inner, scale(self.lowest), scale(self.highest)), [scale(self.highest)]]
+        )
+        found = np.empty(len(places))
+        found[order] = np.diff(edges) / (edges[-1] - edges[0])
+        return found
+
 
 _REFERENCE_C = 20.0
-_LAG = Shape("lag", "s", 3600.0, 300.0, 36000.0)
+# Castings of a robot follow their motors and the air in a quarter of an hour to some hours.
+_LAG = Shape("lag", "s", 3600.0, 900.0, 36000.0)
 
 
 @dataclass(frozen=True)
@@ -117,6 +135,8 @@ class Candidate:
     place : str
         Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
         location are variants of its law, of which only one can hold.
+    turning : tuple of int
+        Joints with whose angles the law goes, counted from 1, where it belongs to no joint.
     """
 
     effect: str
@@ -130,6 +150,7 @@ class Candidate:
     distinct_angles: int = 0
     place: str = ""
     of_setup: bool = False
+    turning: tuple = ()
 
     @property
     def location(self):

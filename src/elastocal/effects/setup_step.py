@@ -12,8 +12,9 @@ _PARAMETERS = (
     *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
     *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),
 )
-# Twelfths of the campaign: one nearest to the step has all but a 24th of the readings on the right side.
-_WHEN = Shape("when", "1", 0.5, 0.04, 0.96, tried=12)
+# The nearest of these has all but a 24th of the readings on the right side of the step. Nearer to an end than the outermost a
+# step would be a shift of nearly all readings.
+_WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
 
 
 def candidates(sites):

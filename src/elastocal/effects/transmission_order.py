@@ -2,7 +2,8 @@
 
 theta_i = a cos(k q_i) + b sin(k q_i) with k between two integers: planets, cranks and cages turn by ratios of numbers of teeth.
 Integers themselves are those of `transmission_harmonic`. Over the part of a turn that a joint uses, orders nearer than half a
-wave over that part are nearly one function, so that the middle between two integers is where a search has to try.
+wave over that part are nearly one function, so that the middle between two integers is where a search has to try; and less
+than a whole wave in a turn would be nearly any smooth function.
 """
 
 import numpy as np
@@ -21,7 +22,7 @@ _AMPLITUDE_RAD = 2e-4
 def candidates(sites):
     """One candidate a joint and interval between two integers."""
     revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
-    return [_candidate(joint, above) for joint in revolute for above in range(_HIGHEST)]
+    return [_candidate(joint, above) for joint in revolute for above in range(1, _HIGHEST)]
 
 
 def _candidate(joint, above):

@@ -26,7 +26,59 @@ class Axis:
         return _wrench(0.0, np.cross(self.direction, wrench[:, :3]))
 
 
-def base_and_flange(name, family, parameters, change):
+# Share of the moments that may be left unexplained where a pull acts at one place.
+_OF_ONE_PLACE = 0.01
+
+
+def at_flange_and_in_pull(name, family, parameters, change):
+    """Candidates for an error of the force, with the moments right, or with those that the wrong force makes at its lever.
+
+    Between flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
+
+    Parameters
+    ----------
+    name, family, parameters, change
+        As of `base_and_flange`.
+
+    Returns
+    -------
+    list of Candidate
+    """
+
+    def in_pull(axis, wrench, lever):
+        force = change(axis, wrench, lever)[:, :3]
+        return _wrench(force, 0.0) + _wrench(0.0, np.cross(lever, force))
+
+    pulled = base_and_flange(name, family, parameters, in_pull, " in the pull")
+    return [*base_and_flange(name, family, parameters, change), *pulled]
+
+
+def lever_of_pull(wrench, rotation):
+    """Where a pull acts: the one place, in the flange or in base axes, about which forces make the moments (least squares).
+
+    Parameters
+    ----------
+    wrench : ndarray (S, 6)
+        At a point of the flange, base axes.
+    rotation : ndarray (S, 3, 3)
+        Of the flange.
+
+    Returns
+    -------
+    ndarray (S, 3)
+        From the point of the wrench, m, base axes; zero where no place explains the moments.
+    """
+    for axes in (rotation, np.broadcast_to(np.eye(3), rotation.shape)):
+        force, moment = (np.einsum("sji,sj->si", axes, part) for part in (wrench[:, :3], wrench[:, 3:]))
+        # r x F = -[F] r.
+        rows = -np.cross(force[:, :, None], np.eye(3)[None], axis=1).reshape(-1, 3)
+        place = np.linalg.lstsq(rows, moment.ravel(), rcond=None)[0]
+        if np.linalg.norm(rows @ place - moment.ravel()) <= _OF_ONE_PLACE * np.linalg.norm(moment):
+            return axes @ place
+    return np.zeros((len(wrench), 3))
+
+
+def base_and_flange(name, family, parameters, change, how=""):
     """Candidates for an error of the load that is fixed in base axes or turns with the flange.
 
     Parameters
@@ -35,7 +87,10 @@ def base_and_flange(name, family, parameters, change):
     parameters : tuple of Parameter
         For x, y and z.
     change : callable
-        ``change(axis, wrench)`` is the change (S, 6) of a wrench (S, 6) per unit of the parameter of an `Axis`.
+        ``change(axis, wrench, lever)`` is the change (S, 6) of a wrench (S, 6) per unit of the parameter of an `Axis`; the
+        lever is that of `lever_of_pull`.
+    how : str
+        What follows the axes in the name of the variant.
 
     Returns
     -------
@@ -50,11 +105,13 @@ def base_and_flange(name, family, parameters, change):
         return _deflections(circumstances, np.moveaxis(circumstances.end_rotation, -1, 0))
 
     def _deflections(circumstances, axes):
-        turned = [circumstances.joint_deflections(change(Axis(axis), circumstances.wrench)) for axis in axes]
+        wrench = circumstances.wrench
+        lever = lever_of_pull(wrench, circumstances.end_rotation)
+        turned = [circumstances.joint_deflections(change(Axis(axis), wrench, lever)) for axis in axes]
         return [dict(enumerate(angles.T)) for angles in turned]
 
     return [
-        Candidate(name, family, (), frame, parameters, law, frozenset({"load"}))
+        Candidate(name, family, (), frame + how, parameters, law, frozenset({"load"}))
         for frame, law in (("base axes", in_base), ("flange axes", in_flange))
     ]
 

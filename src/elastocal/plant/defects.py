@@ -312,7 +312,7 @@ def _link_weight(robot, joints, size, draws):
     return _with_structure(robot, masses=(*structure.masses, *more)), {}
 
 
-@_register("payload", "kg", 10.0, _nowhere, scale=(0.0, 1.0))
+@_register("payload", "kg", 25.0, _nowhere, scale=(0.0, 1.0))
 def _payload(robot, joints, size, draws):
     centre = 0.15 * _direction(draws)
     return _with_structure(robot, payload=Mass(robot.arm.joints, size, 1.0, tuple(centre))), {"mass": size} | _named(
@@ -350,16 +350,18 @@ def _transmission_ratio(robot, joints, size, draws):
 
 @_register("bearing_runout", "m", 3e-5, _each_joint)
 def _bearing_runout(robot, joints, size, draws):
-    """The axis of a joint circles once a turn by `size`, and wobbles by as much at the edge of its bearing."""
-    joint, phase, lean = joints[0], draws.uniform(0, 2 * np.pi), draws.uniform(0, 2 * np.pi)
-    structure, number, sense = robot.structure, joints[0] + 1, draws.choice([-1.0, 1.0])
+    """The axis of a joint moves to and fro by `size`, once a turn across it and twice across both; so it wobbles at its edge.
+
+    An axis that circled once with the joint, or against it, would be a link of other dimensions.
+    """
+    joint, phases = joints[0], draws.uniform(0, 2 * np.pi, 4)
+    structure, number = robot.structure, joints[0] + 1
     tilt = structure.tilt | {number: structure.tilt.get(number, (0.0, 0.0))}
     changed = _with_structure(robot, loose=tuple({*structure.loose, number}), tilt=tilt)
     laws = []
-    for which in range(2):
-        quarter = which * sense * np.pi / 2
-        laws.append((f"shift{number}_{which}", drives.Runout(joint, size, phase + quarter)))
-        laws.append((f"tilt{number}_{which}", drives.Runout(joint, size / _BEARING_M, lean + quarter)))
+    for which, order in enumerate((1, 2)):
+        laws.append((f"shift{number}_{which}", drives.Runout(joint, order, size, phases[which])))
+        laws.append((f"tilt{number}_{which}", drives.Runout(joint, order, size / _BEARING_M, phases[2 + which])))
     return replace(changed, offsets=(*robot.offsets, *laws)), {}
 
 
@@ -373,8 +375,11 @@ def _motor_eccentricity(robot, joints, size, draws):
 
 @_register("transmission_order", "rad", 8e-5, _each_joint)
 def _transmission_order(robot, joints, size, draws):
-    """A planet or a cage: an order between two integers, and a quarter as much of its double."""
-    order, phases = draws.integers(2, 30) + draws.uniform(0.25, 0.75), draws.uniform(0, 2 * np.pi, 2)
+    """A planet or a cage: an order between two integers, and a quarter as much of its double.
+
+    No higher than some twenty poses can show; `short_waves` are.
+    """
+    order, phases = draws.integers(2, 5) + draws.uniform(0.25, 0.75), draws.uniform(0, 2 * np.pi, 2)
     waves = ((order, size, phases[0]), (2.0 * order, 0.25 * size, phases[1]))
     return _with_drive(robot, drives.TransmissionError(joints[0], waves)), {}
 
@@ -538,6 +543,12 @@ def _temperature_gradient(robot, joints, size, draws):
     return replace(_with_structure(robot, tubes=tubes), offsets=(*robot.offsets, *laws)), {}
 
 
+@_register("nest_eccentricity", "m", 1e-4, _nowhere)
+def _nest_eccentricity(robot, joints, size, draws):
+    turns = robot.arm.stretches[-1].rotation.T @ robot.arm.axes[-1]
+    return replace(robot, nest=EccentricNest(size, int(np.argmax(np.abs(turns))))), {}
+
+
 # Outside of the catalogue
 
 
@@ -598,11 +609,6 @@ def _foot_slip(robot, joints, size, draws):
 @_register(OUTSIDE + "refraction", "1/m", 2e-6, _nowhere)
 def _refraction(robot, joints, size, draws):
     return replace(robot, tracker=replace(robot.tracker, refraction_per_m=size)), {}
-
-
-@_register(OUTSIDE + "eccentric_nest", "m", 1e-4, _nowhere)
-def _eccentric_nest(robot, joints, size, draws):
-    return replace(robot, nest=EccentricNest(size)), {}
 
 
 @_register(OUTSIDE + "cell_crosstalk", "1/N", 5e-5, _nowhere, scale=(0.0, -1.0))

@@ -116,21 +116,24 @@ class SlippingZero:
 
 @dataclass(frozen=True)
 class Runout:
-    """One coordinate of an axis that wobbles as its bearing turns: size cos(q - phase), (S,), rad or m.
+    """One coordinate of an axis that wobbles as its bearing turns: size cos(order q - phase), (S,), rad or m.
 
     Attributes
     ----------
     joint : int
         From 0.
+    order : int
+        Times a turn.
     size, phase_rad : float
     """
 
     joint: int
+    order: int
     size: float
     phase_rad: float
 
     def __call__(self, visits):
-        return self.size * np.cos(visits.angle[:, self.joint] - self.phase_rad)
+        return self.size * np.cos(self.order * visits.angle[:, self.joint] - self.phase_rad)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import numpy as np
 
 from elastocal.plant.physical_robot import at_rest, seen_at_rest, seen_poses
 from elastocal.plant.tracker import rotation_vector
-from elastocal.plant.weights import centre_std_m
+from elastocal.plant.weights import allowed_centre_std_m
 
 _ROUNDS = 12
 # Below this share of the largest a direction is second order and rounding.
@@ -174,13 +174,14 @@ def _per_turn(machine, rest):
 def _turns_of_weights(machine, rest, robot, declared):
     """Turns of all gears per standard deviation of each mass and each component of its centre, list of ndarray (S, n)."""
     where, gear, pull = rest.where, machine.gear, np.array(robot.structure.gravity_m_s2)
+    reach_m = robot.arm.reach_m
     found = []
     for mass in declared:
         link = machine.links[mass.link]
         turn, moves = where.body_rotation[:, link], machine.beyond[gear, link]
         place = where.body[:, link] + turn @ np.array(mass.centre_m)
         levers = [(place[:, None] - where.anchor[:, gear]) * mass.relative_std * mass.mass_kg]
-        levers += [turn[:, None, :, axis] * mass.mass_kg * centre_std_m(mass) for axis in range(3)]
+        levers += [turn[:, None, :, axis] * mass.mass_kg * allowed_centre_std_m(mass, reach_m) for axis in range(3)]
         for lever in levers:
             torque = (where.axis[:, gear] * np.cross(lever, pull)).sum(axis=2) * moves
             found.append(robot.compliance * torque)

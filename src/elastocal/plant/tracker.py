@@ -150,13 +150,23 @@ class Tracker:
 
 @dataclass(frozen=True)
 class EccentricNest:
-    """A nest of the flange's target whose centre circles twice a turn of the tool: e (0, cos 2 q_n, sin 2 q_n) in its frame."""
+    """A nest of the flange's target whose centre circles twice a turn of the tool, e (cos 2 q_n, sin 2 q_n) across its axis.
+
+    Attributes
+    ----------
+    radius_m : float
+        e.
+    axis : int
+        Of the target's frame, about which the tool turns; the circle goes from the next one to the one after that.
+    """
 
     radius_m: float
+    axis: int = 0
 
     def moved(self, position, rotation, tool_angle):
         """Positions (S, 3) of the target with rotations (S, 3, 3) at tool angles (S,)."""
-        wobble = np.stack([np.zeros_like(tool_angle), np.cos(2 * tool_angle), np.sin(2 * tool_angle)], axis=-1)
+        circle = [np.zeros_like(tool_angle), np.cos(2 * tool_angle), np.sin(2 * tool_angle)]
+        wobble = np.roll(np.stack(circle, axis=-1), self.axis, axis=-1)
         return position + self.radius_m * np.einsum("sij,sj->si", rotation, wobble)
 
 

@@ -16,6 +16,8 @@ _ALONG, _ASIDE = 0.45, 0.01
 _GUESSED_STD = 0.1
 # A centre that lies on its joint's axis is known no better than this.
 _SHORTEST_LEVER_M = 0.1
+# Width of a link over the reach of the arm: within it centres of mass lie anywhere.
+_WIDTH_OF_REACH = 0.1
 # Standard deviations; beyond them nobody's declaration would be believed.
 _FARTHEST = 3.0
 _POSES = 64
@@ -51,6 +53,11 @@ def _guessed_centre(stretch, reach_m):
 def centre_std_m(mass):
     """Standard deviation of each component of a declared centre of mass, m."""
     return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _SHORTEST_LEVER_M)
+
+
+def allowed_centre_std_m(mass, reach_m):
+    """Standard deviation that an analyst must allow each component of a centre, who does not know how far aside it lies, m."""
+    return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _WIDTH_OF_REACH * reach_m)
 
 
 def true_masses(masses, draws):

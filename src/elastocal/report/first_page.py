@@ -131,8 +131,14 @@ def what_to_do(verdict, experiment):
             f"Use the declared model with the parameters fitted here; new poses like these will be off by {error} RMS.",
             "Effects too small for these measurements may still be there. More poses, larger loads or repeats would show them.",
         ]
-    advice = []
-    if found:
+    advice, adopted = [], any(effect["adopted"] for effect in found)
+    if found and not adopted:
+        error = length(heldout["after"]["rms_m"])
+        advice.append(
+            "Use the declared model until more is known: what was found is too uncertain to make predictions better and is not "
+            f"part of the final model. New poses like these will be off by {error} RMS."
+        )
+    elif found:
         low, high = heldout["reduction_ci95"]
         if low > 0:
             advice.append(
@@ -156,7 +162,7 @@ def what_to_do(verdict, experiment):
         advice.append(
             f"To resolve what is ambiguous measure the {counted(poses, 'pose')} of the section on the next experiment."
         )
-    elif said == "class":
+    elif said == "class" and adopted:
         advice.append(
             "Until an experiment resolves which mechanism acts, trust the correction at poses and loads like these only."
         )

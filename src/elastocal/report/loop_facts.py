@@ -281,6 +281,7 @@ def effect_facts(effect):
         else "",
         "probability": "" if effect["probability"] is None else probability_words(effect["probability"]),
         "gain": "" if gain is None else _gain(gain),
+        "adopted": effect["adopted"],
         "alternatives": listed(
             effect["alternatives"] if of_data else map(alternative_words, effect["alternatives"]), MOST_NAMES
         )
