@@ -10,6 +10,7 @@ import subprocess
 import sys
 from statistics import median
 
+import yaml
 from common import ROOT, Row
 
 from elastocal.blind.cases import SIZES, cases_of, make_case
@@ -26,6 +27,21 @@ CASES, SEED = 12, 2026
 CASE_S, PROOF_MIN, CORES = 0.7, 45.0, 2
 SERIES_A_S, SERIES_A_GB = 60.0, 1.0
 MILLION, MILLION_S, MILLION_GB = 1_000_000, 300.0, 2.0
+# The engine before this one, as the history of the repository has it; what its robot files may say, and its bootstrap.
+OLD_ENGINE, OLD_CASES, OLD_REPLICATES = "dbb3fa1", 6, 200
+OLD_KEYS = ("name", "chain", "lengths_m", "joint_limits_deg", "compliance_urad_per_Nm")
+OLD_SCRIPT = """
+import json, sys, time
+from elastocal.loop.whole import diagnosed
+
+robots, replicates, *folders = sys.argv[1:]
+seconds = []
+for folder in folders:
+    start = time.perf_counter()
+    diagnosed(folder, robots, int(replicates), 1)
+    seconds.append(time.perf_counter() - start)
+print(json.dumps({"seconds": seconds}))
+"""
 # Readings of the growth; the larger number twice the smaller.
 GROWTH = (20_000, 40_000)
 # What a process of its own does: campaigns one after the other, all candidates or every second one.
@@ -59,6 +75,7 @@ def rows(work):
         Temporary folder.
     """
     yield from _proof(work)
+    yield from _old_engine(work)
     if os.environ.get(FOLDER_VARIABLE):
         source = os.path.join(os.environ[FOLDER_VARIABLE], FILES["ur10_ipa_a"].local)
         ur10_ipa.write_campaign(source, work / "series_a", "ur10_series_a")
@@ -84,6 +101,30 @@ def _proof(work):
     minutes = sum(seconds) / CASES * len(every) / CORES / 60
     how = f"minutes for the {len(every)} cases of the full proof on {CORES} cores at the mean of these, without making them"
     yield Row("large proof", 60 * minutes, 60 * PROOF_MIN, minutes / PROOF_MIN, "<= 1", minutes <= PROOF_MIN, how)
+
+
+def _old_engine(work):
+    """Both engines on the same cases, of arms that weigh nothing, for the old one knows no weight; none without the history."""
+    archive = subprocess.run(["git", "-C", ROOT, "archive", OLD_ENGINE, "src", "config"], capture_output=True, check=False)
+    if archive.returncode:
+        return
+    old, folders = work / "old_engine", []
+    old.mkdir()
+    subprocess.run(["tar", "-x", "-C", old], input=archive.stdout, check=True)
+    weightless = [c for c in cases_of(SIZES["development"], SEED) if c.setting == "weight_compensated"][:OLD_CASES]
+    for case in weightless:
+        make_case(case, work / "weightless", work / "sealed", ROBOTS)
+        folders.append(work / "weightless" / case.name)
+        path = folders[-1] / "robot.yaml"
+        robot = yaml.safe_load(path.read_text(encoding="utf-8"))
+        path.write_text(yaml.safe_dump({key: robot[key] for key in OLD_KEYS}, sort_keys=False), encoding="utf-8")
+    # The first pays for the imports.
+    folders = [folders[0], *folders]
+    ours = median(_run(folders)["seconds"][1:])
+    command = [OLD_SCRIPT, old / "config" / "robots", str(OLD_REPLICATES), *folders]
+    theirs = median(_called(command, 1, PYTHONPATH=str(old / "src"))["seconds"][1:])
+    how = f"this engine over the one before, median of {OLD_CASES} cases of arms that weigh nothing"
+    yield Row("large old engine", ours, theirs, ours / theirs, "", None, how)
 
 
 def _limits(name, folder, allowed_s, allowed_gb, how):
@@ -113,8 +154,13 @@ def _dynamic(work, readings):
 
 
 def _run(folders, threads=1, share=1):
+    return _called([SCRIPT, ROBOTS, str(share), *folders], threads)
+
+
+def _called(script, threads, **environment):
+    """What a process of its own prints last."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    environment = os.environ | dict.fromkeys(names, str(threads))
-    command = [sys.executable, "-c", SCRIPT, ROBOTS, str(share), *folders]
-    done = subprocess.run(list(map(str, command)), env=environment, check=True, capture_output=True, text=True)
+    environment = os.environ | dict.fromkeys(names, str(threads)) | environment
+    command = [sys.executable, "-c", *map(str, script)]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     return json.loads(done.stdout.splitlines()[-1])
