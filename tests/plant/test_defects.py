@@ -59,6 +59,18 @@ def test_at_least_eight_kinds_are_outside_of_the_catalogue():
     assert len(FOREIGN) >= 8
 
 
+def states_of(schedule):
+    """A schedule as the catalogue sees it."""
+    return States(
+        session=0 * schedule.pose,
+        pose=schedule.pose,
+        load=schedule.load,
+        joint_angles=schedule.angle,
+        wrench=schedule.shown_wrench,
+        repeats=1 + 0 * schedule.pose,
+    )
+
+
 @pytest.mark.parametrize("kind", sorted(KINDS))
 def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does_not(yardstick, fanuc_specimen, kind):
     defect = drawn_defect(kind, fanuc_specimen.arm, 3)
@@ -100,14 +112,7 @@ def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(weightless,
     defects = (drawn_defect(kind, weightless.arm, seed) for seed in range(3, 20))
     defect = next(defect for defect in defects if truth_of(weightless, defect)["parameters"])
     parameters = truth_of(weightless, defect)["parameters"]
-    states = States(
-        session=0 * schedule.pose,
-        pose=schedule.pose,
-        load=schedule.load,
-        joint_angles=schedule.angle,
-        wrench=schedule.shown_wrench,
-        repeats=1 + 0 * schedule.pose,
-    )
+    states = states_of(schedule)
     sites = sites_of(analysed("fanuc").chain)
     given = circumstances_of(sites, weightless.compliance, states)
     change = seen_poses(with_defects(weightless, [defect]), schedule)
@@ -232,14 +237,7 @@ def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     assert not change[:, :-1].any()
     np.testing.assert_allclose(np.linalg.norm(change[:, -1], axis=1), 1e-4, rtol=1e-6)
     sites = sites_of(analysed(name).chain)
-    states = States(
-        session=0 * schedule.pose,
-        pose=schedule.pose,
-        load=schedule.load,
-        joint_angles=schedule.angle,
-        wrench=schedule.shown_wrench,
-        repeats=1 + 0 * schedule.pose,
-    )
+    states = states_of(schedule)
     # Where the loaded arm has yielded to the target's frame is turned a little.
     bare = schedule.load == 0
     (candidate,) = effects()["nest_eccentricity"].candidates(sites)

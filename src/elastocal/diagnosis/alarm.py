@@ -87,11 +87,11 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         for place, number in enumerate(members):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
-            log_prior = prior.log_odds_of([problem.units[number]])
-            terms = []
-            unit = problem.units[number]
-            weights = grid.of(replace(unit, smallest=max(unit.smallest - 1, 0)))
-            for scale, log_weight in zip(grid.scales[np.isfinite(weights)], weights[np.isfinite(weights)], strict=True):
+            unit, terms = problem.units[number], []
+            log_prior = prior.log_odds_of([unit])
+            first = max(unit.smallest - 1, 0)
+            weights = grid.of(replace(unit, smallest=first))
+            for scale, log_weight in zip(grid.scales[first:], weights[first:], strict=True):
                 widened = 1.0 + scale**2 * values[:, place]
                 gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
                 occam = -0.5 * np.log(widened).sum(axis=1)[:, None]

@@ -168,10 +168,10 @@ def _effect_steps(case, declared, final, found):
     model = found.posterior.models[found.conclusion.best.model]
     chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
-    alone = names if len(names) <= _MOST_STEPS else names[:1]
-    last = names[-1] if len(alone) == len(names) else f"{len(names) - len(alone)} further effects"
-    steps = [Step(f"+ {last}", "effect", final)]
-    for number in range(len(alone) - (len(alone) == len(names)), 0, -1):
+    alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
+    rest = names[len(alone) :]
+    steps = [Step(f"+ {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
+    for number in range(len(alone), 0, -1):
         some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
         steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))

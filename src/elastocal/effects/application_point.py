@@ -13,4 +13,4 @@ _PARAMETERS = tuple(Parameter(f"shift_{axis}", "m", 0.02) for axis in "xyz")
 
 def candidates(sites):
     """One candidate for each frame in which the shift can be fixed."""
-    return base_and_flange(NAME, FAMILY, _PARAMETERS, lambda axis, wrench, lever: axis.shift(wrench))
+    return base_and_flange(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.shift(wrench))

@@ -13,4 +13,4 @@ _PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 
 def candidates(sites):
     """One candidate for each frame in which the sensor can sit."""
-    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench, lever: axis.push(wrench))
+    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.push(wrench))

@@ -14,4 +14,4 @@ _PARAMETERS = tuple(Parameter(f"about_{axis}", "rad", 0.02) for axis in "xyz")
 
 def candidates(sites):
     """One candidate for each frame in which the sensor can sit, at the flange and in the pull."""
-    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench, lever: axis.turn(wrench))
+    return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.turn(wrench))

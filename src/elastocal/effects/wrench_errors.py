@@ -45,12 +45,16 @@ def at_flange_and_in_pull(name, family, parameters, change):
     list of Candidate
     """
 
-    def in_pull(axis, wrench, lever):
-        force = change(axis, wrench, lever)[:, :3]
-        return _wrench(force, 0.0) + _wrench(0.0, np.cross(lever, force))
+    def in_pull(circumstances, axes):
+        wrench = circumstances.wrench
+        lever = lever_of_pull(wrench, circumstances.end_rotation)
+        forces = [change(axis, wrench)[:, :3] for axis in axes]
+        return [np.concatenate([force, np.cross(lever, force)], axis=1) for force in forces]
 
-    pulled = base_and_flange(name, family, parameters, in_pull, " in the pull")
-    return [*base_and_flange(name, family, parameters, change), *pulled]
+    return [
+        *base_and_flange(name, family, parameters, change),
+        *_in_both_frames(name, family, parameters, in_pull, " in the pull"),
+    ]
 
 
 def lever_of_pull(wrench, rotation):
@@ -78,7 +82,7 @@ def lever_of_pull(wrench, rotation):
     return np.zeros((len(wrench), 3))
 
 
-def base_and_flange(name, family, parameters, change, how=""):
+def base_and_flange(name, family, parameters, change):
     """Candidates for an error of the load that is fixed in base axes or turns with the flange.
 
     Parameters
@@ -87,15 +91,21 @@ def base_and_flange(name, family, parameters, change, how=""):
     parameters : tuple of Parameter
         For x, y and z.
     change : callable
-        ``change(axis, wrench, lever)`` is the change (S, 6) of a wrench (S, 6) per unit of the parameter of an `Axis`; the
-        lever is that of `lever_of_pull`.
-    how : str
-        What follows the axes in the name of the variant.
+        ``change(axis, wrench)`` is the change (S, 6) of a wrench (S, 6) per unit of the parameter of an `Axis`.
 
     Returns
     -------
     list of Candidate
     """
+
+    def changes(circumstances, axes):
+        return [change(axis, circumstances.wrench) for axis in axes]
+
+    return _in_both_frames(name, family, parameters, changes, "")
+
+
+def _in_both_frames(name, family, parameters, changes, how):
+    """Candidates whose wrench changes by each of ``changes(circumstances, axes)``; `how` follows the axes in their names."""
 
     def in_base(circumstances):
         axes = [np.broadcast_to(axis, circumstances.wrench[:, :3].shape) for axis in np.eye(3)]
@@ -105,9 +115,8 @@ def base_and_flange(name, family, parameters, change, how=""):
         return _deflections(circumstances, np.moveaxis(circumstances.end_rotation, -1, 0))
 
     def _deflections(circumstances, axes):
-        wrench = circumstances.wrench
-        lever = lever_of_pull(wrench, circumstances.end_rotation)
-        turned = [circumstances.joint_deflections(change(Axis(axis), wrench, lever)) for axis in axes]
+        changed = changes(circumstances, [Axis(axis) for axis in axes])
+        turned = [circumstances.joint_deflections(wrench) for wrench in changed]
         return [dict(enumerate(angles.T)) for angles in turned]
 
     return [
