@@ -89,13 +89,13 @@ def probabilities(sets=None, alarm_p_value=0.002):
     return {"nothing": nothing, "alarm_p_value": alarm_p_value, "mechanisms": mechanisms, "sets": listed}
 
 
-def step_rows(effects=("lost_motion",), controls=("joint_offset@4",), largest_m=3e-4):
+def step_rows(effects=("lost_motion",), largest_m=3e-4):
     """Rows of before_after.csv, each model better than the one before."""
     named = [("frames and targets", "frames"), ("declared model", "declared")]
-    named += [(f"+ {name}", "effect") for name in effects] + [(f"control: {name}", "control") for name in controls]
+    named += [(f"+ {name}", "effect") for name in effects]
     rows = []
     for number, (name, kind) in enumerate(named):
-        size = largest_m * (0.7 if kind == "control" else 0.7**number)
+        size = largest_m * 0.7**number
         row = {"step": name, "kind": kind, "parameters": 6 * min(number, 1) + number}
         for metric, factor in {"mean": 0.5, "rms": 0.6, "p95": 0.9, "max": 1.0}.items():
             row |= {f"train_{metric}_m": 0.9 * factor * size, f"heldout_{metric}_m": factor * size}

@@ -44,7 +44,7 @@ def names_held(found):
 def test_noiseless_readings_give_back_every_parameter(fanuc, keys, rows):
     model = model_of(fanuc, *keys, targets=TARGETS, rows=rows)
     true = made_estimate(model, (0, 1), seed=1)
-    seen = seen_exactly(model, true, made_states(6, 40, seed=2, sessions=2))
+    seen = seen_exactly(model, true, made_states(6, 120, seed=2, sessions=2))
     found = fit(model, seen, NOISE)
     assert names_held(found) == []
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-9)
@@ -209,7 +209,7 @@ def test_two_names_of_one_thing_leave_the_later_one_held(fanuc):
     model = model_of(fanuc, "joint_dependent_stiffness@2", "compensator_stiffness@2")
     true = made_estimate(model, seed=21)
     seen = with_noise(seen_exactly(model, true, made_states(6, 30, seed=22, force=2000.0)), np.random.default_rng(23))
-    assert names_held(fit(model, seen, NOISE)) == ["compensator_stiffness@2 cos_q", "compensator_stiffness@2 sin_q"]
+    assert names_held(fit(model, seen, NOISE)) == ["compensator_stiffness@2 cos_1q", "compensator_stiffness@2 sin_1q"]
 
 
 def test_outliers_get_little_weight_and_do_little_harm(fanuc):

@@ -1,6 +1,7 @@
 """The alarm: its level by simulation on problems in which nothing is missing, and its power."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -109,6 +110,40 @@ def test_statistic_is_the_log_of_the_prior_weighted_bayes_factors(smallest):
         for unit in unsigned
     ]
     assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
+
+
+def test_a_mechanism_counts_at_all_its_locations_at_once_too():
+    """With one law at each; of two laws each, and only of those that are at every location once."""
+    candidates = {detail: SimpleNamespace(detail=detail) for detail in ("", "two slopes")}
+    units = (
+        made_unit("stiffening", (1,), 0, candidate=candidates[""], smallest=1),
+        made_unit("stiffening", (2,), [1, 2], candidate=candidates[""]),
+        made_unit("stiffening", (1,), 3, candidate=candidates["two slopes"]),
+        made_unit("payload", (), 4, candidate=candidates[""]),
+    )
+    problem, products = made_problem(made_rows(5, candidates=8), units)
+    found = alarm_of(problem, products, 0.0, np.random.default_rng(7))
+    some, log_pose, grid = problem.statistics.at(np.arange(3)), problem.log_pose[:3], problem.grid
+    whole = replace(units[0], columns=np.arange(3), signs=np.zeros(3, int), sizes=np.ones(3), smallest=0)
+    tested = [(replace(unit, smallest=max(unit.smallest - 1, 0)), [unit]) for unit in units] + [(whole, list(units[:2]))]
+    nothing = evaluate(some, [], grid, log_pose, []).log_evidence
+    total = [
+        evaluate(some, [unit], grid, log_pose, [0.1]).log_evidence - nothing + problem.prior.log_odds_of(members)
+        for unit, members in tested
+    ]
+    assert found.statistic == pytest.approx(log_sum_exp(np.array(total)), abs=1e-6)
+
+
+def test_weak_defects_of_every_joint_together_raise_an_alarm_that_none_of_them_raises_alone():
+    units = [made_unit("stiffening", (n + 1,), n, candidate=SimpleNamespace(detail="")) for n in range(8)]
+    rows = made_rows(5, poses=12, candidates=8)
+    signal = 0.35 * rows.candidates @ np.ones(8)
+    found = []
+    for number in range(10):
+        made = rows.drawn(np.random.default_rng((3, number)))
+        problem, products = made_problem(replace(made, residual=made.residual + signal), units)
+        found.append(alarm_of(problem, products, 0.0, np.random.default_rng(number)).p_value)
+    assert np.median(found) <= 0.01
 
 
 def test_it_is_the_same_for_one_seed():

@@ -210,17 +210,6 @@ def test_a_maximum_that_grows_is_a_warning(made):
     assert "the step '+ joint_offset' raised the held-out RMS" in found.document["warnings"]
 
 
-def test_a_control_that_does_as_well_is_a_warning(made):
-    case, held_out, steps = made
-    declared, effect, control = steps[1], steps[2], replace(steps[2], kind="control", name="control: x")
-    found = judged([steps[0], declared, effect, control], case, held_out)
-    assert [warning for warning in found.document["warnings"] if "control" in warning] == [
-        f"a control does as well: {1e3 * found.rows[3]['heldout_rms_m']:.3f} mm held-out RMS"
-    ]
-    better = replace(control, fitted=spoilt(effect.fitted, 0.8 * OFFSET))
-    assert about_errors(judged([steps[0], declared, effect, better], case, held_out)) == []
-
-
 def test_one_step_of_several_that_harms_is_named(made):
     case, held_out, steps = made
     worse = Step("+ other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))

@@ -64,13 +64,25 @@ def test_laws_of_which_a_campaign_has_no_inputs_are_left_out():
 
 @pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)
 def test_a_joint_is_displaced_by_about_its_size_in_any_state(competitor):
-    """Unloaded all features are of use: their squares sum to a chi-square-like spread about the square of the size."""
+    """Unloaded all features are of use; what is constant or straight in the angle has been taken off."""
     states = around(400, force=0.0)
     found = displacements(states, competitor, FEATURES)
     assert len(found) == FEATURES and all(set(law) == {3} for law in found)
     squares = (waves(found) ** 2).sum(axis=0)
-    assert np.mean(squares) == pytest.approx(JOINT_RAD**2, rel=0.25)
-    assert squares.max() < 2 * JOINT_RAD**2
+    assert 0.2 * JOINT_RAD**2 < np.mean(squares) < JOINT_RAD**2
+    assert squares.max() < 4 * JOINT_RAD**2
+
+
+@pytest.mark.parametrize("competitor", [*AT_A_JOINT, *(Competitor((), law, SHIFT) for law in (FORCE, TIME, PLACE))], ids=named)
+def test_no_law_has_a_part_that_the_catalogue_has_a_name_for(competitor):
+    """A zero offset, a frame, a transmission ratio: half of the features, the others go with the load."""
+    states = around()
+    found = waves(displacements(states, competitor, FEATURES))
+    free = found[: len(found) // 2] if competitor.location else found[:3]
+    size = np.abs(free).max()
+    np.testing.assert_allclose(free.mean(axis=1), 0.0, atol=1e-9 * size)
+    if competitor.law in (OWN, NEIGHBOURS):
+        np.testing.assert_allclose(free @ states.joint_angles[:, 3], 0.0, atol=1e-7 * size)
 
 
 @pytest.mark.parametrize("competitor", AT_A_JOINT, ids=named)

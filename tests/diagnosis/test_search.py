@@ -10,8 +10,9 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import _Searcher, first_look, posterior
+from elastocal.diagnosis.search import _Searcher, first_look, pose_errors_within_reach, posterior
 from elastocal.diagnosis.settings import Settings
+from elastocal.diagnosis.statistics import Statistics
 
 TAU = [0.0, 0.3, 0.9]
 # Two laws at one location, two mechanisms at three and two locations, and the competitor.
@@ -118,6 +119,19 @@ def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     for number, unit in enumerate(problem.units):
         one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
         assert factors[number] == pytest.approx(one.log_evidence - empty, abs=1e-6)
+
+
+def test_pose_errors_go_on_two_steps_beyond_the_most_likely_and_as_far_as_any_is_likely():
+    log_likelihood = {
+        "none": (0, -1, -12, -20, -30),
+        "some": (-20, -3, 0, -2, -30),
+        "flat": (0, 0, 0, -1, -10),
+        "all": (0, 0, 0, 0, 0),
+    }
+    for name, kept in {"none": 3, "some": 5, "flat": 4, "all": 5}.items():
+        taus, nothing = np.array([0.0, 1.0, 2.0, 4.0, 8.0]), np.zeros((5, 0, 0))
+        made = Statistics(taus, nothing, np.zeros((5, 0)), np.full(5, 50.0), np.array(log_likelihood[name], float), 50)
+        assert pose_errors_within_reach(made, Settings()).tolist() == [number < kept for number in range(5)], name
 
 
 @pytest.mark.parametrize("tau", TAU)

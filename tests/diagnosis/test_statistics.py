@@ -194,3 +194,13 @@ def test_draws_are_the_same_for_one_seed():
     one, other = (null_draws(rows.products, 0.3, TAU, 5, np.random.default_rng(17)) for _ in range(2))
     np.testing.assert_array_equal(one[0], other[0])
     np.testing.assert_array_equal(one[1], other[1])
+
+
+def test_without_candidates_it_is_as_if_there_were_none():
+    rows = made_rows(4, candidates=5, joint_rad=0.2)
+    taus = np.array([0.0, 0.3])
+    found = statistics_of(rows.products.without_candidates, taus)
+    expected = statistics_of(replace(rows, candidates=rows.candidates[:, :0]).products, taus)
+    assert found.gram.shape == (2, 0, 0) and found.freedom == expected.freedom
+    np.testing.assert_allclose(found.squares, expected.squares, rtol=1e-10)
+    np.testing.assert_allclose(found.log_likelihood, expected.log_likelihood, rtol=1e-10)

@@ -70,6 +70,20 @@ def test_what_is_enough_is_a_setting(more, verdict):
     assert conclusion(((OFFSET_2,), probability), ((PAYLOAD,), 1 - probability)).verdict == verdict
 
 
+@pytest.mark.parametrize(("probability", "verdict"), [(0.7, CLASS), (0.8, NAMED)])
+def test_a_mechanism_that_only_its_prior_prefers_is_not_named(probability, verdict):
+    """A payload has one place, an offset two, each with a third of its prior: at odds of 7 to 3 readings prefer the offset."""
+    found = conclusion(((PAYLOAD,), probability), ((OFFSET_2,), 1 - probability))
+    assert found.verdict == verdict and found.best.mechanisms == ("payload",)
+    assert found.alternatives == {"payload": ("offset",) if verdict == CLASS else ()}
+
+
+def test_what_the_readings_prefer_is_listed_however_improbable_it_was_before_them():
+    units = tuple(replace(unit, log_prior=-4.0 * (unit.mechanism == "tilt")) for unit in UNITS)
+    found = concluded(made_problem(made_rows(), units)[0], made_posterior(((PAYLOAD,), 0.97), ((TILT,), 0.03)), RAISED)
+    assert found.verdict == CLASS and found.alternatives == {"payload": ("tilt",)}
+
+
 def test_the_alarm_decides_that_something_is_missing_and_the_posterior_what():
     """A name needs the probability that is asked for, of which "nothing" has its part, too."""
     found = conclusion(((OFFSET_2,), 0.12), ((PAYLOAD,), 0.02))

@@ -203,10 +203,14 @@ def test_joint_dependent_stiffness_is_the_torque_times_cosine_and_sine(name, fan
             np.testing.assert_allclose(column, expected, rtol=0, atol=1e-10)
 
 
-def test_compensator_stiffens_the_shoulder_as_an_angle_dependent_stiffness_would(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 5, seed=6))
+def test_compensator_stiffens_the_shoulder_as_an_angle_dependent_stiffness_would_and_by_twice_the_angle(fanuc):
+    states = made_states(6, 5, seed=6)
+    around = circumstances_on(fanuc.chain, states)
     ours, alias = (candidate_on(fanuc.chain, f"{name}@2") for name in ("compensator_stiffness", "joint_dependent_stiffness"))
-    np.testing.assert_array_equal(displacements(ours, around), displacements(alias, around))
+    made = displacements(ours, around)
+    np.testing.assert_array_equal(made[:2], displacements(alias, around))
+    for column, wave in zip(made[2:, :, 1], (np.cos, np.sin), strict=True):
+        np.testing.assert_allclose(column, around.total[:, 1] * wave(2 * states.joint_angles[:, 1]), rtol=1e-12)
     assert ours.key == "compensator_stiffness@2" and ours.family == "elastic"
 
 

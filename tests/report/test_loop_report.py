@@ -90,7 +90,7 @@ DIALECT = re.compile(
 def facts_of(verdict, **changed):
     found = [effect["name"] for effect in verdict["effects"] if effect["adopted"]]
     given = {
-        "steps": step_rows(effects=found, controls=["joint_offset@4"] if found else []),
+        "steps": step_rows(effects=found),
         "splits": split_rows(changed=bool(found)),
         "experiment": [],
         "table": residual_table(),
@@ -198,7 +198,7 @@ def test_an_effect_that_is_not_adopted_is_named_and_no_correction_is_spoken_of(c
     assert not any("corrected model" in advice or "trust the correction" in advice for advice in facts["now"])
     assert facts["held_out_sentence"].startswith("On 10 poses that were not fitted the declared model leaves")
     assert [effect["adopted"] for effect in facts["effects"]] == [False] and facts["effects"][0]["gain"] == ""
-    assert [row["kind"] for row in facts["steps"]["rows"]] == ["frames", "declared"] and facts["controls"] == ""
+    assert [row["kind"] for row in facts["steps"]["rows"]] == ["frames", "declared"]
     assert not facts["splits"]["changed"]
     # An experiment is what resolves it.
     assert any("next experiment" in advice for advice in what_to_do(CAMPAIGNS[campaign], experiment_rows()))
@@ -243,7 +243,7 @@ def test_long_names_wrap(pictures, pages, tmp_path):
         "descriptions": campaign_descriptions(
             long, f"{long} robot", f"{long}_static", targets=[f"target_{k}_of_a_long_bar" for k in range(2)]
         ),
-        "steps": step_rows(["lost_motion"], [", ".join(HARMONICS[:5])]),
+        "steps": step_rows(["lost_motion", ", ".join(HARMONICS[:5])]),
         "experiment": experiment_rows() + experiment_rows("transmission_harmonic"),
         "parameters": parameter_table(
             [f"link_geometry@{k} {name}" for k in range(1, 9) for name in ("dx", "dy", "dz", "rx", "ry", "rz")]
@@ -362,7 +362,7 @@ def test_every_effect_of_the_catalogue_is_described_without_formulas():
 
 def test_before_and_after_have_intervals_and_multiples():
     table = table_rows(step_rows(), 5e-5)
-    assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect", "control"]
+    assert table["unit"] == "µm" and [row["kind"] for row in table["rows"]] == ["frames", "declared", "effect"]
     cells = table["rows"][0]["cells"]
     assert cells[1] == ["180", "[144, 216]", "3.60 × floor"]
     assert cells[2] == ["270", "≥ 216", "5.40 × floor"]
@@ -418,13 +418,6 @@ def test_the_side_of_the_approach_and_reference_weights_are_asked_for():
     told = facts_of(CAMPAIGNS["class"], experiment=rows)["experiment"]
     assert told["heads"][-3:] == ["approach", "weight kg", "separation"] and told["approach"]
     assert told["rows"][0][-3:] == ["+−0++−", "25.0", "10.0"]
-
-
-def test_controls_are_held_against_what_was_found():
-    assert "zero offset of joint 4 (2 more parameters) leaves" in facts_of(CAMPAIGNS["named"])["controls"].replace(
-        "\u00a0", " "
-    )
-    assert facts_of(CAMPAIGNS["adequate"])["controls"] == ""
 
 
 def assert_within_margins(pages):

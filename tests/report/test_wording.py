@@ -2,16 +2,15 @@
 
 import pytest
 
+from elastocal.diagnosis.words import listed
 from elastocal.report.wording import (
     counted,
     length,
-    listed,
     members_words,
     p_words,
     plain,
     probability_words,
     scaled,
-    step_words,
 )
 
 
@@ -46,11 +45,6 @@ def test_joints_count_up_and_those_of_which_the_same_is_told_stand_together():
     assert members_words(["cross_compliance@1+2", "cross_compliance@2+3"]) == "joints 1 and 2; joints 2 and 3"
     assert members_words([f"cross_compliance@{k}+{k + 1}" for k in range(1, 6)], 2) == "joints 1 and 2; joints 2 and 3; 3 more"
     assert members_words(["payload"]) == ""
-
-
-def test_steps_are_named_in_words():
-    assert step_words("+ link_weight") == "+ gravity sag"
-    assert step_words("control: joint_offset@1, joint_offset@2") == "control: zero offset of joint 1 and zero offset of joint 2"
 
 
 def test_no_probability_is_zero_or_one():

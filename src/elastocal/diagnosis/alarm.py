@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
+from elastocal.diagnosis.search import REACH
 from elastocal.diagnosis.statistics import null_draws
 from elastocal.diagnosis.summed import Sums
 
@@ -55,7 +56,7 @@ def alarm_of(problem, products, pose_error_rad, stream):
     """
     settings, statistics = problem.settings, problem.statistics
     # Of readings that are summed, the size of the pose error is known to a step of its grid.
-    chosen = _near(statistics.pose_error_rad, pose_error_rad, 0 if isinstance(products, Sums) else 2)
+    chosen = _near(statistics.pose_error_rad, pose_error_rad, 0 if isinstance(products, Sums) else REACH)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
     along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
     along = np.concatenate([statistics.along[..., None], along], axis=2)
@@ -79,16 +80,16 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
     along : ndarray (T, K, N)
     squares : ndarray (T, N)
     """
-    grid, prior = problem.grid, problem.prior
+    grid = problem.grid
     start = (statistics.log_likelihood + log_pose)[:, None]
     nothing = log_sum_exp(start + log_likelihood(squares, statistics.freedom), axis=0)
-    blocks = blocks_of(statistics.gram, problem.units, range(len(problem.units)))
+    tested, log_priors = _alternatives(problem)
+    blocks = blocks_of(statistics.gram, tested, range(len(tested)))
     total = np.full(len(nothing), -np.inf)
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         for place, number in enumerate(members):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
-            unit, terms = problem.units[number], []
-            log_prior = prior.log_odds_of([unit])
+            unit, terms = tested[number], []
             first = max(unit.smallest - 1, 0)
             weights = grid.of(replace(unit, smallest=first))
             for scale, log_weight in zip(grid.scales[first:], weights[first:], strict=True):
@@ -97,5 +98,21 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
                 occam = -0.5 * np.log(widened).sum(axis=1)[:, None]
                 likelihood = log_likelihood(squares - gain, statistics.freedom)
                 terms.append(log_weight + start + occam + likelihood)
-            total = np.logaddexp(total, log_prior + log_sum_exp(np.concatenate(terms), axis=0))
+            total = np.logaddexp(total, log_priors[number] + log_sum_exp(np.concatenate(terms), axis=0))
     return total - nothing
+
+
+def _alternatives(problem):
+    """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
+    prior = problem.prior
+    alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
+    laws = {}
+    for unit in problem.units:
+        if unit.candidate:
+            laws.setdefault((unit.mechanism, unit.candidate.detail, unit.shapes), []).append(unit)
+    for units in laws.values():
+        if len({unit.location for unit in units}) == len(units) > 1:
+            columns, smallest = np.concatenate([unit.columns for unit in units]), min(unit.smallest for unit in units)
+            alternatives.append(replace(units[0], columns=columns, smallest=smallest))
+            log_priors.append(prior.log_odds_of(units) - (len(units) - 1) * units[0].log_prior)
+    return alternatives, log_priors

@@ -29,7 +29,7 @@ class Step:
     Attributes
     ----------
     name : str
-    kind : {"frames", "declared", "effect", "control"}
+    kind : {"frames", "declared", "effect"}
     fitted : Fit
         To the training poses.
     """
@@ -68,7 +68,7 @@ class Diagnosis:
     ----------
     case : Case
     steps : tuple of Step
-        The last but controls is the final model.
+        The last is the final model.
     evidence : Evidence or None
     document : dict
         Contents of verdict.json, but for what held-out poses say.
@@ -86,8 +86,8 @@ class Diagnosis:
 
     @property
     def final(self):
-        """Fit with all effects found."""
-        return [step.fitted for step in self.steps if step.kind in ("declared", "effect")][-1]
+        """Fit with all effects that were adopted."""
+        return self.steps[-1].fitted
 
 
 def diagnose(case, settings, seed, progress=None):
@@ -123,7 +123,7 @@ def diagnose(case, settings, seed, progress=None):
             steps[-1] = replace(steps[-1], fitted=final)
         if found.adopted:
             steps += _effect_steps(case, declared, final, found)
-    document = _document(case, noise, steps[1].fitted, final, found, known, settings, warnings)
+    document = _document(case, noise, steps, final, found, known, settings, warnings)
     return Diagnosis(case, tuple(steps), found, document)
 
 
@@ -178,10 +178,11 @@ def _effect_steps(case, declared, final, found):
     return steps
 
 
-def _document(case, noise, declared, final, found, known, settings, warnings):
+def _document(case, noise, steps, with_effects, found, known, settings, warnings):
+    declared, final = steps[1].fitted, steps[-1].fitted
     listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
     decisive = [fault for fault in listed if fault["decisive"]]
-    averages = _averages(declared, found) if found else Averaged({}, {})
+    springs = Averaged({}, {})
     entries, probabilities, untestable, misfit = [findings.fault_entry(fault) for fault in decisive], None, {}, None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
     said = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
@@ -189,11 +190,16 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
-        entries = findings.effect_entries(problem, found.posterior, conclusion, found.alarm, final, averages, case.observations)
+        averages = springs = _averages(declared, found, conclusion.best if conclusion.best.named else None)
+        if not found.adopted:
+            springs = _averages(declared, found, None)
+        entries = findings.effect_entries(
+            problem, found.posterior, conclusion, found.alarm, with_effects, averages, case.observations
+        )
         entries = [entry | {"adopted": found.adopted} for entry in entries]
         if entries and not found.adopted:
             said.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        said += findings.implausible(final, entries, case.campaign.robot.payload_kg)
+        said += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found)
         said += _pose_error_warnings(final.noise, found.linearized)
     said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
@@ -209,7 +215,7 @@ def _document(case, noise, declared, final, found, known, settings, warnings):
         "noise": _noise_facts(noise, final.noise),
         "misfit": misfit,
         "heldout": None,
-        "compliance_urad_per_Nm": _compliances(declared, final, averages),
+        "compliance_urad_per_Nm": _compliances(declared, final, springs),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),
         "untestable": untestable,
@@ -260,20 +266,21 @@ def _pose_error_warnings(left, linearized):
     ]
 
 
-def _averages(declared, found):
-    best = found.posterior.models[found.conclusion.best.model] if found.conclusion.best.named else found.posterior.nothing
+def _averages(declared, found, best):
+    """Averages beside the exact fit of a hypothesis, or of the declared model."""
+    best = found.posterior.models[best.model] if best else found.posterior.nothing
     owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
     return averaged(found.linearized, found.posterior, best, owners)
 
 
-def _compliances(declared, final, averages):
+def _compliances(declared, final, springs):
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
     if final.model.identifies_compliance:
         mine = np.flatnonzero([owner == "joint_compliance" for owner, _ in final.parameters])
         names = [("joint_compliance", final.parameters[index][1].name) for index in mine]
         alone = np.sqrt(np.diag(final.covariance))[mine]
-        after += [averages.shift.get(name, 0.0) for name in names]
-        deviations = np.array([averages.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
+        after += [springs.shift.get(name, 0.0) for name in names]
+        deviations = np.array([springs.std_error.get(name, error) for name, error in zip(names, alone, strict=True)])
     found = {"before": joint_compliances(declared.model, declared.estimate), "after": after, "std_error": deviations}
     return {name: (1e6 * values).tolist() for name, values in found.items()}

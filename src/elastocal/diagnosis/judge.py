@@ -249,9 +249,6 @@ def _warnings(steps, rows, errors, before, after):
     for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
         found.append(f"the held-out {name.removesuffix('_m')} grew from {low:.3f} to {high:.3f} mm")
-    best = min((row["heldout_rms_m"] for row in rows if row["kind"] == "control"), default=np.inf)
-    if best <= rows[after]["heldout_rms_m"]:
-        found.append(f"a control does as well: {1e3 * best:.3f} mm held-out RMS")
     pairs = [(steps[n], rows[n - 1], rows[n]) for n in range(before + 1, after + 1)]
     for step, last, row in pairs:
         if row["heldout_rms_m"] > last["heldout_rms_m"]:

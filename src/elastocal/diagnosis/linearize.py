@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from elastocal.diagnosis import other
 from elastocal.diagnosis.hypotheses import prior_of, units_of
-from elastocal.diagnosis.search import Problem, likely_pose_errors
+from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
 from elastocal.effects.protocol import at_states, offered
@@ -104,6 +104,7 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     if held:
         (block,) = source.blocks(parts)
         products = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        grid = grid[pose_errors_within_reach(statistics_of(products.without_candidates, grid), settings)]
     else:
         chosen = spread_poses(observations, SAMPLE_ROWS // observations.rows)
         some, seen = selected(fitted, observations, chosen)

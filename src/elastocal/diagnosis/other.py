@@ -1,11 +1,12 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
 A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
-approximate Gaussian process. A function of everything at once would fit nothing better than chance does, so that each law has
-the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach; the angles of the
-joints beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features
-are multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a
-mechanism, that a *related* one acts. It names nothing and is not used to predict.
+approximate Gaussian process. What is constant of it, or at a joint straight in its angle, is taken off: a zero offset, a frame
+that is fitted and a transmission ratio have names. A function of everything at once would fit nothing better than chance does,
+so that each law has the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach;
+the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the place of the end.
+Half of the features are multiplied by the load, so that they vanish without it. Alone it means that the residual is
+*unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not used to predict.
 
 References
 ----------
@@ -101,8 +102,12 @@ def displacements(around, competitor, features, campaign=None):
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
     found = []
     for coordinate in _coordinates(around, competitor):
-        inputs = _inputs(around, competitor, coordinate, campaign)
-        found += [{coordinate: size * wave} for wave in _waves(inputs, load, count, draws, loaded)]
+        inputs, known = (_inputs(states, competitor, coordinate, campaign) for states in (around, campaign))
+        smooth = _waves(count, inputs.shape[1], draws)
+        waves = smooth(inputs) - _named_part(competitor, around, campaign, smooth(known))
+        if loaded:
+            waves[:, count // 2 :] *= load[:, None]
+        found += [{coordinate: size * wave} for wave in waves.T]
     return found
 
 
@@ -113,15 +118,29 @@ def _coordinates(around, competitor):
     return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
-def _waves(inputs, load, count, draws, loaded):
-    """Features (count, S) whose squares sum to about one, the second half times the load; none of them without an input."""
+def _waves(count, inputs, draws):
+    """Random functions of so many inputs, values (S, count), whose squares sum to about one; without an input zero."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, count))
-    frequency = draws.standard_normal((inputs.shape[1], count)) / lengths
-    waves = np.sqrt(2.0 / count) * np.cos(inputs @ frequency + draws.uniform(0, 2 * np.pi, count))
-    if loaded:
-        waves[:, count // 2 :] *= load[:, None]
-    return waves.T if inputs.shape[1] else np.zeros_like(waves.T)
+    frequency, phase = draws.standard_normal((inputs, count)) / lengths, draws.uniform(0, 2 * np.pi, count)
+    size = np.sqrt(2.0 / count) if inputs else 0.0
+    return lambda values: size * np.cos(values @ frequency + phase)
+
+
+def _named_part(competitor, around, campaign, known):
+    """What is constant in the waves over the campaign, and at a joint what goes straight with its angle.
+
+    A zero offset, a transmission ratio, a frame that is fitted: the catalogue has names for these.
+    """
+    straight, there = (_straight(competitor, states) for states in (around, campaign))
+    return straight @ np.linalg.lstsq(there, known)[0]
+
+
+def _straight(competitor, states):
+    columns = [np.ones(len(states.joint_angles))]
+    if competitor.location and competitor.law != TIME:
+        columns.append(states.joint_angles[:, competitor.location[0] - 1])
+    return np.column_stack(columns)
 
 
 def _inputs(around, competitor, coordinate, campaign):

@@ -33,6 +33,8 @@ _NEGLIGIBLE = 9.0
 _BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
 _UNLIKELY, _TELLING_UNITS = -9.0, 10
+# Steps of the grid of the pose error to either side that readings simulated with one size can make likely.
+REACH = 2
 
 
 @dataclass(frozen=True)
@@ -142,6 +144,27 @@ def posterior(problem, known=()):
     searcher.start_from(known)
     searcher.grow()
     return searcher.weigh()
+
+
+def pose_errors_within_reach(statistics, settings):
+    """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
+
+    And up to `REACH` steps beyond the most likely, for readings that are simulated with that may look like more.
+
+    Parameters
+    ----------
+    statistics : Statistics
+        Of the declared model alone.
+    settings : Settings
+
+    Returns
+    -------
+    ndarray of bool (T,)
+    """
+    prior = pose_weights(statistics.pose_error_rad, settings)
+    values = statistics.log_likelihood + prior + log_likelihood(statistics.squares, statistics.freedom)
+    largest = max(np.flatnonzero(values > values.max() + _UNLIKELY)[-1], np.argmax(values) + REACH)
+    return np.arange(len(values)) <= largest
 
 
 def likely_pose_errors(statistics, units, settings):

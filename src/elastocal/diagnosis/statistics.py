@@ -17,7 +17,7 @@ References
 """
 
 import contextlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -102,6 +102,18 @@ class Products:
     into_basis: np.ndarray
     projected: np.ndarray
 
+    @property
+    def without_candidates(self):
+        """Of the declared model alone."""
+        kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
+        return replace(
+            self,
+            gram=self.gram[np.ix_(kept, kept)],
+            pose_rows=self.pose_rows[..., kept],
+            white_gram=self.white_gram[: self.declared, : self.declared],
+            projected=self.projected[:, -1:],
+        )
+
     def alike(self, declared, candidates, columns):
         """Whitened rows at other states in the parameters of these products.
 
@@ -173,16 +185,16 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
         seen = jacobian[members].transpose(0, 2, 1)
         pose_rows[mine] = seen @ rows[members]
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
-    white = rows[:, :-1]
+    prior, white = every[len(declared) :], rows.T @ rows
     freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
     return Products(
         count,
-        every.T @ every,
+        white + prior.T @ prior,
         pose_rows,
         pose_gram,
         joint_rad,
-        white.T @ white,
+        white[:-1, :-1],
         len(rows),
         freedom,
         into_basis,

@@ -102,9 +102,9 @@ def final_parameters(facts, columns):
     Returns
     -------
     dict of str to ndarray
-        Columns of the steps table, of the last step that is no control.
+        Columns of the steps table, of the last step.
     """
-    last = [number for number, step in enumerate(facts["steps"]) if step["kind"] in ("declared", "effect")][-1]
+    last = len(facts["steps"]) - 1
     return {name: values[columns["step"] == last] for name, values in columns.items()}
 
 

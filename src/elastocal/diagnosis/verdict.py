@@ -80,8 +80,9 @@ def concluded(problem, posterior, alarm):
     Returns
     -------
     Conclusion
-        adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for. class: one
-        mechanism, but which of some, or whether a related one, remains ambiguous. several: more than one mechanism.
+        adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for, and favoured over
+        each other one by the readings alone. class: one mechanism, but which of some, or whether a related one, remains
+        ambiguous. several: more than one mechanism.
         unexplained: something acts that the catalogue does not have, or that no model explains better than "nothing" does.
         not_testable: the readings can test no mechanism of the robot, and nothing of the set-up shows.
     """
@@ -105,10 +106,27 @@ def concluded(problem, posterior, alarm):
     if kind == UNEXPLAINED:
         return Conclusion(UNEXPLAINED, hypotheses, best, {}, mechanisms)
     total = sum(weights)
-    if kind == CLASS and OTHER not in best.mechanisms and best.probability >= settings.named_probability:
+    favoured = _favoured_instead(problem, posterior, best, there) if kind == CLASS else ()
+    sure = best.probability >= settings.named_probability and not favoured
+    if kind == CLASS and OTHER not in best.mechanisms and sure:
         return Conclusion(NAMED, hypotheses, best, dict.fromkeys(best.named, ()), mechanisms)
     credible = _credible(there, settings.credible * total)
+    credible += tuple(hypothesis for hypothesis in favoured if hypothesis not in credible)
     return Conclusion(kind, hypotheses, best, {name: _instead_of(name, best, credible) for name in best.named}, mechanisms)
+
+
+def _favoured_instead(problem, posterior, best, hypotheses):
+    """Other single mechanisms under which the readings are at least as probable, each at its best place.
+
+    The best has only its prior over these, which goes by how many places and laws each has: no name rests on that alone.
+    """
+
+    def log_bayes_factor(hypothesis):
+        model = posterior.models[hypothesis.model]
+        return model.log_odds - problem.prior.log_odds_of(problem.units[number] for number in model.units)
+
+    single = [h for h in hypotheses if len(h.mechanisms) == 1 and h.model >= 0 and h != best]
+    return tuple(h for h in single if log_bayes_factor(h) >= log_bayes_factor(best))
 
 
 def _marginal(hypotheses):

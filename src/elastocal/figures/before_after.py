@@ -13,10 +13,9 @@ from elastocal.figures.style import PALETTE, panels, styled
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 LOOKS = {
-    "frames": ("#b9b9b9", "frames and targets only", ""),
-    "declared": (PALETTE[1], "declared model", ""),
-    "effect": (PALETTE[0], "with the effects found", ""),
-    "control": ("#e2e2e2", "control, which should not help", "////"),
+    "frames": ("#b9b9b9", "frames and targets only"),
+    "declared": (PALETTE[1], "declared model"),
+    "effect": (PALETTE[0], "with the effects found"),
 }
 # Beyond this ratio the smallest bars would be lost on a linear axis.
 _LARGEST_RATIO = 25
@@ -52,8 +51,7 @@ def before_after(steps, noise_floor_m=None):
     for axis, (metric, title) in zip(axes[0], METRICS.items(), strict=True):
         for row, step in zip(rows, steps, strict=True):
             value, low, high = (scale * step[f"heldout_{metric}_m{end}"] for end in ("", "_low", "_high"))
-            color, _, hatch = LOOKS[step["kind"]]
-            axis.barh(row, value, height=0.42, color=color, hatch=hatch, edgecolor="#8a8a8a" if hatch else color, linewidth=0.5)
+            axis.barh(row, value, height=0.42, color=LOOKS[step["kind"]][0])
             _interval(axis, value, low, high, row)
             axis.plot(scale * step[f"train_{metric}_m"], row, "D", color="white", markeredgecolor="black", markersize=3.4)
         if noise_floor_m:
@@ -87,11 +85,7 @@ def step_name(name, most=3):
 
 
 def _legend(kinds, noise_floor_m):
-    handles = [
-        Patch(facecolor=color, hatch=hatch, edgecolor="#8a8a8a" if hatch else color, linewidth=0.5, label=label)
-        for kind, (color, label, hatch) in LOOKS.items()
-        if kind in kinds
-    ]
+    handles = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
     handles.append(
         Line2D(

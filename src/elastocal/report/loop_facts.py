@@ -40,7 +40,6 @@ from elastocal.report.wording import (
     plain,
     probability_words,
     scaled,
-    step_words,
     words,
 )
 
@@ -100,7 +99,6 @@ def loop_facts(verdict, steps, splits, experiment, table, descriptions, paramete
         "misfit": _misfit_sentence(verdict["misfit"]),
         "floor": length(floor),
         "steps": step_rows(steps, floor),
-        "controls": _controls(steps),
         "splits": split_rows(_as_judged(splits, steps, verdict["heldout"])),
         "range": range_sentence(verdict["heldout"]),
         "effects": [effect_facts(effect) for effect in verdict["effects"]],
@@ -170,7 +168,7 @@ def step_rows(steps, floor_m):
             multiple = [f"{step[f'heldout_{metric}_over_floor']:.2f} × floor"] if floor_m else []
             interval = "–" if np.isnan(low) else f"≥ {digits(low)}" if np.isinf(high) else f"[{digits(low)}, {digits(high)}]"
             cells.append([digits(step[f"heldout_{metric}_m"]), interval, *multiple])
-        name, number = step_words(step["step"]), str(int(step["parameters"]))
+        name, number = in_words(step["step"]), str(int(step["parameters"]))
         rows.append(
             {"name": name, "kind": step["kind"], "parameters": number, "training": digits(step["train_rms_m"]), "cells": cells}
         )
@@ -492,23 +490,6 @@ def _misfit_sentence(misfit):
 def _of_data_joints(effect):
     joints = effect["joints"] if effect["family"] == OF_DATA else ()
     return f" of joint{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}" if joints else ""
-
-
-def _controls(steps):
-    controls = [step for step in steps if step["kind"] == "control"]
-    after = [step for step in steps if step["kind"] in ("declared", "effect")][-1]
-    if not controls:
-        return ""
-    declared = next(step for step in steps if step["kind"] == "declared")
-    said = []
-    for step in controls:
-        more = counted(int(step["parameters"] - declared["parameters"]), "more parameter")
-        said.append(f"{step_words(step['step']).removeprefix('control: ')} ({more}) leaves {length(step['heldout_rms_m'])}")
-    return (
-        "Negative controls are effects of other families that should not help, with as many parameters as those found where "
-        f"there are so many. On the held-out poses {listed(said)}, against {length(declared['heldout_rms_m'])} of the declared "
-        f"model and {length(after['heldout_rms_m'])} with what was found."
-    )
 
 
 def _gain(gain):

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 
-from elastocal.diagnosis.words import at_joints, candidate_words, detail_words, in_words, listed
+from elastocal.diagnosis.words import at_joints, detail_words
 
 MICRO, MILLI = 1e6, 1e3
 # A blank at which no line ends.
@@ -77,13 +77,6 @@ def members_words(keys, most=12):
 
 def _natural(key):
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", key)]
-
-
-def step_words(step):
-    """The name of a row of before_after.csv as words."""
-    if not step.startswith("control: "):
-        return in_words(step)
-    return "control: " + listed([candidate_words(key) for key in step.removeprefix("control: ").split(", ")], 3)
 
 
 def length(metres, digits=3):
