@@ -132,15 +132,14 @@ def _named_part(competitor, around, campaign, known):
 
     A zero offset, a transmission ratio, a frame that is fitted: the catalogue has names for these.
     """
-    straight, there = (_straight(competitor, states) for states in (around, campaign))
-    return straight @ np.linalg.lstsq(there, known)[0]
-
-
-def _straight(competitor, states):
-    columns = [np.ones(len(states.joint_angles))]
-    if competitor.location and competitor.law != TIME:
-        columns.append(states.joint_angles[:, competitor.location[0] - 1])
-    return np.column_stack(columns)
+    part = known.mean(axis=0)
+    if not competitor.location or competitor.law == TIME:
+        return part
+    angle, there = (states.joint_angles[:, competitor.location[0] - 1] for states in (around, campaign))
+    off = there - there.mean()
+    squares = off @ off
+    slope = off @ known / squares if squares > _ROUNDING else np.zeros_like(part)
+    return part + np.outer(angle - there.mean(), slope)
 
 
 def _inputs(around, competitor, coordinate, campaign):
