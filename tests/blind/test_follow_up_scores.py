@@ -1,5 +1,6 @@
 """The name after further poses: every case counts at every number of poses, and a single name stands."""
 
+import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import beta
@@ -85,8 +86,10 @@ def test_poses_needed_are_those_of_the_cases_that_reached_the_name(cases):
 
 def test_aliases_that_the_proposal_cannot_tell_are_set_apart(cases):
     assert set(cases.loc[with_prospects(cases), "case"]) == {"b", "d"}
-    proposals = pd.DataFrame({"case": ["a", "b", "a", "b"], "separation": [1.0, 2.0, 3.0, 30.0]})
-    assert promised(proposals) == {"a": 3.0, "b": 30.0}
+    proposals = pd.DataFrame({"case": ["a", "b", "c"] * 2, "separation": [1.0, 2.0, 8.0, 3.0, 30.0, 40.0]})
+    # As read from a file, where nothing is missing data.
+    proposals["indistinguishable"] = [np.nan, "", "joint_tilt"] * 2
+    assert promised(proposals) == {"a": 3.0, "b": 30.0, "c": 0.0}
 
 
 def test_nothing_followed_up_makes_empty_tables():

@@ -50,10 +50,14 @@ def followed(truths, first, anew, foreseen):
 
 
 def promised(proposals):
-    """Separation with all poses by the name of the case, of tables of proposals."""
+    """Separation from the nearest alternative with all poses, by the name of the case, of tables of proposals.
+
+    None where a proposal says that it leaves alternatives aside, for it promises no single name then.
+    """
     if "separation" not in proposals:
         return {}
-    return proposals.groupby("case")["separation"].max().to_dict()
+    whole = proposals["indistinguishable"].fillna("") == ""
+    return proposals["separation"].where(whole, 0.0).groupby(proposals["case"]).max().to_dict()
 
 
 def with_one_effect(cases):

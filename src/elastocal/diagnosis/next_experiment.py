@@ -51,7 +51,7 @@ WANTED_PROBABILITY = 0.9
 _STATES, _SHORT_LIST = 10_000, 300
 # Multiplications that the search may take: fewer entries are looked at where models have hundreds of unknowns. And numbers in
 # memory at once.
-_WORK, _MEMORY = 1e10, 2e7
+_WORK, _MEMORY = 4e9, 2e7
 # Models that stand for the hypotheses; the others hold a few per cent.
 _MODELS, _HYPOTHESES = 12, 8
 # Draws of each model's coefficients: for the search, and of each hypothesis for what is promised (standard error 2 %).
