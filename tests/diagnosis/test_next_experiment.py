@@ -15,7 +15,10 @@ from elastocal.diagnosis import new_states, next_experiment
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.next_experiment import facts_of, propose, sentence_of, table_of
+from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.promise import PROMISE_DRAWS, Promise, separation_resolved
+from elastocal.diagnosis.proposal import DATA_AT_FAULT, NOTHING_AMBIGUOUS, facts_of, sentence_of, table_of
+from elastocal.diagnosis.rivals import members_of
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded
@@ -54,7 +57,7 @@ def pieces(diagnosis, robot, ladder=None):
     noise = replace(evidence.linearized.about.noise, pose_rad=lead.pose_error_rad)
     made = evidence.linearized, diagnosis.final, numbers, noise, states, reach, ladder is None
     instrument = new_states.instrument_of(*made)
-    return next_experiment._members(evidence, kept, instrument, lead, 1.0), instrument, reach
+    return members_of(evidence, kept, instrument, lead, 1.0), instrument, reach
 
 
 ELASTIC = ("link_elasticity", "base_compliance", "joint_tilt")
@@ -106,7 +109,7 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
     targets = list(range(len(instrument.model.targets)))
     entries = new_states.drawn(reach, 30, rng)
     rows = instrument.rows(entries, targets).reshape(-1, instrument.unknowns)
-    promise = next_experiment._Promise(members, rng)
+    promise = Promise(members, rng)
     information = instrument.information(entries, targets).sum(axis=0)
     simulated = promise.log_factors(information)
     promised = promise.separations(simulated)
@@ -137,10 +140,10 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
         often = (weights[0] * (for_best > np.log(19)).mean() + weights[h] * (against > np.log(19)).mean()) / weights[
             [0, h]
         ].sum()
-        error = spread * np.sqrt(1 / draws + 1 / next_experiment._PROMISE_DRAWS)
+        error = spread * np.sqrt(1 / draws + 1 / PROMISE_DRAWS)
         # The smaller of both is stated; of a share of 1,200 draws, the separation that belongs to it is as sure as its slope.
-        share = np.sqrt(often * (1 - often) * (1 / draws + 1 / next_experiment._PROMISE_DRAWS)) + 1e-3
-        low, high = (next_experiment.separation_resolved(np.clip(often + 4 * side * share, 0, 1 - 1e-9)) for side in (-1, 1))
+        share = np.sqrt(often * (1 - often) * (1 / draws + 1 / PROMISE_DRAWS)) + 1e-3
+        low, high = (separation_resolved(np.clip(often + 4 * side * share, 0, 1 - 1e-9)) for side in (-1, 1))
         assert min(mean - 4 * error, low) <= promised[h] <= min(mean + 4 * error, high), (h, promised, mean, often)
 
 
@@ -171,13 +174,13 @@ def test_stated_separation_is_that_of_two_fixed_hypotheses_resolved_as_often():
     for separation, often in ((2 * np.log(19), 0.5), (16.2, 0.9), (21.0, 0.95)):
         factors = separation / 2 + np.sqrt(separation) * rng.standard_normal(200_000)
         assert abs((factors >= np.log(19)).mean() - often) < 0.005
-        assert abs(next_experiment.separation_resolved(often) - separation) < 0.2
+        assert abs(separation_resolved(often) - separation) < 0.2
 
 
 def test_proposal_separates_half_as_much_again_as_random_poses_and_resolves_more(ambiguous, proposal, kuka):
     members, instrument, reach = pieces(ambiguous[0], kuka, LADDER)
     members = members.without([h for h, name in enumerate(members.names) if name in proposal.indistinguishable])
-    promise, rng, found = next_experiment._Promise(members, np.random.default_rng(2)), np.random.default_rng(3), []
+    promise, rng, found = Promise(members, np.random.default_rng(2)), np.random.default_rng(3), []
     for _ in range(8):
         entries = new_states.drawn(reach, 10, rng)
         total = instrument.information(entries, range(instrument.own)).sum(axis=0)
@@ -262,9 +265,9 @@ def test_nothing_is_proposed_where_nothing_is_ambiguous(kuka):
     # So many poses that something unknown beside it has less than what is left open.
     campaign = planted(kuka, {"joint_offset@3": (2e-3,)}, poses=40)
     diagnosis = diagnosed(campaign, kuka, ["joint_offset@3", "payload"])
-    assert propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == next_experiment.NOTHING_AMBIGUOUS
+    assert propose(diagnosis, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == NOTHING_AMBIGUOUS
     quiet = SimpleNamespace(**vars(diagnosis) | {"evidence": None})
-    assert propose(quiet, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == next_experiment.DATA_AT_FAULT
+    assert propose(quiet, limits(kuka), SETTINGS, np.random.default_rng(0)).reason == DATA_AT_FAULT
 
 
 def test_table_is_in_the_angles_of_the_controller(ambiguous, proposal, kuka):

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 from elastocal.diagnosis import tables
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.next_experiment import facts_of, propose, table_of
+from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.proposal import facts_of, table_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.frames import write_csv
 from elastocal.json_files import write_json

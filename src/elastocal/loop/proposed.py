@@ -1,7 +1,8 @@
 """The next experiment for a campaign that was diagnosed in one call, from its folder."""
 
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.next_experiment import propose, table_of
+from elastocal.diagnosis.next_experiment import propose
+from elastocal.diagnosis.proposal import table_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in
 from elastocal.random_streams import stream
@@ -23,7 +24,7 @@ def proposed(folder, robots_folder, poses, ladder, seed):
     Returns
     -------
     pandas.DataFrame
-        As `next_experiment.table_of`.
+        As `proposal.table_of`.
     """
     case, _ = cases_in(folder, robots_folder)
     robot, settings = case.campaign.robot, Settings()

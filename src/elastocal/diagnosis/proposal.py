@@ -1,0 +1,221 @@
+"""A proposal for the next experiment, as whoever drives the robot and whoever reads the report want it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.robot import STANDARD_GRAVITY
+from elastocal.study.columns import WRENCH_NAMES
+
+# Said where nothing within reach helps.
+NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
+NOTHING_MISSING, NOTHING_AMBIGUOUS = "nothing is missing", "nothing is ambiguous"
+DATA_AT_FAULT, NOTHING_TESTABLE = "the data are at fault", "the measurements can test no mechanism"
+# Poses after which nobody goes on: some two days with a tracker. Fewer are said to be needed, or none.
+MOST_POSES = 100
+WANTED_PROBABILITY = 0.9
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Poses to measure next, in the order of their worth, and what they promise; arrays of E, empty where nothing helps.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (E, n)
+        rad.
+    wrench : ndarray (E, 6)
+        N, N m, at the last measuring point, base axes, at the share 1 of `shares`.
+    approach : ndarray (E, n) or None
+        Sense in which to approach each joint; None where the campaign does not note it, or where a ladder is given: then any.
+    reference_weight : ndarray of bool (E,)
+        Whether the load is a weight hung at the last measuring point, known by weighing and not by the load cell.
+    shares : tuple of float
+        Shares of its load at which each pose is read; a weight hangs at their absolute values.
+    points : tuple of str
+        Measuring points at which targets are read in every pose.
+    separation : ndarray (E,)
+        From the nearest alternative, by readings of this pose and all before it: at most twice the log Bayes factor that they
+        bring for the truth on average; 16 gives it odds of 19:1 from even ones with 90 %.
+    resolved : ndarray (E,)
+        Probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
+    present : float
+        Separation from the nearest alternative that the present readings give to an effect as large as the one found.
+    poses_needed : int or None
+        For `resolved` of 90 %, if further poses tell as much as these; None where a hundred are not enough.
+    best : tuple of str
+        Mechanisms of the best hypothesis.
+    nearest : tuple of str
+        Of the alternative with the smallest separation.
+    indistinguishable : tuple of tuple of str
+        Alternatives that no experiment within reach tells from the best; they do not count in the promise.
+    reason : str
+        Why there is nothing to measure; empty where there is.
+    """
+
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    approach: np.ndarray | None
+    reference_weight: np.ndarray
+    shares: tuple
+    points: tuple
+    separation: np.ndarray
+    resolved: np.ndarray
+    present: float
+    poses_needed: int | None
+    best: tuple
+    nearest: tuple
+    indistinguishable: tuple
+    reason: str
+
+    def __len__(self):
+        return len(self.separation)
+
+
+def without_poses(joints, best, indistinguishable, reason):
+    """A proposal without poses.
+
+    Parameters
+    ----------
+    joints : int
+    best : tuple of str
+    indistinguishable : tuple of tuple of str
+    reason : str
+
+    Returns
+    -------
+    Proposal
+    """
+    none = np.zeros(0)
+    return Proposal(
+        np.zeros((0, joints)),
+        np.zeros((0, 6)),
+        None,
+        np.zeros(0, bool),
+        (),
+        (),
+        none,
+        none,
+        0.0,
+        None,
+        best,
+        (),
+        indistinguishable,
+        reason,
+    )
+
+
+def table_of(proposal, robot):
+    """The proposal as whoever drives the robot wants it.
+
+    Parameters
+    ----------
+    proposal : Proposal
+    robot : Robot
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
+        ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present readings, and what the
+        promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
+        where a weight is asked for.
+    """
+    joints, count = robot.joints, len(proposal)
+    columns = {
+        "effect": [f"{words(proposal.best)} or {words(proposal.nearest)}"] * count,
+        "pose": np.arange(count),
+        "load": proposal.wrench.any(axis=1).astype(int),
+        "point": [" ".join(proposal.points)] * count,
+    }
+    reported = robot.reported_angles(proposal.joint_angles) if count else np.zeros((0, joints))
+    columns |= {f"q{joint + 1}": reported[:, joint] for joint in range(joints)}
+    columns |= dict(zip(WRENCH_NAMES, proposal.wrench.T, strict=True))
+    columns |= {"separation": proposal.separation, "separation_without": np.full(count, proposal.present)}
+    columns |= {
+        "resolved": proposal.resolved,
+        "indistinguishable": ["; ".join(words(name) for name in proposal.indistinguishable)] * count,
+    }
+    if proposal.approach is not None:
+        columns |= {f"approach{joint + 1}": proposal.approach[:, joint] for joint in range(joints)}
+    if proposal.reference_weight.any():
+        mass = np.linalg.norm(proposal.wrench[:, :3], axis=1) / STANDARD_GRAVITY
+        columns["reference_weight_kg"] = np.where(proposal.reference_weight, mass, 0.0)
+    return pd.DataFrame(columns)
+
+
+def facts_of(proposal):
+    """What verdict.json says of the next experiment.
+
+    Parameters
+    ----------
+    proposal : Proposal
+
+    Returns
+    -------
+    dict
+    """
+    return {
+        "poses": len(proposal),
+        "reason": proposal.reason,
+        "best": list(proposal.best),
+        "nearest": list(proposal.nearest),
+        "separation": float(proposal.separation[-1]) if len(proposal) else None,
+        "resolved": float(proposal.resolved[-1]) if len(proposal) else None,
+        "poses_needed": proposal.poses_needed,
+        "indistinguishable": [list(name) for name in proposal.indistinguishable],
+        "sentence": sentence_of(proposal),
+    }
+
+
+def sentence_of(proposal):
+    """What the report says of the next experiment.
+
+    Parameters
+    ----------
+    proposal : Proposal
+
+    Returns
+    -------
+    str
+    """
+    aside = "".join(f" {sentence}" for sentence in _left_aside(proposal))
+    if proposal.reason == NOT_DISTINGUISHABLE:
+        return f"No further measurement is proposed.{aside}"
+    if proposal.reason:
+        return f"No further measurement is proposed: {proposal.reason}."
+    needed = f"{proposal.poses_needed} poses" if proposal.poses_needed else f"more than {MOST_POSES} poses"
+    shares = ", ".join(f"{share:g}" for share in proposal.shares)
+    return (
+        f"{len(proposal)} further poses, each read at {shares} times its load, separate "
+        f"{words(proposal.best)} from {words(proposal.nearest)} by "
+        f"{proposal.separation[-1]:.1f} and resolve the verdict at 19:1 with a probability of {proposal.resolved[-1]:.0%}; "
+        f"{WANTED_PROBABILITY:.0%} needs {needed}.{aside}"
+    )
+
+
+def words(mechanisms):
+    """A hypothesis in words: joint_tilt, payload and link_weight, joint_tilt or a related mechanism."""
+    named = [name for name in mechanisms if name != OTHER]
+    if not named:
+        return "a mechanism that the catalogue lacks"
+    return " and ".join(named) + (" with a related mechanism" if OTHER in mechanisms else "")
+
+
+def _left_aside(proposal):
+    """Sentences on the alternatives that nothing within reach tells from the best: instead of it, or beside it."""
+    best = set(proposal.best)
+    instead = [words(name) for name in proposal.indistinguishable if not set(name) > best or OTHER in set(name) - best]
+    beside = dict.fromkeys(
+        mechanism
+        for name in proposal.indistinguishable
+        if set(name) > best
+        for mechanism in name
+        if mechanism not in best and mechanism != OTHER
+    )
+    if instead:
+        yield f"{words(proposal.best)} and {', '.join(instead)} are {NOT_DISTINGUISHABLE}."
+    if beside:
+        yield f"Whether {' or '.join(beside)} acts beside {words(proposal.best)} is {NOT_DISTINGUISHABLE}."

@@ -1,0 +1,205 @@
+"""Models that are left after the present readings, and what an experiment would tell of them.
+
+Models of the posterior are linear in their coefficients, so that what an experiment tells is one matrix, its information G on
+declared parameters and units together. A model j that present readings leave with coefficients N(m_j, P_j^-1) expects readings
+with mean A_j m_j and covariance I + A_j P_j^-1 A_j', A'A = G. If readings come from coefficients t instead, then on average
+
+    -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
+
+with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is twice the
+divergence of Box and Hill [1]_, the *separation*. The sum of all divergences never has enough of two models that are far apart
+already; the expected fall of the entropy does, and is bounded from below by the same pairwise quantities through
+exp(-separation / 8) [2]_.
+
+References
+----------
+.. [1] Box, G. E. P. and Hill, W. J. (1967). Discrimination among mechanistic models. Technometrics 9, 57-71.
+.. [2] Kolchinsky, A. and Tracey, B. D. (2017). Estimating mixture entropy with pairwise distances. Entropy 19, 361.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.diagnosis.evidence import log_sum_exp
+from elastocal.diagnosis.statistics import normal_equations
+
+# Draws of each model's coefficients.
+_DRAWS = 4
+
+
+@dataclass(frozen=True)
+class Members:
+    """Models as they are after the present readings; M of them.
+
+    Attributes
+    ----------
+    names : tuple of tuple of str
+        Of the hypotheses, the best first.
+    hypothesis : ndarray of int (M,)
+    log_weights : ndarray (M,)
+        Of their probabilities, which sum to one.
+    columns : tuple of ndarray of int
+        Of the unknowns that each has.
+    means : ndarray (M, U)
+        Of the unknowns; zero for those that a model does not have.
+    precisions : tuple of ndarray (d, d)
+    roots : tuple of ndarray (d, d)
+        Times white noise, deviations of its coefficients.
+    """
+
+    names: tuple
+    hypothesis: np.ndarray
+    log_weights: np.ndarray
+    columns: tuple
+    means: np.ndarray
+    precisions: tuple
+    roots: tuple
+
+    def without(self, hypotheses):
+        """These models without those of some hypotheses."""
+        kept = np.flatnonzero(~np.isin(self.hypothesis, hypotheses))
+        numbers = [h for h in range(len(self.names)) if h not in hypotheses]
+        return Members(
+            tuple(self.names[h] for h in numbers),
+            np.searchsorted(numbers, self.hypothesis[kept]),
+            self.log_weights[kept] - log_sum_exp(self.log_weights[kept]),
+            *(tuple(values[m] for m in kept) for values in (self.columns,)),
+            self.means[kept],
+            *(tuple(values[m] for m in kept) for values in (self.precisions, self.roots)),
+        )
+
+    def drawn(self, model, count, stream):
+        """Coefficients from the posterior of one model, ndarray (count, U)."""
+        found = np.repeat(self.means[model][None], count, axis=0)
+        white = stream.standard_normal((count, len(self.columns[model])))
+        found[:, self.columns[model]] += white @ self.roots[model].T
+        return found
+
+
+def members_of(evidence, kept, instrument, lead, factor):
+    """Posterior of the coefficients of each model, in units of the noise that the leading model leaves.
+
+    All models are taken at the pose error of the leading one; half-normal priors count as normal ones.
+
+    Parameters
+    ----------
+    evidence : Evidence
+    kept : dict of tuple of str to list of search.Model
+        Models of each hypothesis, the best first.
+    instrument : new_states.Instrument
+    lead : search.Model
+    factor : float
+        Times the noise taken that the leading model leaves.
+
+    Returns
+    -------
+    Members
+    """
+    problem, products = evidence.linearized.problem, evidence.linearized.products
+    total, _ = normal_equations(products, lead.pose_error_rad)
+    total = total / factor**2
+    declared, added = products.declared, int(instrument.added.sum())
+    place = np.zeros(products.gram.shape[0], int)
+    place[declared + instrument.columns] = declared + np.arange(len(instrument.columns))
+    unknown_places = np.arange(instrument.unknowns - added, instrument.unknowns)
+    hypothesis, odds, columns, means, precisions, roots = [], [], [], [], [], []
+    for number, (_, models) in enumerate(kept.items()):
+        for model in models:
+            mine = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
+            deviations = np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
+            chosen = np.concatenate([np.arange(declared), declared + mine])
+            precision = total[np.ix_(chosen, chosen)] + np.diag(np.append(np.zeros(declared), (factor * deviations) ** -2))
+            mean = np.zeros(instrument.unknowns)
+            at = np.concatenate([np.arange(declared), place[declared + mine]])
+            mean[at] = np.linalg.solve(precision, total[chosen, -1])
+            # Places of further targets: a prior of a metre and a radian decides nothing.
+            size = len(chosen) + added
+            whole = np.eye(size)
+            whole[: len(chosen), : len(chosen)] = precision
+            hypothesis.append(number)
+            odds.append(model.log_odds)
+            columns.append(np.concatenate([at, unknown_places]))
+            means.append(mean)
+            precisions.append(whole)
+            roots.append(np.linalg.inv(np.linalg.cholesky(whole)).T)
+    odds = np.array(odds)
+    return Members(
+        tuple(kept),
+        np.array(hypothesis),
+        odds - log_sum_exp(odds),
+        tuple(columns),
+        np.array(means),
+        tuple(precisions),
+        tuple(roots),
+    )
+
+
+def _misfits(members, information, truths):
+    """-2 ln p_j on average, but for what is common to all models, for readings that true coefficients make.
+
+    Parameters
+    ----------
+    members : Members
+    information : ndarray (N, U, U)
+    truths : ndarray (T, U)
+
+    Returns
+    -------
+    ndarray (N, T, M)
+    """
+    of_truths = information @ truths.T
+    squares = (of_truths * truths.T).sum(axis=1)
+    found = np.empty((len(information), len(truths), len(members.means)))
+    for number, (columns, mean, precision) in enumerate(zip(members.columns, members.means, members.precisions, strict=True)):
+        of_mean = information @ mean
+        quadratic = squares - 2.0 * of_mean @ truths.T + (of_mean @ mean)[:, None]
+        seen = of_truths[:, columns] - of_mean[:, columns, None]
+        inner = information[:, columns[:, None], columns] + precision
+        factor = np.linalg.cholesky(inner)
+        inverse = np.linalg.inv(inner)
+        quadratic -= (seen * (inverse @ seen)).sum(axis=1)
+        log_det = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1) - np.linalg.slogdet(precision)[1]
+        common = (inverse * precision).sum(axis=(1, 2)) - len(columns) + log_det
+        found[..., number] = quadratic + common[:, None]
+    return found
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """Entropy of the hypotheses that an experiment leaves, by pairwise separations.
+
+    Attributes
+    ----------
+    members : Members
+    truths : ndarray (T, U)
+        Draws of each model's coefficients.
+    source : ndarray of int (T,)
+        Whose.
+    """
+
+    members: Members
+    truths: np.ndarray
+    source: np.ndarray
+
+    @classmethod
+    def of(cls, members, stream):
+        """With fresh draws."""
+        count = len(members.means)
+        truths = np.concatenate([members.drawn(model, _DRAWS, stream) for model in range(count)])
+        return cls(members, truths, np.repeat(np.arange(count), _DRAWS))
+
+    @property
+    def work(self):
+        """Multiplications for one entry."""
+        return sum(len(columns) ** 3 for columns in self.members.columns) + self.truths.size * self.truths.shape[1]
+
+    def left(self, information):
+        """Entropy left after experiments of some information (N, U, U), ndarray (N,), nats."""
+        misfits = _misfits(self.members, information, self.truths)
+        own = misfits[:, np.arange(len(self.source)), self.source]
+        exponents = self.members.log_weights - (misfits - own[..., None]) / 8.0
+        mine = self.members.hypothesis == self.members.hypothesis[self.source][:, None]
+        right = log_sum_exp(np.where(mine, exponents, -np.inf), axis=2)
+        weights = np.exp(self.members.log_weights[self.source]) / _DRAWS
+        return (log_sum_exp(exponents, axis=2) - right) @ weights
