@@ -83,7 +83,10 @@ def test_keys_are_unique_and_readable(chain):
     [
         ("joint_offset", "@1 @2 @3 @4 @5 @6"),
         ("link_geometry", "@1 @2 @3 @4 @5 @6"),
-        ("link_weight", "@2 @3 @4 @5 " + " ".join(f"@{joint}[off_the_line]" for joint in range(2, 6))),
+        (
+            "link_weight",
+            " [off_the_line] [all_links] @2 @3 @4 @5 " + " ".join(f"@{joint}[off_the_line]" for joint in range(2, 6)),
+        ),
         ("payload", " [mass]"),
         ("nest_eccentricity", ""),
         ("compensator_torque", "@2 @2[first_order]"),

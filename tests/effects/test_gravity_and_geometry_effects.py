@@ -41,20 +41,26 @@ def far_ends(chain):
 def test_link_weight_is_the_gravity_of_point_masses_by_pinocchio(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=1, span=3.0)
-    around = circumstances_on(chain, states)
+    compliance = 1e-6 * np.arange(1, chain.coordinates + 1)
+    around = circumstances_on(chain, states, compliance)
     found = [c for c in candidates_on(around.sites).values() if c.effect == "link_weight"]
-    assert found
+    assert {bool(candidate.joints) for candidate in found} == {True, False}
     for candidate in found:
-        (joint,) = candidate.joints
         for column, parameter in zip(displacements(candidate, around), candidate.parameters, strict=True):
             link = int(parameter.name.split("_")[-1])
             expected, after = np.zeros_like(column), far_ends(chain)[link]
             torques = gravity_torques(chain, states.joint_angles, after, 1.0)
             if "moment" in parameter.name:
                 # What a kilogram does more, one metre off along an axis of the frame at the far end.
-                off = np.eye(3)["xyz".index(parameter.name.split("_")[3])]
+                off = np.eye(3)["xyz".index(parameter.name.split("moment_")[1][0])]
                 torques = gravity_torques(chain, states.joint_angles, after, 1.0, off) - torques
-            expected[:, joint - 1] = torques[:, joint - 1]
+            # Of one joint by its compliance times the mass, of the arm by the mass alone.
+            if candidate.joints:
+                (joint,) = candidate.joints
+                expected[:, joint - 1] = torques[:, joint - 1]
+            else:
+                expected[:, : chain.coordinates] = 1e6 * compliance * torques
+                column = 1e6 * column
             np.testing.assert_allclose(column, expected, rtol=0, atol=1e-12)
             assert np.abs(expected).max() > 0.1
 
@@ -65,7 +71,22 @@ def test_link_weight_is_that_of_the_next_two_links_with_a_length(fanuc):
         for c in candidates_on(sites_of(fanuc.chain)).values()
         if c.effect == "link_weight" and not c.detail
     }
-    assert named == {"link_weight@2": [2, 3], "link_weight@3": [3, 6], "link_weight@4": [6], "link_weight@5": [6]}
+    joints = {"link_weight@2": [2, 3], "link_weight@3": [3, 6], "link_weight@4": [6], "link_weight@5": [6]}
+    assert named == {"link_weight": [2, 3]} | joints
+
+
+def test_link_weight_of_the_arm_may_be_that_of_all_links_with_a_length(fanuc):
+    whole = candidate_on(fanuc.chain, "link_weight[all links]")
+    masses = [int(p.name.split("_")[-1]) for p in whole.parameters if p.unit == "kg"]
+    moments = [p.name for p in whole.parameters if p.unit == "kg m"]
+    assert masses == [2, 3, 6] and whole.location == ("arm",)
+    assert moments == [f"moment_{name}" for name in ("z_of_link_2", "z_of_link_3", "y_of_link_6", "z_of_link_6")]
+    # One finding with that of two links: a model has one of these laws.
+    assert (
+        candidate_on(fanuc.chain, "link_weight").location
+        == whole.location
+        != candidate_on(fanuc.chain, "link_weight@2").location
+    )
 
 
 def test_centres_of_mass_off_the_line_count_where_they_can_turn_the_joint(fanuc):
@@ -73,7 +94,7 @@ def test_centres_of_mass_off_the_line_count_where_they_can_turn_the_joint(fanuc)
     named = {
         c.joints[0]: [p.name.removeprefix("compliance_times_moment_") for p in c.parameters if "moment" in p.name]
         for c in candidates_on(sites_of(fanuc.chain)).values()
-        if c.effect == "link_weight" and c.detail == "off the line"
+        if c.effect == "link_weight" and c.detail == "off the line" and c.joints
     }
     # Link 6 has a length along x and turns with joint 6, so that its y and z turn every joint but those about x.
     assert named == {

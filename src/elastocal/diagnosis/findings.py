@@ -6,6 +6,7 @@ from elastocal.diagnosis.confounding import nearest_angles
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
+from elastocal.effects import payload
 from elastocal.effects.protocol import lever_m
 from elastocal.model import effect_columns
 
@@ -254,7 +255,7 @@ def implausible(final, entries, rated_kg=None):
                 found.append(f"{key}: {parameter.name} is {size}, and by its physics {needed}")
             if abs(value) > _IMPLAUSIBLE * parameter.plausible + _SURE * error:
                 found.append(f"{key}: {parameter.name} is {size}, more than {_IMPLAUSIBLE:g} times what such an effect reaches")
-            weighed = parameter.unit == "kg" and final.model.identifies_compliance
-            if rated_kg is not None and weighed and value - _SURE * error > rated_kg:
+            carried = effects[key].effect == payload.NAME and parameter.unit == "kg" and final.model.identifies_compliance
+            if rated_kg is not None and carried and value - _SURE * error > rated_kg:
                 found.append(f"{key}: {parameter.name} is {size}, beyond the rated payload of {rated_kg:g} kg")
     return found

@@ -1,51 +1,86 @@
-"""Sag of a joint under the weight of the links that it carries.
+"""Sag of the arm, or of one joint, under the weight of the links that it carries.
 
 Catalogue row 8: theta_i = sum_k (c_i m_k) tau_ik(q), with tau_ik the torque on joint i of one kilogram at the far end of link
-k. Linear in the products of compliance and mass. A link's own mass m at its middle counts as m/2 at its end. Where the robot
-file declares masses, theirs are parameters already (`declared_weight`). A variant has the first moments of these links across
-their lines too: centres of mass are seldom on them.
+k. Given the compliances it is linear in the masses, which turn all joints at once; of one joint alone it is linear in the
+products of its compliance and the masses. A link's own mass m at its middle counts as m/2 at either end. Where the robot file
+declares masses, theirs are parameters already (`declared_weight`). Variants have the first moments of these links across their
+lines too: centres of mass are seldom on them.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "link_weight", "gravity"
 WORDS = "gravity sag"
-DETAIL_WORDS = {"off the line": "centre off the line"}
+_OFF_THE_LINE, _ALL_LINKS = "off the line", "all links"
+DETAIL_WORDS = {_OFF_THE_LINE: "centre off the line", _ALL_LINKS: "all links"}
 _LINKS = 2
-# Some 200 kg on a joint of 1 urad/(N m), and their centre 0.2 m off the line of the link.
+# Some 200 kg on a joint of 1 urad/(N m), and their centre 0.2 m off the line of the link. Of the arm, where it is known what it
+# may carry, which is about a sixth of its own mass, a quarter of that at the end of a link.
 _PRODUCT, _MOMENT = 2e-4, 4e-5
+_LINK_OVER_RATED, _LINK_KG, _OFF_M = 1.5, 200.0, 0.2
+_OF_THE_ARM = "arm"
 
 
 def candidates(sites):
-    """Two candidates a joint that weight can turn: of the next two links behind it that have a length.
+    """Three candidates for the arm and two a joint that weight can turn: of the next two links behind it that have a length.
 
-    Masses at their far ends; and the same with the first moments across the links, where these can turn the joint.
+    Masses at their far ends; and the same with the first moments across the links, where these can turn the joint. Of the arm
+    also both of all links.
     """
     if sites.masses:
         return []
-    found = [
-        (_candidate(sites, joint, False), _candidate(sites, joint, True))
-        for joint in range(sites.joints)
-        if not sites.prismatic[joint]
-    ]
-    return [candidate for variant in zip(*found, strict=True) for candidate in variant if candidate]
+    joints = [joint for joint in range(sites.joints) if not sites.prismatic[joint] and sites.carried_links(joint)]
+    return [*_of_the_arm(sites, joints), *_of_joints(sites, joints)]
 
 
-def _candidate(sites, joint, transverse):
-    carried = sites.carried_links(joint)[:_LINKS]
-    across = [(k, axis) for k in carried for axis in sites.transverse_axes(k) if sites.moment_turns(k, axis, joint)]
-    if not carried or (transverse and not across):
-        return None
-    parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", _PRODUCT) for k in carried]
-    if transverse:
-        names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in across)
+def _of_the_arm(sites, joints):
+    """Of the links behind the first joint that weight can turn, by which they turn all others too."""
+    if not joints:
+        return
+    carried = sites.carried_links(joints[0])
+    some = carried[:_LINKS]
+    across = _across(sites, some, range(sites.joints))
+    mass = _LINK_KG if sites.payload_kg is None else _LINK_OVER_RATED * sites.payload_kg
+
+    def candidate(detail, links, axes):
+        parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass) for k in links]
+        parameters += [Parameter(f"moment_{'xyz'[axis]}_of_link_{k}", "kg m", _OFF_M * mass) for k, axis in axes]
+
+        def displacement(circumstances):
+            torques = _torques(circumstances, links, axes)
+            return [dict(enumerate((torque * circumstances.compliance).T)) for torque in torques]
+
+        return Candidate(NAME, FAMILY, (), detail, tuple(parameters), displacement, place=_OF_THE_ARM)
+
+    yield candidate("", some, ())
+    if across:
+        yield candidate(_OFF_THE_LINE, some, across)
+    if len(carried) > len(some):
+        yield candidate(_ALL_LINKS, carried, _across(sites, carried, range(sites.joints)))
+
+
+def _of_joints(sites, joints):
+    def candidate(joint, detail, links, axes):
+        parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", _PRODUCT) for k in links]
+        names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in axes)
         parameters += [Parameter(name, "rad kg m/(N m)", _MOMENT) for name in names]
 
-    def displacement(circumstances):
-        torques = [circumstances.weight[k] for k in carried]
-        if transverse:
-            torques += [circumstances.weight_moment(k, axis) for k, axis in across]
-        return [{joint: torque[:, joint]} for torque in torques]
+        def displacement(circumstances):
+            return [{joint: torque[:, joint]} for torque in _torques(circumstances, links, axes)]
 
-    detail = "off the line" if transverse else ""
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, tuple(parameters), displacement)
+        return Candidate(NAME, FAMILY, (joint + 1,), detail, tuple(parameters), displacement)
+
+    carried = {joint: sites.carried_links(joint)[:_LINKS] for joint in joints}
+    yield from (candidate(joint, "", links, ()) for joint, links in carried.items())
+    across = {joint: _across(sites, links, [joint]) for joint, links in carried.items()}
+    yield from (candidate(joint, _OFF_THE_LINE, carried[joint], axes) for joint, axes in across.items() if axes)
+
+
+def _across(sites, links, turned):
+    """Links, and their axes across them along which a first moment can turn some joints."""
+    axes = [(k, axis) for k in links for axis in sites.transverse_axes(k)]
+    return [pair for pair in axes if any(sites.moment_turns(*pair, joint) for joint in turned)]
+
+
+def _torques(circumstances, links, axes):
+    return [*(circumstances.weight[k] for k in links), *(circumstances.weight_moment(k, axis) for k, axis in axes)]
