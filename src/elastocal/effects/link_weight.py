@@ -50,7 +50,8 @@ def _of_the_arm(sites, joints):
             torques = _torques(circumstances, links, axes)
             return [dict(enumerate((torque * circumstances.compliance).T)) for torque in torques]
 
-        return Candidate(NAME, FAMILY, (), detail, tuple(parameters), displacement, place=_OF_THE_ARM)
+        # Without a load nothing tells the compliances, and nominal ones are far off.
+        return Candidate(NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"load"}), place=_OF_THE_ARM)
 
     yield candidate("", some, ())
     if across:
