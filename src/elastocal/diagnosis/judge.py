@@ -216,7 +216,7 @@ def carried_over(fitted, states):
     -------
     Fit
     """
-    there = offered(fitted.model.sites, states) | {"load"}
+    there = offered(fitted.model.sites, states) | {"load", "external load"}
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
     model = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
     coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes

@@ -51,7 +51,9 @@ def _of_the_arm(sites, joints):
             return [dict(enumerate((torque * circumstances.compliance).T)) for torque in torques]
 
         # Without a load nothing tells the compliances, and nominal ones are far off.
-        return Candidate(NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"load"}), place=_OF_THE_ARM)
+        return Candidate(
+            NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"external load"}), place=_OF_THE_ARM
+        )
 
     yield candidate("", some, ())
     if across:

@@ -126,7 +126,7 @@ class Candidate:
         ``displacement(circumstances, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
         displacement per unit of the parameter, ndarray (S,).
     needs : frozenset of str
-        What must be there, see `offered`: "load", "approach", "time", "temperature".
+        What must be there, see `offered`: "load", "external load", "approach", "time", "temperature".
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be told from a smooth one.
@@ -423,11 +423,12 @@ def offered(sites, states):
     Returns
     -------
     frozenset of str
-        "load": an external load, or declared masses, whose weight loads the joints too; "approach", where it is known
-        somewhere; "time" and "temperature", where they change.
+        "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which
+        nothing tells the compliances; "approach", where it is known somewhere; "time" and "temperature", where they change.
     """
     there = {
         "load": bool(sites.masses) or bool(states.wrench.any()),
+        "external load": bool(states.wrench.any()),
         "approach": states.approach is not None and bool(states.approach.any()),
         "time": states.time_s is not None and np.ptp(states.time_s) > 0,
         "temperature": states.temperature_c is not None and np.ptp(states.temperature_c) > 0,
