@@ -134,7 +134,8 @@ def _marginal(hypotheses):
     present = {}
     for hypothesis in hypotheses:
         for mechanism in hypothesis.mechanisms:
-            present[mechanism] = present.get(mechanism, 0.0) + hypothesis.probability
+            # Their sum may exceed one by rounding.
+            present[mechanism] = min(present.get(mechanism, 0.0) + hypothesis.probability, 1.0)
     return dict(sorted(present.items(), key=lambda entry: -entry[1]))
 
 
