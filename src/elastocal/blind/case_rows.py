@@ -15,8 +15,6 @@ EXACT_ALIASES = {
     ("compensator_torque", (2,)): "transmission_harmonic",
     ("transmission_harmonic", (2,)): "compensator_torque",
     ("link_weight", (2,)): "compensator_torque",
-    ("compensator_stiffness", (2,)): "joint_dependent_stiffness",
-    ("joint_dependent_stiffness", (2,)): "compensator_stiffness",
 }
 _STD_ERRORS = 2.0
 _ERRORS = ("before_rms_m", "after_rms_m", "noise_floor_rms_m", "reduction", "reduction_std_error")
