@@ -44,7 +44,7 @@ def names_held(found):
 def test_noiseless_readings_give_back_every_parameter(fanuc, keys, rows):
     model = model_of(fanuc, *keys, targets=TARGETS, rows=rows)
     true = made_estimate(model, (0, 1), seed=1)
-    seen = seen_exactly(model, true, made_states(6, 120, seed=2, sessions=2))
+    seen = seen_exactly(model, true, made_states(6, 40, seed=2, sessions=2))
     found = fit(model, seen, NOISE)
     assert names_held(found) == []
     np.testing.assert_allclose(found.residual, 0.0, atol=1e-9)

@@ -20,7 +20,7 @@ from elastocal.diagnosis.other import (
     TURN,
     Competitor,
     competitors,
-    displacements,
+    law_of,
 )
 from elastocal.effects.protocol import at_states
 from elastocal.robot import Mass
@@ -34,6 +34,10 @@ EVERY = AT_A_JOINT + AT_THE_BASE
 def around(count=60, force=500.0, **changes):
     robot = robot_of(SEVEN_JOINTS)
     return circumstances_on(robot, replace(made_states(7, count, seed=1, force=force), **changes))
+
+
+def displacements(states, competitor, features, campaign=None):
+    return law_of(competitor, states if campaign is None else campaign, features).displacement(states)
 
 
 def waves(found):

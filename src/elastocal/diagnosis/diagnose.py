@@ -190,9 +190,9 @@ def _document(case, noise, steps, with_effects, found, known, settings, warnings
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
         probabilities = findings.probability_facts(problem, found.posterior, conclusion, found.alarm)
-        averages = springs = _averages(declared, found, conclusion.best if conclusion.best.named else None)
-        if not found.adopted:
-            springs = _averages(declared, found, None)
+        named = conclusion.best if conclusion.best.named else None
+        averages = _averages(declared, found, named)
+        springs = _averages(declared, found, None) if named and not found.adopted else averages
         entries = findings.effect_entries(
             problem, found.posterior, conclusion, found.alarm, with_effects, averages, case.observations
         )

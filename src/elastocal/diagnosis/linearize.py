@@ -83,14 +83,15 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
     against = other.competitors(around)
-    features = [len(other.displacements(at_states(around, slice(1)), at, settings.other_features, around)) for at in against]
+    laws = [other.law_of(each, around, settings.other_features) for each in against]
+    features = [len(law.displacement(at_states(around, slice(1)))) for law in laws]
     units = units_of(tested, list(zip(against, features, strict=True)), settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
-    source = _Source(fitted, observations, around, tested, against, units, found, values, settings)
+    source = _Source(fitted, observations, tested, laws, units, found, values)
     width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
@@ -216,16 +217,6 @@ def smallest_shown(statistics, units, settings):
 
 
 @dataclass(frozen=True)
-class _Fixed:
-    """Displacements that are known already, in the shape of a candidate."""
-
-    laws: list
-
-    def displacement(self, _):
-        return self.laws
-
-
-@dataclass(frozen=True)
 class _Source:
     """Whitened rows of a fit, made for some whole poses at a time.
 
@@ -233,28 +224,23 @@ class _Source:
     ----------
     fitted : Fit
     observations : Observations
-    campaign : Circumstances
-        By which the competitor's inputs are normalised.
     tested : list of (Candidate, tuple)
-    against : list of Competitor
+    against : list of other.Law
     units : tuple of Unit
         Of both.
     found : ndarray of bool
         Which parameters of the fit are those of candidates.
     values : ndarray
         Of the parameters, in which the prediction is linear; zero for shapes.
-    settings : Settings
     """
 
     fitted: object
     observations: object
-    campaign: object
     tested: list
     against: list
     units: tuple
     found: np.ndarray
     values: np.ndarray
-    settings: object
 
     def lines(self, parts):
         """Linearization, circumstances, states and whitening of each part."""
@@ -282,9 +268,8 @@ class _Source:
         """`WhiteRows` of each part."""
         sizes = np.concatenate([unit.sizes for unit in self.units])
         for line, some, jacobian, white in self.lines(parts):
-            around, features = line.circumstances, self.settings.other_features
-            waves = [_Fixed(other.displacements(around, each, features, self.campaign)) for each in self.against]
-            laws = [*self.tested, *((made, ()) for made in waves)]
+            around = line.circumstances
+            laws = [*self.tested, *((law, ()) for law in self.against)]
             made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
             made *= sizes
             residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]

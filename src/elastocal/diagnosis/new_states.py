@@ -244,12 +244,10 @@ class Instrument:
         Number of the campaign's own targets, which come first.
     linearized : Linearized
         In the parameters of whose products information is stated.
-    laws : list of (Candidate, tuple)
-        In the order of the columns, but for features of the competitor, which follow.
-    features : list of (Competitor, ndarray of int)
-        Location of each unit of the competitor, and its columns.
+    laws : list of (Candidate or other.Law, tuple)
+        In the order of the columns.
     columns : ndarray of int (U,)
-        Of the statistics, in the order of laws and features.
+        Of the statistics.
     sizes : ndarray (U,)
     of_load_cell : ndarray of bool (U,)
         Columns of effects that a reference weight does not have.
@@ -267,7 +265,6 @@ class Instrument:
     own: int
     linearized: object
     laws: list
-    features: list
     columns: np.ndarray
     sizes: np.ndarray
     of_load_cell: np.ndarray
@@ -310,14 +307,7 @@ class Instrument:
         around = replace(around, progress=np.ones(len(observations.states)))
         line = linearize(self.model, self.estimate, observations, around)
         jacobian, state, around = line.coordinate_jacobian, observations.state, line.circumstances
-        campaign = self.linearized.about.circumstances
-        count = sum(len(columns) for _, columns in self.features)
-        waves = [
-            law
-            for each, columns in self.features
-            for law in other.displacements(around, each, self.linearized.problem.settings.other_features, campaign)
-        ]
-        made = effect_columns([*self.laws, (_Known(waves), ())] if count else self.laws, around, jacobian, state) * self.sizes
+        made = effect_columns(self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
         every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
@@ -352,16 +342,6 @@ class Instrument:
         return Observations(states, state, target, np.zeros((len(target), 3)), rotation)
 
 
-@dataclass(frozen=True)
-class _Known:
-    """Displacements that are known already, in the shape of a candidate."""
-
-    laws: list
-
-    def displacement(self, _):
-        return self.laws
-
-
 def instrument_of(linearized, fitted, numbers, noise, states, reach, further_targets):
     """What tells the information in entries.
 
@@ -391,14 +371,12 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     new = {f"target {target.name}" for target in model.targets[own:]}
     added = np.array([owner in new for owner in owners], bool)
     declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
-    laws, features, columns, sizes, cell = [], [], [], [], []
-    problem = linearized.problem
-    for number in sorted(numbers, key=lambda number: problem.units[number].candidate is None):
+    laws, columns, sizes, cell = [], [], [], []
+    problem, campaign = linearized.problem, linearized.about.circumstances
+    for number in numbers:
         unit = problem.units[number]
-        if unit.candidate is None:
-            features.append((unit.competitor, unit.columns))
-        else:
-            laws.append((unit.candidate, unit.shapes))
+        law = unit.candidate or other.law_of(unit.competitor, campaign, problem.settings.other_features)
+        laws.append((law, unit.shapes))
         columns.append(unit.columns)
         sizes.append(unit.sizes)
         cell.append(np.full(len(unit.columns), unit.candidate is not None and unit.candidate.family == "load"))
@@ -409,7 +387,6 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
         own,
         linearized,
         laws,
-        features,
         np.concatenate(empty + columns),
         np.concatenate(empty + sizes),
         np.concatenate([np.zeros(0, bool), *cell]),

@@ -77,38 +77,62 @@ def competitors(campaign):
     ]
 
 
-def displacements(around, competitor, features, campaign=None):
-    """Random displacements by one law, per unit of their coefficients in plausible sizes.
+@dataclass(frozen=True)
+class Law:
+    """Random displacements by one law, in the shape of a candidate: per unit of their coefficients in plausible sizes.
+
+    Attributes
+    ----------
+    competitor : Competitor
+    campaign : Circumstances
+        By whose inputs and loads those of all states are normalised.
+    size : float
+        rad or m.
+    parts : tuple of (int, callable, callable)
+        Coordinate that is displaced, waves by their inputs, and the part of them that has a name by the states.
+    """
+
+    competitor: Competitor
+    campaign: object
+    size: float
+    parts: tuple
+
+    def displacement(self, around):
+        """For each feature a displacement of one coordinate in some states, list of dict of int to ndarray (S,)."""
+        location, found = self.competitor.location, []
+        largest = np.abs(_load(self.campaign, location)).max(initial=0.0)
+        for coordinate, smooth, named in self.parts:
+            waves = smooth(_inputs(around, self.competitor, coordinate, self.campaign)) - named(around)
+            if largest > _ROUNDING:
+                waves[:, waves.shape[1] // 2 :] *= (_load(around, location) / largest)[:, None]
+            found += [{coordinate: self.size * wave} for wave in waves.T]
+        return found
+
+
+def law_of(competitor, campaign, features):
+    """Draw the displacements by one law.
 
     Parameters
     ----------
-    around : Circumstances
     competitor : Competitor
+    campaign : Circumstances
+        Of whose states what has a name is taken off.
     features : int
         At a joint.
-    campaign : Circumstances, optional
-        By whose inputs those are normalised; without, by their own. It makes the same function of other states.
 
     Returns
     -------
-    list of dict of int to ndarray (S,)
-        For each feature a displacement of one coordinate.
+    Law
     """
-    campaign, location = around if campaign is None else campaign, competitor.location
-    load = _relative_load(around, location, campaign)
-    loaded = bool(np.abs(_load(campaign, location)).max(initial=0.0) > _ROUNDING)
+    location = competitor.location
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
-    count = features if location else _BASE_FEATURES
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
-    found = []
-    for coordinate in _coordinates(around, competitor):
-        inputs, known = (_inputs(states, competitor, coordinate, campaign) for states in (around, campaign))
-        smooth = _waves(count, inputs.shape[1], draws)
-        waves = smooth(inputs) - _named_part(competitor, around, campaign, smooth(known))
-        if loaded:
-            waves[:, count // 2 :] *= load[:, None]
-        found += [{coordinate: size * wave} for wave in waves.T]
-    return found
+    parts = []
+    for coordinate in _coordinates(campaign, competitor):
+        known = _inputs(campaign, competitor, coordinate, campaign)
+        smooth = _waves(features if location else _BASE_FEATURES, known.shape[1], draws)
+        parts.append((coordinate, smooth, _named_part(competitor, campaign, smooth(known))))
+    return Law(competitor, campaign, size, tuple(parts))
 
 
 def _coordinates(around, competitor):
@@ -127,19 +151,20 @@ def _waves(count, inputs, draws):
     return lambda values: size * np.cos(values @ frequency + phase)
 
 
-def _named_part(competitor, around, campaign, known):
-    """What is constant in the waves over the campaign, and at a joint what goes straight with its angle.
+def _named_part(competitor, campaign, waves):
+    """What is constant in waves (S, count) over a campaign, and at a joint what goes straight with its angle; for any states.
 
     A zero offset, a transmission ratio, a frame that is fitted: the catalogue has names for these.
     """
-    part = known.mean(axis=0)
+    mean = waves.mean(axis=0)
     if not competitor.location or competitor.law == TIME:
-        return part
-    angle, there = (states.joint_angles[:, competitor.location[0] - 1] for states in (around, campaign))
-    off = there - there.mean()
+        return lambda around: mean
+    joint = competitor.location[0] - 1
+    center = campaign.joint_angles[:, joint].mean()
+    off = campaign.joint_angles[:, joint] - center
     squares = off @ off
-    slope = off @ known / squares if squares > _ROUNDING else np.zeros_like(part)
-    return part + np.outer(angle - there.mean(), slope)
+    slope = off @ waves / squares if squares > _ROUNDING else np.zeros_like(mean)
+    return lambda around: mean + np.outer(around.joint_angles[:, joint] - center, slope)
 
 
 def _inputs(around, competitor, coordinate, campaign):
@@ -187,12 +212,6 @@ def _place(coordinate, campaign):
 
 
 _INPUTS = {OWN: _own, NEIGHBOURS: _neighbours, TIME: _time, FORCE: _force, PLACE: _place}
-
-
-def _relative_load(around, location, campaign):
-    """The load relative to the largest of the campaign, ndarray (S,)."""
-    load, largest = _load(around, location), np.abs(_load(campaign, location)).max(initial=0.0)
-    return load / largest if largest > _ROUNDING else np.zeros(len(load))
 
 
 def _load(around, location):

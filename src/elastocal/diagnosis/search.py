@@ -161,10 +161,10 @@ def pose_errors_within_reach(statistics, settings):
     -------
     ndarray of bool (T,)
     """
-    prior = pose_weights(statistics.pose_error_rad, settings)
-    values = statistics.log_likelihood + prior + log_likelihood(statistics.squares, statistics.freedom)
-    largest = max(np.flatnonzero(values > values.max() + _UNLIKELY)[-1], np.argmax(values) + REACH)
-    return np.arange(len(values)) <= largest
+    problem = Problem(statistics, (), None, settings)
+    weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
+    largest = max(np.flatnonzero(weights > weights.max() + _UNLIKELY)[-1], np.argmax(weights) + REACH)
+    return np.arange(len(weights)) <= largest
 
 
 def likely_pose_errors(statistics, units, settings):

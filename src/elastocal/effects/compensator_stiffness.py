@@ -5,8 +5,7 @@ whose first is the torque of `compensator_torque`: where the crank is short, ord
 alone it is the same as a shoulder whose own stiffness depends on its angle.
 """
 
-import numpy as np
-
+from elastocal.effects import compensator_torque
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "compensator_stiffness", "elastic"
@@ -16,12 +15,12 @@ _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad/(N m)", 2e-7 / order) for
 
 def candidates(sites):
     """One candidate, where the robot file has a compensator."""
-    if sites.compensator is None or sites.prismatic[sites.compensator.joint - 1]:
+    joint = compensator_torque.turned_joint(sites)
+    if joint is None:
         return []
-    joint = sites.compensator.joint - 1
 
     def displacement(circumstances):
-        angle, torque = circumstances.joint_angles[:, joint], circumstances.total[:, joint]
-        return [{joint: torque * wave(order * angle)} for order in (1, 2) for wave in (np.cos, np.sin)]
+        torque = circumstances.total[:, joint]
+        return [{joint: torque * wave} for wave in compensator_torque.waves(circumstances.joint_angles[:, joint])]
 
     return [Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))]

@@ -15,13 +15,12 @@ _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order
 
 def candidates(sites):
     """Two candidates where the robot file has a compensator: with the crank's part, and as for a crank that is very short."""
-    if sites.compensator is None or sites.prismatic[sites.compensator.joint - 1]:
+    joint = turned_joint(sites)
+    if joint is None:
         return []
-    joint = sites.compensator.joint - 1
 
     def displacement(circumstances):
-        angle = circumstances.joint_angles[:, joint]
-        return [{joint: wave(order * angle)} for order in (1, 2) for wave in (np.cos, np.sin)]
+        return [{joint: wave} for wave in waves(circumstances.joint_angles[:, joint])]
 
     def first_order(circumstances):
         return displacement(circumstances)[:2]
@@ -30,3 +29,15 @@ def candidates(sites):
         Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement),
         Candidate(NAME, FAMILY, (joint + 1,), "first order", _PARAMETERS[:2], first_order),
     ]
+
+
+def turned_joint(sites):
+    """Joint on which the compensator acts, from 0; None where the robot file has none."""
+    if sites.compensator is None or sites.prismatic[sites.compensator.joint - 1]:
+        return None
+    return sites.compensator.joint - 1
+
+
+def waves(angle):
+    """Cosine and sine of an angle (S,) and of twice the angle, in the order of the parameters; list of ndarray (S,)."""
+    return [wave(order * angle) for order in (1, 2) for wave in (np.cos, np.sin)]
