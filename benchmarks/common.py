@@ -4,9 +4,9 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from elastocal.documents import read_document
-from elastocal.robot import robot_from_document
-from elastocal.strategies import strategy_from_document
+from elastocal.io.documents import read_document
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.study.strategies import strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
 

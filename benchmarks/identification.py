@@ -3,11 +3,11 @@
 import numpy as np
 from common import Row, interleaved, load_robot, load_strategy
 
-from elastocal.identification import estimate_compliance, identify
-from elastocal.simulation import Loading, measurement_noise, random_experiments, true_deflections
-from elastocal.study import SETS_PER_BLOCK
-from elastocal.study.columns import deflection_columns, experiment_columns
-from elastocal.study.identify import Situation
+from elastocal.study.identification import estimate_compliance, identify
+from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
+from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.columns import deflection_columns, experiment_columns
+from elastocal.study.steps.identify import Situation
 
 SETS, CONFIGURATIONS, ROWS = 1000, 100, 6
 LOADING = Loading(force_N=1000.0, offset_m=(0.0, 0.5, 0.0), offset_frame="base", joint_range="full_turn")

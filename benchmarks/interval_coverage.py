@@ -10,9 +10,9 @@ import numpy as np
 from common import ROOT
 from scipy.stats import bootstrap
 
-from elastocal.held_out import intervals
+from elastocal.validation.held_out import intervals
 
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 from made_errors import KINDS, campaigns_of, true_figures
 
 POSES, CAMPAIGNS, REPLICATES = (9, 18, 36), 400, 999

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 from common import Row, interleaved, load_robot
 
-from elastocal.kinematics import poses_and_jacobians
+from elastocal.mechanics.kinematics import poses_and_jacobians
 
 ROBOTS = ("kuka", "fanuc")
 CONFIGURATIONS = 100_000

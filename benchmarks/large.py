@@ -14,13 +14,13 @@ import yaml
 from common import ROOT, Row
 
 from elastocal.blind.cases import SIZES, cases_of, make_case
-from elastocal.importers import ur10_ipa
+from elastocal.blind.folders import write_dynamic_campaign
+from elastocal.campaigns.importers import ur10_ipa
+from elastocal.campaigns.public_data import FILES, FOLDER_VARIABLE
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.defects import Defect, with_defects
-from elastocal.plant.folders import write_dynamic_campaign
 from elastocal.plant.physical_robot import specimen
 from elastocal.plant.weights import declared_masses
-from elastocal.public_data import FILES, FOLDER_VARIABLE
 
 ROBOTS = ROOT / "config" / "robots"
 CASES, SEED = 12, 2026

@@ -9,16 +9,16 @@ from dataclasses import replace
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
 
-from elastocal.campaign import read_campaign, split, write_campaign
-from elastocal.campaign_simulation import Plan, simulated_measurements
+from elastocal.campaigns.campaign import read_campaign, split, write_campaign
+from elastocal.campaigns.public_data import FOLDER_VARIABLE
+from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on
-from elastocal.loop.case import Case
-from elastocal.model import declared_model
-from elastocal.observations import averaged
-from elastocal.public_data import FOLDER_VARIABLE
-from elastocal.sites import sites_of
+from elastocal.fitting.case import Case
+from elastocal.fitting.model import declared_model
+from elastocal.fitting.observations import averaged
+from elastocal.mechanics.sites import sites_of
 
 POSES, POINTS = 60, ("2DoF", "3DoF", "4DoF", "6DoF")
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)

@@ -5,9 +5,9 @@ from pathlib import Path
 import hypothesis
 import pytest
 
-from elastocal.documents import check_document, read_document
-from elastocal.robot import robot_from_document
-from elastocal.strategies import strategy_from_document
+from elastocal.io.documents import check_document, read_document
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.study.strategies import strategy_from_document
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"
 
@@ -58,3 +58,9 @@ def strategies():
         check_document(document, "strategy", path)
         found[path.stem] = strategy_from_document(document)
     return found
+
+
+@pytest.fixture(scope="session")
+def config(config_folder):
+    """The repository's own configuration."""
+    return read_document(config_folder.parent / "config.yaml")

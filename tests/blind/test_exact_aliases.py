@@ -10,12 +10,12 @@ pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
-from elastocal.fitting import fit
-from elastocal.loop.case import case_from, noise_from
-from elastocal.loop.declared import noise_of
-from elastocal.loop.intake import taken_in
-from elastocal.loop.reading_columns import reading_columns
-from elastocal.model import circumstances, effect_columns, linearize
+from elastocal.campaigns.reading_columns import reading_columns
+from elastocal.fitting.case import case_from, noise_from
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import circumstances, effect_columns, linearize
+from elastocal.fitting.noise_estimation import noise_of
+from elastocal.loop.loading import taken_in
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE, _ROUNDING = 1e-6, 1e-7

@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 import pytest
+from made_verdicts import said, truth
 from scipy.stats import beta
-from test_scores import said, truth
 
 from elastocal.blind.follow_up_scores import (
     followed,

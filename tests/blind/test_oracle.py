@@ -11,7 +11,7 @@ from elastocal.blind.cases import Case, make_case
 from elastocal.blind.oracle import members_of, oracle
 from elastocal.effects.catalogue import candidates_on
 from elastocal.loop.whole import diagnosed
-from elastocal.sites import sites_of
+from elastocal.mechanics.sites import sites_of
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 

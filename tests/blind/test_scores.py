@@ -1,18 +1,9 @@
 """A verdict is counted for what it is worth."""
 
 import pytest
+from made_verdicts import said, truth
 
 from elastocal.blind.scores import outcome
-
-
-def truth(*effects, group="single", level=50.0):
-    case = {"group": group, "robot": "gp180", "setting": "usual", "effects": effects, "levels": [level] * len(effects)}
-    return {"campaign": "case_x", "case": case}
-
-
-def said(word, *names, alternatives=()):
-    return {"verdict": word, "effects": [{"name": name, "alternatives": list(alternatives)} for name in names]}
-
 
 OUTCOMES = {
     "right name": (truth("payload"), said("named", "payload"), {"detected", "exact", "named_right", "holds_truth"}),

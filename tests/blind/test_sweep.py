@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from made_verdicts import said, truth
 from scipy.stats import beta
-from test_scores import said, truth
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 

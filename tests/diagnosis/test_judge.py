@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
-from elastocal.elastostatics import generalized_forces
-from elastocal.fitting import fit
-from elastocal.held_out import METRICS
-from elastocal.kinematics import poses, poses_and_jacobians
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
-from elastocal.model import joint_compliances
-from elastocal.noise import Noise
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.validation.held_out import METRICS
 
 NOISE = Noise("declared", 6e-5, 6e-5, np.zeros(6))
 OFFSET = 1e-3

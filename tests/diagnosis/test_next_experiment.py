@@ -10,7 +10,7 @@ from planted import planted, two_loads_a_pose
 from scipy.stats import ks_2samp, multivariate_normal
 from synthetic import seen_exactly, with_noise
 
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import new_states, next_experiment
 from elastocal.diagnosis.alarm import Alarm
 from elastocal.diagnosis.evidence import log_sum_exp
@@ -22,9 +22,9 @@ from elastocal.diagnosis.rivals import members_of
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded
-from elastocal.fitting import fit
-from elastocal.model import stepped
-from elastocal.observations import Observations, States
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import stepped
+from elastocal.fitting.observations import Observations, States
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)

@@ -23,7 +23,7 @@ from elastocal.diagnosis.other import (
     law_of,
 )
 from elastocal.effects.protocol import at_states
-from elastocal.robot import Mass
+from elastocal.mechanics.robot import Mass
 
 FEATURES = 40
 AT_A_JOINT = [Competitor((4,), law) for law in (OWN, NEIGHBOURS, TIME)]

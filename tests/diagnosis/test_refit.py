@@ -10,8 +10,8 @@ from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import Model, posterior
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting import ON_THE_WAY, fit
-from elastocal.model import linearize
+from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.model import linearize
 
 SETTINGS = Settings()
 

@@ -8,7 +8,6 @@ import pytest
 from made_folders import PLAN, made_folder, made_table
 from planted import planted
 
-from elastocal.diagnosis import tables
 from elastocal.diagnosis.confounding import angles_between
 from elastocal.diagnosis.diagnose import _effect_steps, diagnose
 from elastocal.diagnosis.judge import judge
@@ -17,9 +16,10 @@ from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.refit import fit_with_sizes, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.settings import Settings
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.loop.whole import cases_in
-from elastocal.storage import read_table, write_table
 
 
 def there_and_back(path, schema, blocks):

@@ -18,13 +18,13 @@ from synthetic import (
     with_noise,
 )
 
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting import fit
-from elastocal.kinematics import poses
-from elastocal.model import circumstances, displaced_coordinates, predict
-from elastocal.observations import Observations
-from elastocal.robot import Chain, MeasuringPoint, Transform
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import circumstances, displaced_coordinates, predict
+from elastocal.fitting.observations import Observations
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
 
 CHAINS = ["fanuc", "ur10", "fixed rotations", "seven joints"]
 

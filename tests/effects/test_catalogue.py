@@ -20,12 +20,12 @@ from synthetic import (
 )
 
 import elastocal.effects
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.protocol import Shape
-from elastocal.kinematics import poses
-from elastocal.model import circumstances, linearize
+from elastocal.fitting.model import circumstances, linearize
+from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.
 TABLE = {

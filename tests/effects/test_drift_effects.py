@@ -18,12 +18,12 @@ from synthetic import (
     with_noise,
 )
 
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.protocol import progress_of
-from elastocal.fitting import fit
-from elastocal.kinematics import poses
-from elastocal.model import circumstances, predict
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import circumstances, predict
+from elastocal.mechanics.kinematics import poses
 
 CHAINS = ["fanuc", "ur10", "fixed rotations"]
 

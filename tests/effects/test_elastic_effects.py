@@ -7,11 +7,11 @@ from support import OTHER_CHAINS, PinocchioPoint, chain_of
 from synthetic import candidate_on, circumstances_on, displacements, made_states
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.elastostatics import generalized_forces
-from elastocal.kinematics import poses, poses_and_jacobians
-from elastocal.links import extended_chain, tube_compliance
-from elastocal.robot import MeasuringPoint
-from elastocal.sites import sites_of
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.links import extended_chain, tube_compliance
+from elastocal.mechanics.robot import MeasuringPoint
+from elastocal.mechanics.sites import sites_of
 
 LINEAR = (
     "link_elasticity",

@@ -8,13 +8,13 @@ import pytest
 from support import OTHER_CHAINS, PinocchioPoint, chain_of, robot_of
 from synthetic import candidate_on, circumstances_on, displacements, made_estimate, made_model, made_states, seen_exactly
 
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.kinematics import poses
-from elastocal.model import circumstances, predict
+from elastocal.fitting.model import circumstances, predict
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.robot import Mass, MeasuringPoint
+from elastocal.mechanics.sites import sites_of
 from elastocal.plant.tracker import EccentricNest
-from elastocal.robot import Mass, MeasuringPoint
-from elastocal.sites import sites_of
 
 GRAVITY = 9.80665
 

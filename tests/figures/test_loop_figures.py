@@ -21,7 +21,6 @@ from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
 from synthetic import equipped
 
-from elastocal.diagnosis.tables import candidate_columns
 from elastocal.effects.catalogue import candidates_on
 from elastocal.figures import candidates as drawn
 from elastocal.figures.before_after import before_after, step_name
@@ -36,6 +35,7 @@ from elastocal.figures.residuals import (
     share_explained,
 )
 from elastocal.figures.style import save
+from elastocal.loop.diagnosis_tables import candidate_columns
 
 LONG = ("link_elasticity@1+2+3+6[one section]", "force_misalignment[flange axes]", "transmission_harmonic@1[orders 31-36]")
 LONG_SETS = [

@@ -8,17 +8,17 @@ from made_folders import made_folder, made_table
 from support import chain_of
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.campaign import Target, read_campaign
+from elastocal.campaigns.campaign import Target, read_campaign
+from elastocal.campaigns.reading_columns import reading_columns, readings_from
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting import Fit, fit
-from elastocal.loop.case import case_from, noise_facts, noise_from
+from elastocal.fitting.case import case_from, noise_facts, noise_from
+from elastocal.fitting.least_squares import Fit, fit
+from elastocal.fitting.model import parameters
+from elastocal.fitting.noise import Noise
+from elastocal.io.storage import TableSchema, read_table, write_table
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
-from elastocal.loop.intake import taken_in
-from elastocal.loop.reading_columns import reading_columns, readings_from
+from elastocal.loop.loading import taken_in
 from elastocal.loop.schemas import CORRELATIONS, PARAMETER_COLUMNS, readings
-from elastocal.model import parameters
-from elastocal.noise import Noise
-from elastocal.storage import TableSchema, read_table, write_table
 
 PARAMETERS = TableSchema("parameters", PARAMETER_COLUMNS)
 COVARIATES = {

@@ -9,11 +9,11 @@ import pytest
 import yaml
 from analysed_robots import ROBOTS
 
-from elastocal.campaign import read_campaign, split
+from elastocal.blind.folders import write_blind_campaign, write_truth
+from elastocal.campaigns.campaign import read_campaign, split
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import Design, continued, measured_table, schedule_of
 from elastocal.plant.defects import Defect, drawn_defect, truth_of, with_defects
-from elastocal.plant.folders import write_blind_campaign, write_truth
 from elastocal.plant.physical_robot import Warmth, seen_poses, specimen
 from elastocal.plant.tracker import Tracker, rotation_vector
 from elastocal.plant.weights import declared_masses

@@ -10,9 +10,10 @@ import pytest
 from analysed_robots import ROBOTS, analysed
 from support import OTHER_CHAINS, robot_of
 
-from elastocal.elastostatics import generalized_forces as joint_torques
-from elastocal.kinematics import pose_differences, poses, poses_and_jacobians
-from elastocal.links import extended_chain, spring_compliance
+from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.mechanics.robot import Link, Tube, stretches
 from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
 from elastocal.plant.campaigns import usual_force_N
 from elastocal.plant.multibody import machine_of
@@ -20,7 +21,6 @@ from elastocal.plant.random_numbers import stream
 from elastocal.plant.statics import Loading, equilibrium, generalized_forces, places
 from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
 from elastocal.plant.weights import declared_masses, gravity_torque, on_stretches, true_masses
-from elastocal.robot import Link, Tube, stretches
 
 STATES = 100
 

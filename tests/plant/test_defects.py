@@ -9,15 +9,15 @@ from analysed_robots import analysed
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import circumstances_of
 from elastocal.errors import InputError
-from elastocal.kinematics import poses_and_jacobians
-from elastocal.observations import States
+from elastocal.fitting.observations import States
+from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.sites import sites_of
 from elastocal.plant.campaigns import schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.physical_robot import seen_poses, specimen
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import rotation_vector
 from elastocal.plant.weights import declared_masses, on_stretches
-from elastocal.sites import sites_of
 
 NAMED = sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE))
 FOREIGN = sorted(set(KINDS) - set(NAMED))

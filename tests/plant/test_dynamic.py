@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 from analysed_robots import ROBOTS
 
-from elastocal.campaign import read_campaign
+from elastocal.blind.folders import write_dynamic_campaign
+from elastocal.campaigns.campaign import read_campaign
 from elastocal.plant.defects import Defect, with_defects
 from elastocal.plant.dynamic import _unloaded, dynamic_table, moving_angles
-from elastocal.plant.folders import write_dynamic_campaign
 from elastocal.plant.physical_robot import seen_poses
 from elastocal.plant.tracker import Tracker
 from elastocal.plant.weights import declared_masses

@@ -6,7 +6,7 @@ import pytest
 from loop_scripts import run_script
 from made_folders import made_folder, made_table
 
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
 
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")

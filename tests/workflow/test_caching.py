@@ -140,7 +140,7 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, ev
 
 
 def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
-    finished.append("src/elastocal/bounds.py", "# an edit\n")
+    finished.append("src/elastocal/study/bounds.py", "# an edit\n")
     assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | REPORT
 
 
@@ -157,7 +157,7 @@ def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
 
 
 def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, every_job):
-    finished.append("src/elastocal/gauss_newton.py", "# an edit\n")
+    finished.append("src/elastocal/study/gauss_newton.py", "# an edit\n")
     untouched = of_rules(
         every_job,
         "draw_experiments",
@@ -177,7 +177,7 @@ def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, 
 
 
 def test_an_edit_of_the_metrics_leaves_data_and_estimates(finished, every_job):
-    finished.append("src/elastocal/metrics.py", "# an edit\n")
+    finished.append("src/elastocal/study/metrics.py", "# an edit\n")
     untouched = of_rules(
         every_job,
         "draw_experiments",

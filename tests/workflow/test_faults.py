@@ -122,7 +122,7 @@ def test_spoilt_data_end_the_job_that_reads_them(spoil, said, finished):
 def test_a_killed_job_leaves_no_file_under_the_final_name(finished):
     """Killed after its first block, with no chance to tidy up."""
     finished.append(
-        "src/elastocal/study/measure.py",
+        "src/elastocal/study/steps/measure.py",
         "\n_blocks = measured_blocks\n\n\ndef measured_blocks(*arguments):\n    import time\n\n"
         "    for block in _blocks(*arguments):\n        yield block\n        time.sleep(600)\n",
     )

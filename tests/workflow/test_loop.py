@@ -11,7 +11,7 @@ import yaml
 from made_folders import made_folder, made_table
 from study_folder import Study
 
-from elastocal.table_schemas import COMPONENTS
+from elastocal.mechanics.components import COMPONENTS
 
 CELL = "cells/made"
 OWN = ("diagnose", "--config", f"campaign={CELL}")
@@ -163,12 +163,12 @@ EDITS = {
         {"simulate", "measure"},
     ),
     "a fault": (
-        "src/elastocal/faults/outliers.py",
+        "src/elastocal/data_checks/outliers.py",
         {"diagnose_campaign", "judge_campaign"},
         {"read_campaign"},
     ),
     "the search": ("src/elastocal/diagnosis/search.py", set(STEPS[1:]), set(STEPS[:1])),
-    "the judgement": ("src/elastocal/held_out.py", set(STEPS[2:]), set(STEPS[:2])),
+    "the judgement": ("src/elastocal/validation/held_out.py", set(STEPS[2:]), set(STEPS[:2])),
     "figures of the study": ("src/elastocal/figures/strategies.py", set(), set(STEPS)),
     "style of all figures": ("src/elastocal/figures/style.py", set(), set(STEPS)),
 }

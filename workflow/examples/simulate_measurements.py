@@ -7,10 +7,10 @@ the base frame; ROBOT_FILE is the robot that is measured, which may have more th
 import argparse
 from pathlib import Path
 
-from elastocal.campaign import CSV, read_descriptions, read_robot
-from elastocal.campaign_simulation import Plan, simulated_measurements
-from elastocal.measurements import write_measurements
-from elastocal.whole_files import appearing_whole
+from elastocal.campaigns.campaign import CSV, read_descriptions, read_robot
+from elastocal.campaigns.measurements import write_measurements
+from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.io.atomic_writes import appearing_whole
 
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 

@@ -4,8 +4,9 @@ import gc
 import sys
 from pathlib import Path
 
-from elastocal.campaign import campaign_files
-from elastocal.configuration import campaign_sources, check_study, rows_read, user_campaign
+from elastocal.campaigns.campaign import campaign_files
+from elastocal.campaigns.sources import campaign_sources, user_campaign
+from elastocal.study.configuration import check_study, rows_read
 from elastocal.errors import InputError
 
 ROOT = Path(workflow.basedir)

@@ -1,11 +1,11 @@
 """Cramér-Rao bounds of one robot for every set of measuring points that a strategy reads."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import robot_from_document, with_target_offset
-from elastocal.storage import read_blocks, read_table, write_table
-from elastocal.study.bound import bound_blocks
-from elastocal.study.evaluate import judge_from
-from elastocal.table_schemas import BOUNDS, DEFLECTIONS, experiments
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, read_table, write_table
+from elastocal.mechanics.robot import robot_from_document, with_target_offset
+from elastocal.study.steps.bound import bound_blocks
+from elastocal.study.steps.evaluate import judge_from
+from elastocal.study.table_schemas import BOUNDS, DEFLECTIONS, experiments
 
 from job import run
 

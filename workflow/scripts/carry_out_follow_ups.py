@@ -6,7 +6,7 @@ import pandas as pd
 
 from elastocal.blind.carrying_out import carry_out
 from elastocal.blind.cases import SIZES, cases_of
-from elastocal.study.columns import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES
 
 from job import run
 

@@ -1,13 +1,13 @@
 """Both solvers on the data sets of one robot, for every strategy at one length."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import parse_chain, with_target_offset
-from elastocal.storage import read_blocks, write_table
-from elastocal.strategies import strategy_from_document
-from elastocal.study.columns import DEFLECTION_COLUMNS
-from elastocal.study.identify import paired_blocks
-from elastocal.study.solvers import solver_table
-from elastocal.table_schemas import DEFLECTIONS, experiments, solvers
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.mechanics.robot import parse_chain, with_target_offset
+from elastocal.study.steps.columns import DEFLECTION_COLUMNS
+from elastocal.study.steps.identify import paired_blocks
+from elastocal.study.steps.solvers import solver_table
+from elastocal.study.strategies import strategy_from_document
+from elastocal.study.table_schemas import DEFLECTIONS, experiments, solvers
 
 from job import run
 

@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from elastocal.comparison import OurResults, comparison_table
-from elastocal.frames import read_long, write_csv
-from elastocal.table_schemas import REPLICATES, metrics
+from elastocal.io.data_frames import read_long, write_csv
+from elastocal.study.comparison import OurResults, comparison_table
+from elastocal.study.table_schemas import REPLICATES, metrics
 
 from job import run
 

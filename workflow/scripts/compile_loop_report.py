@@ -2,12 +2,12 @@
 
 import pandas as pd
 
-from elastocal.diagnosis.tables import STEPS, final_parameters
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
+from elastocal.loop.diagnosis_tables import STEPS, final_parameters
 from elastocal.loop.schemas import residuals
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
-from elastocal.storage import read_table
 
 from job import run
 

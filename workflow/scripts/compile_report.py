@@ -2,9 +2,9 @@
 
 import pandas as pd
 
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
 from elastocal.report.pages import write_report
-from elastocal.tables import headed_rows
+from elastocal.study.tables import headed_rows
 
 from job import run
 

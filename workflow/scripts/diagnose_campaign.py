@@ -3,18 +3,18 @@
 import sys
 from dataclasses import replace
 
-from elastocal.diagnosis import tables
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.proposal import facts_of, table_of
 from elastocal.diagnosis.settings import Settings
-from elastocal.frames import write_csv
-from elastocal.json_files import write_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import CORRELATIONS
-from elastocal.provenance import provenance
 from elastocal.random_streams import stream
-from elastocal.storage import write_table
 
 from job import run
 

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from elastocal.blind.follow_up import diagnosed_anew
-from elastocal.json_files import write_json
+from elastocal.io.json_files import write_json
 from elastocal.loop.whole import diagnosed
 
 from job import run

@@ -2,9 +2,9 @@
 
 from elastocal.figures.residuals import arrows
 from elastocal.figures.style import save
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals as schema
-from elastocal.storage import read_table
 
 from job import run
 

@@ -4,7 +4,7 @@ import pandas as pd
 
 from elastocal.figures.before_after import before_after
 from elastocal.figures.style import save
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
 
 from job import run
 

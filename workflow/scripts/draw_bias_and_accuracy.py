@@ -4,8 +4,8 @@ import pandas as pd
 
 from elastocal.figures.strategies import bias_and_accuracy
 from elastocal.figures.style import save
-from elastocal.frames import read_long
-from elastocal.table_schemas import metrics
+from elastocal.io.data_frames import read_long
+from elastocal.study.table_schemas import metrics
 
 from job import run
 

@@ -1,10 +1,10 @@
 """What may be missing in the model of a campaign: probabilities of hypotheses, and candidates one by one."""
 
-from elastocal.diagnosis.tables import CANDIDATES
 from elastocal.figures.candidates import probabilities
 from elastocal.figures.style import save
-from elastocal.json_files import read_json
-from elastocal.storage import read_table
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
+from elastocal.loop.diagnosis_tables import CANDIDATES
 
 from job import run
 

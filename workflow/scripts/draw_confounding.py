@@ -1,9 +1,9 @@
 """Angles between the contributions of the leading candidates."""
 
-from elastocal.diagnosis.tables import CANDIDATES, CONFOUNDING
 from elastocal.figures.candidates import confounding
 from elastocal.figures.style import save
-from elastocal.storage import read_table
+from elastocal.io.storage import read_table
+from elastocal.loop.diagnosis_tables import CANDIDATES, CONFOUNDING
 
 from job import run
 

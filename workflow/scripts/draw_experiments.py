@@ -1,11 +1,11 @@
 """Random configurations and wrenches of one robot."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import joint_limits, parse_chain
-from elastocal.simulation import Loading
-from elastocal.storage import write_table
-from elastocal.study.simulate import experiment_blocks
-from elastocal.table_schemas import experiments
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+from elastocal.mechanics.robot import joint_limits, parse_chain
+from elastocal.study.simulation import Loading
+from elastocal.study.steps.simulate import experiment_blocks
+from elastocal.study.table_schemas import experiments
 
 from job import run
 

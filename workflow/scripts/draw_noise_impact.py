@@ -2,8 +2,8 @@
 
 from elastocal.figures.strategies import noise_impact
 from elastocal.figures.style import save
-from elastocal.frames import read_long
-from elastocal.table_schemas import metrics
+from elastocal.io.data_frames import read_long
+from elastocal.study.table_schemas import metrics
 
 from job import run
 

@@ -4,8 +4,8 @@ import pandas as pd
 
 from elastocal.figures.against_paper import table2_samples
 from elastocal.figures.style import save
-from elastocal.frames import read_frame
-from elastocal.table_schemas import INITIAL
+from elastocal.io.data_frames import read_frame
+from elastocal.study.table_schemas import INITIAL
 
 from job import run
 

@@ -1,9 +1,9 @@
 """Bootstrap weights of one robot."""
 
-from elastocal.provenance import provenance
-from elastocal.storage import write_table
-from elastocal.study.weights import weight_blocks
-from elastocal.table_schemas import WEIGHTS
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+from elastocal.study.steps.weights import weight_blocks
+from elastocal.study.table_schemas import WEIGHTS
 
 from job import run
 

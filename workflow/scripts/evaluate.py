@@ -1,12 +1,12 @@
 """Metrics of one strategy for one robot at one noise level."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import robot_from_document, with_target_offset
-from elastocal.storage import read_blocks, read_table, write_table
-from elastocal.strategies import strategy_from_document
-from elastocal.study.evaluate import evaluated, judge_from
-from elastocal.study.weights import DATA_SETS, TESTS
-from elastocal.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, read_table, write_table
+from elastocal.mechanics.robot import robot_from_document, with_target_offset
+from elastocal.study.steps.evaluate import evaluated, judge_from
+from elastocal.study.steps.weights import DATA_SETS, TESTS
+from elastocal.study.strategies import strategy_from_document
+from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
 
 from job import run
 

@@ -1,12 +1,12 @@
 """One strategy on the data sets of one robot at one noise level, every prefix length."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import parse_chain, with_target_offset
-from elastocal.storage import read_blocks, write_table
-from elastocal.strategies import strategy_from_document, without_forgotten_stages
-from elastocal.study.columns import DEFLECTION_COLUMNS
-from elastocal.study.identify import identified_blocks, paired_blocks
-from elastocal.table_schemas import DEFLECTIONS, design, experiments, identified
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.mechanics.robot import parse_chain, with_target_offset
+from elastocal.study.steps.columns import DEFLECTION_COLUMNS
+from elastocal.study.steps.identify import identified_blocks, paired_blocks
+from elastocal.study.strategies import strategy_from_document, without_forgotten_stages
+from elastocal.study.table_schemas import DEFLECTIONS, design, experiments, identified
 
 from job import run
 

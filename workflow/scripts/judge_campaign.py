@@ -2,14 +2,14 @@
 
 import pandas as pd
 
-from elastocal.diagnosis import tables
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
-from elastocal.frames import write_csv
-from elastocal.json_files import read_json, write_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import residuals
-from elastocal.provenance import provenance
-from elastocal.storage import read_table, write_table
 
 from job import run
 

@@ -1,11 +1,11 @@
 """What the experiments of one robot can tell one strategy."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import parse_chain, with_target_offset
-from elastocal.storage import read_blocks, write_table
-from elastocal.strategies import strategy_from_document
-from elastocal.study.design import design_blocks
-from elastocal.table_schemas import design, experiments
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.mechanics.robot import parse_chain, with_target_offset
+from elastocal.study.steps.design import design_blocks
+from elastocal.study.strategies import strategy_from_document
+from elastocal.study.table_schemas import design, experiments
 
 from job import run
 

@@ -1,9 +1,9 @@
 """Deflections of one robot as measured at one noise level."""
 
-from elastocal.provenance import provenance
-from elastocal.storage import read_blocks, write_table
-from elastocal.study.measure import measured_blocks
-from elastocal.table_schemas import DEFLECTIONS
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.study.steps.measure import measured_blocks
+from elastocal.study.table_schemas import DEFLECTIONS
 
 from job import run
 

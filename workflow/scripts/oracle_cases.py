@@ -4,7 +4,7 @@ from pathlib import Path
 
 from elastocal.blind.oracle import oracle
 from elastocal.blind.truths import opened_truths
-from elastocal.json_files import read_json, write_json
+from elastocal.io.json_files import read_json, write_json
 
 from job import run
 

@@ -3,8 +3,8 @@
 import pandas as pd
 
 from elastocal.blind.follow_up import LADDER, MOST, POSES, followed_up
-from elastocal.frames import write_csv
-from elastocal.json_files import read_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
 from elastocal.loop.proposed import proposed
 
 from job import run

@@ -1,11 +1,11 @@
 """A campaign's folder, checked, as tables: readings to fit and readings to test."""
 
-from elastocal.json_files import write_json
-from elastocal.loop.intake import taken_in
-from elastocal.loop.reading_columns import reading_columns
+from elastocal.campaigns.reading_columns import reading_columns
+from elastocal.io.json_files import write_json
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+from elastocal.loop.loading import taken_in
 from elastocal.loop.schemas import readings
-from elastocal.provenance import provenance
-from elastocal.storage import write_table
 
 from job import run
 

@@ -11,8 +11,8 @@ from elastocal.blind.coverage import covered, intervals_of
 from elastocal.blind.power import powers, undetectable
 from elastocal.blind.targets import by_setting, summarized
 from elastocal.blind.truths import opened_truths
-from elastocal.frames import write_csv
-from elastocal.json_files import read_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
 
 from job import run
 

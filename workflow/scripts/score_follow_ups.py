@@ -14,8 +14,8 @@ from elastocal.blind.follow_up_scores import (
     with_prospects,
 )
 from elastocal.blind.truths import opened_truths
-from elastocal.frames import write_csv
-from elastocal.json_files import read_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
 
 from job import run
 

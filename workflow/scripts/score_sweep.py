@@ -6,8 +6,8 @@ from elastocal.blind.sweep import against_angle, swept
 from elastocal.blind.truths import opened_truths
 from elastocal.figures.style import save
 from elastocal.figures.sweep import sweep
-from elastocal.frames import write_csv
-from elastocal.json_files import read_json
+from elastocal.io.data_frames import write_csv
+from elastocal.io.json_files import read_json
 
 from job import run
 

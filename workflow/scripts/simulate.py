@@ -1,10 +1,10 @@
 """Deflections of one robot without noise."""
 
-from elastocal.provenance import provenance
-from elastocal.robot import robot_from_document, with_target_offset
-from elastocal.storage import read_blocks, write_table
-from elastocal.study.simulate import ideal_blocks
-from elastocal.table_schemas import DEFLECTIONS, experiments
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.mechanics.robot import robot_from_document, with_target_offset
+from elastocal.study.steps.simulate import ideal_blocks
+from elastocal.study.table_schemas import DEFLECTIONS, experiments
 
 from job import run
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from elastocal.campaign import write_campaign
-from elastocal.campaign_simulation import Plan, simulated_measurements
-from elastocal.robot import robot_from_document
+from elastocal.campaigns.campaign import write_campaign
+from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.mechanics.robot import robot_from_document
 
 from job import run
 

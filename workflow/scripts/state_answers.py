@@ -4,10 +4,10 @@ import json
 
 import pandas as pd
 
-from elastocal.frames import read_long
+from elastocal.io.atomic_writes import write_text
+from elastocal.io.data_frames import read_long
 from elastocal.report.answers import answers
-from elastocal.table_schemas import REPLICATES, metrics
-from elastocal.whole_files import write_text
+from elastocal.study.table_schemas import REPLICATES, metrics
 
 from job import run
 

@@ -1,7 +1,7 @@
 """All campaigns of one kind on one page."""
 
-from elastocal.frames import read_frame, write_csv
-from elastocal.json_files import read_json
+from elastocal.io.data_frames import read_frame, write_csv
+from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.loop.summary import campaign_rows
 

@@ -1,9 +1,9 @@
 """Deflection of one robot before calibration, data set by data set."""
 
-from elastocal.provenance import provenance
-from elastocal.storage import read_blocks, write_table
-from elastocal.study.initial import initial_blocks
-from elastocal.table_schemas import DEFLECTIONS, INITIAL
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import read_blocks, write_table
+from elastocal.study.steps.initial import initial_blocks
+from elastocal.study.table_schemas import DEFLECTIONS, INITIAL
 
 from job import run
 

@@ -1,8 +1,8 @@
 """What one data set gives, for every strategy, robot and noise level."""
 
-from elastocal.frames import read_frame, read_long, write_csv
-from elastocal.table_schemas import BOUNDS, accuracy
-from elastocal.tables import per_dataset_table
+from elastocal.io.data_frames import read_frame, read_long, write_csv
+from elastocal.study.table_schemas import BOUNDS, accuracy
+from elastocal.study.tables import per_dataset_table
 
 from job import run
 

@@ -1,8 +1,8 @@
 """Table 1: the compliances that the study takes as true."""
 
-from elastocal.frames import write_csv
-from elastocal.robot import robot_from_document
-from elastocal.tables import table1
+from elastocal.io.data_frames import write_csv
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.study.tables import table1
 
 from job import run
 

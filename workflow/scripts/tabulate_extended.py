@@ -1,8 +1,8 @@
 """What calibration with the reduced model leaves of robots with elastic links."""
 
-from elastocal.frames import read_long, write_csv
-from elastocal.table_schemas import REPLICATES, metrics
-from elastocal.tables import extended_table
+from elastocal.io.data_frames import read_long, write_csv
+from elastocal.study.table_schemas import REPLICATES, metrics
+from elastocal.study.tables import extended_table
 
 from job import run
 

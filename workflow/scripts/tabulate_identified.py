@@ -1,8 +1,8 @@
 """Table 3: compliances by the classical strategy."""
 
-from elastocal.frames import read_long, write_csv
-from elastocal.table_schemas import metrics
-from elastocal.tables import table3
+from elastocal.io.data_frames import read_long, write_csv
+from elastocal.study.table_schemas import metrics
+from elastocal.study.tables import table3
 
 from job import run
 

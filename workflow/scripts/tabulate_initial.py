@@ -1,9 +1,9 @@
 """Table 2: deviation before calibration."""
 
-from elastocal.bootstrap import bootstrap_weights
-from elastocal.frames import read_frame, write_csv
-from elastocal.table_schemas import INITIAL
-from elastocal.tables import table2
+from elastocal.io.data_frames import read_frame, write_csv
+from elastocal.study.bootstrap import bootstrap_weights
+from elastocal.study.table_schemas import INITIAL
+from elastocal.study.tables import table2
 
 from job import run
 

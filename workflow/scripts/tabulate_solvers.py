@@ -1,8 +1,8 @@
 """How far the estimates of strategies and solvers that should agree are apart."""
 
-from elastocal.frames import read_frame, write_csv
-from elastocal.table_schemas import solvers
-from elastocal.tables import solver_summary
+from elastocal.io.data_frames import read_frame, write_csv
+from elastocal.study.table_schemas import solvers
+from elastocal.study.tables import solver_summary
 
 from job import run
 

@@ -1,8 +1,8 @@
 """Table 4: the strategies compared."""
 
-from elastocal.frames import read_long, write_csv
-from elastocal.table_schemas import REPLICATES, metrics
-from elastocal.tables import table4
+from elastocal.io.data_frames import read_long, write_csv
+from elastocal.study.table_schemas import REPLICATES, metrics
+from elastocal.study.tables import table4
 
 from job import run
 

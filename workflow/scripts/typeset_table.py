@@ -2,8 +2,8 @@
 
 import pandas as pd
 
-from elastocal.frames import write_latex, write_markdown
-from elastocal.tables import with_errors_merged
+from elastocal.io.data_frames import write_latex, write_markdown
+from elastocal.study.tables import with_errors_merged
 
 from job import run
 

@@ -4,10 +4,10 @@ Run once by hand, from the top of the repository: python workflow/searches/choos
 Its answer, rounded to 0.1 mm, stands in config/robots/kuka_extended.yaml; nothing else of the paper went into the choice.
 """
 
-from elastocal.documents import read_document
-from elastocal.robot import robot_from_document
-from elastocal.simulation import Loading, random_experiments
-from elastocal.tube_choice import diameter_for_mean_deflection
+from elastocal.io.documents import read_document
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.study.simulation import Loading, random_experiments
+from elastocal.study.tube_choice import diameter_for_mean_deflection
 
 TABLE_2_MEAN_M = 1.749e-3
 

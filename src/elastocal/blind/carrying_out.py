@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from elastocal.blind.cases import declared_of, defects_of, design_of, robot_file, specimen_of
+from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
 from elastocal.plant.campaigns import continued, schedule_of
 from elastocal.plant.defects import with_defects
-from elastocal.plant.folders import write_blind_campaign
 from elastocal.plant.random_numbers import stream
 
 

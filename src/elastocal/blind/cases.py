@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 
+from elastocal.blind.folders import write_blind_campaign, write_truth
+from elastocal.io.atomic_writes import appearing_whole
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import FLANGE, Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.drives import PoseError, Repeatability
-from elastocal.plant.folders import write_blind_campaign, write_truth
 from elastocal.plant.physical_robot import specimen
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import Tracker
 from elastocal.plant.weights import declared_masses, on_stretches, usual_gravity_torque
-from elastocal.whole_files import appearing_whole
 
 # Robot files of config/robots. Nobody has looked at a diagnosis of the first two before the engine was frozen.
 PROOF, TUNED = ("iiwa14", "gp180"), ("kuka", "fanuc", "abb")

@@ -15,8 +15,8 @@ from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting import fit
-from elastocal.loop.case import noise_from
+from elastocal.fitting.case import noise_from
+from elastocal.fitting.least_squares import fit
 from elastocal.loop.whole import cases_in
 from elastocal.plant.defects import OUTSIDE
 

@@ -4,7 +4,7 @@ import hashlib
 from pathlib import Path
 
 from elastocal.errors import InputError
-from elastocal.json_files import read_json
+from elastocal.io.json_files import read_json
 
 
 def opened_truths(files, manifest):

@@ -3,7 +3,8 @@
 Read from top to bottom: `settings`; `hypotheses` (mechanisms at locations) and `other` (a smooth random competitor);
 `statistics` (all that the readings say, in a few hundred numbers; `summed` where there are too many to be held) and
 `linearize`, which makes them of a fit; `evidence` (Bayes factors), `search` (posterior), `alarm`, `verdict`; `refit` and
-`averaging` of parameters; `findings`, with `confounding` and `words`; and the two calls `diagnose` and `judge`, with their
-`tables`. Then the next experiment: `new_states`, `rivals`, `promise`, `proposal`, `next_experiment`. May import fitting,
-effects and what is below; nothing of the workflow, the plant, figures or reports.
+`averaging` of parameters; `findings`, with `confounding` and `words`; and the two calls `diagnose` and `judge`. Then
+the next experiment: `new_states`, `rivals`, `promise`, `proposal`, `next_experiment`.
+
+Imports `fitting`, `data_checks`, `validation` and what these import.
 """

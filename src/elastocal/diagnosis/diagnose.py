@@ -4,7 +4,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from elastocal.compliance_check import fitted_compliance_warnings
+from elastocal.data_checks.catalogue import faults
+from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
@@ -12,10 +13,9 @@ from elastocal.diagnosis.linearize import linearized, searched_part, shapes_look
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
-from elastocal.fitting import ON_THE_WAY, fit
-from elastocal.hygiene import faults
-from elastocal.loop.declared import estimated_noise
-from elastocal.model import joint_compliances
+from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.random_streams import stream
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.

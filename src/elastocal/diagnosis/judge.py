@@ -4,10 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from elastocal.campaigns.reading_columns import residual_columns
 from elastocal.effects.protocol import offered
-from elastocal.fitted_range import outside_fitted_range, predictive_variances
-from elastocal.fitting import fit_frames
-from elastocal.held_out import (
+from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.model import circumstances, measured_in_base, residuals
+from elastocal.fitting.observations import each_approach, state_clusters
+from elastocal.random_streams import stream
+from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
+from elastocal.validation.held_out import (
     METRICS,
     errors_by_range,
     grown,
@@ -18,11 +22,7 @@ from elastocal.held_out import (
     share_below_largest,
     summary,
 )
-from elastocal.loop.reading_columns import residual_columns
-from elastocal.model import circumstances, measured_in_base, residuals
-from elastocal.observations import each_approach, state_clusters
-from elastocal.random_streams import stream
-from elastocal.splits import error_row, split_rows
+from elastocal.validation.splits import error_row, split_rows
 
 _REPLICATES = 1000
 

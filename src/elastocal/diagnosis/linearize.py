@@ -11,10 +11,10 @@ from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_
 from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
 from elastocal.effects.protocol import at_states, offered
-from elastocal.model import bends as shape_parameters
-from elastocal.model import circumstances, effect_columns, linearize, parameter_values
-from elastocal.observations import part_at, parts_of, select_states, spread_poses
-from elastocal.whitening import whitening
+from elastocal.fitting.model import bends as shape_parameters
+from elastocal.fitting.model import circumstances, effect_columns, linearize, parameter_values
+from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses
+from elastocal.fitting.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
 _SHAPES_TRIED = 3

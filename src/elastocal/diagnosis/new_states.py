@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaign import Target
+from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import other
-from elastocal.model import circumstances, effect_columns, linearize, parameters
-from elastocal.observations import Observations, States
-from elastocal.robot import STANDARD_GRAVITY
-from elastocal.whitening import whitening
+from elastocal.fitting.model import circumstances, effect_columns, linearize, parameters
+from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.whitening import whitening
+from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 # Without a ladder of loads: each pose without its load and under it, and under the opposite one where the campaign has such.
 WITHOUT_AND_WITH, BOTH_SENSES = (0.0, 1.0), (0.0, 1.0, -1.0)

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.robot import STANDARD_GRAVITY
-from elastocal.study.columns import WRENCH_NAMES
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 # Said where nothing within reach helps.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.diagnosis.linearize import declared_geometry
-from elastocal.fitting import fit
-from elastocal.model import parameter_values
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import parameter_values
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,4 @@
-"""The catalogue: physical effects that a reduced joint-compliance model lacks, one module each."""
+"""The catalogue of physical effects that a calibrated model may lack, one module for each.
+
+A module with a NAME is an effect: see `protocol`. Imports `mechanics` alone.
+"""

@@ -17,9 +17,9 @@ from functools import cached_property
 
 import numpy as np
 
-from elastocal.elastostatics import generalized_forces
-from elastocal.kinematics import Motion, motion
-from elastocal.sites import Sites
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.kinematics import Motion, motion
+from elastocal.mechanics.sites import Sites
 
 # Of the load under which gears are looked at: a pull at the end of the arm, at the least lever of a tool.
 _PULL_N, _LEAST_LEVER_M = 1e3, 0.5

@@ -1,1 +1,4 @@
-"""Figures of the study and of the robots, as matplotlib figures that the caller saves."""
+"""Figures of study, loop and blind proof: tables in, PDF out.
+
+Imports tables' contents and names from `study`, `diagnosis` and `blind`; computes nothing.
+"""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from elastocal.comparison import ACCEPTED_Z
 from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.study.comparison import ACCEPTED_Z
 
 MILLI = 1e3
 # Beyond this, a z score is drawn at the margin with an arrow.

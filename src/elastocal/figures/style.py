@@ -3,7 +3,7 @@
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from elastocal.whole_files import appearing_whole
+from elastocal.io.atomic_writes import appearing_whole
 
 WIDTH_MM = 165
 # Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.

@@ -1,1 +1,4 @@
-"""Steps of closing the loop on one campaign, each from tables to tables; the science is in the modules above this folder."""
+"""Closing the loop on a campaign: from its folder to the verdict, and the tables in between. The science is below.
+
+Imports `diagnosis` and what that imports.
+"""

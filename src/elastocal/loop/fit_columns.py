@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.model import Estimate, parameters
+from elastocal.fitting.model import Estimate, parameters
 
 
 def parameter_columns(fitted):

@@ -1,9 +1,9 @@
 """Cases from the files that earlier steps wrote."""
 
-from elastocal.json_files import read_json
-from elastocal.loop.case import case_from
+from elastocal.fitting.case import case_from
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
 from elastocal.loop.schemas import readings
-from elastocal.storage import read_table
 
 
 def opened_case(descriptions_path, readings_path, part=None):

@@ -1,7 +1,7 @@
 """Every table that the loop keeps, column by column. Written down here and nowhere else."""
 
-from elastocal.storage import Column, TableSchema
-from elastocal.table_schemas import COMPONENTS, WRENCH
+from elastocal.io.storage import Column, TableSchema
+from elastocal.mechanics.components import COMPONENTS, WRENCH
 
 _IDENTITY = (
     Column("session", "int32", "", "sessions have each their own tracker frame"),

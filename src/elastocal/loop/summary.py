@@ -3,8 +3,8 @@
 import numpy as np
 import pandas as pd
 
-from elastocal.held_out import Errors, intervals, summary
 from elastocal.random_streams import stream
+from elastocal.validation.held_out import Errors, intervals, summary
 
 _REPLICATES = 1000
 _STAGES = ("before", "after")

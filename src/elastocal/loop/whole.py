@@ -1,12 +1,12 @@
 """A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
 same two calls, with tables between them."""
 
+from elastocal.campaigns.reading_columns import reading_columns
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
-from elastocal.loop.case import case_from
-from elastocal.loop.intake import taken_in
-from elastocal.loop.reading_columns import reading_columns
+from elastocal.fitting.case import case_from
+from elastocal.loop.loading import taken_in
 
 
 def cases_in(folder, robots_folder):

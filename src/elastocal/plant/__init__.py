@@ -1,6 +1,6 @@
 """A physical robot to be blind about: MuJoCo statics with defects, its tracker, its load cell, and the campaigns made with it.
 
-Nothing here shares kinematic, elastic or statistical code with the analysis. Of elastocal only the error of bad input and the
-writer of campaign folders are used, so that an agreement of the two is a finding and not the same line of code run twice. The
+Nothing here shares kinematic, elastic or statistical code with the analysis. Of elastocal only `errors` is imported, so that an
+agreement of the two is a finding and not the same line of code run twice. The
 laws of the defects are on purpose not those of the catalogue: what the analysis fits is never exactly what was done.
 """

@@ -1,1 +1,4 @@
-"""The report of the study: what its text says in numbers, and the pages."""
+"""Reports as PDF: facts and sentences for the Typst templates that stand beside them.
+
+Imports what it reports on: `study`, `diagnosis`, `effects`, `blind`.
+"""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from elastocal.comparison import ACCEPTED_Z
-from elastocal.tables import deviation_ratio, with_errors_merged, worded
+from elastocal.study.comparison import ACCEPTED_Z
+from elastocal.study.tables import deviation_ratio, with_errors_merged, worded
 
 # The repeatability that the paper names for both robots, in µm.
 REPEATABILITY_UM = 60.0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typst
 
-from elastocal.whole_files import appearing_whole
+from elastocal.io.atomic_writes import appearing_whole
 
 
 def compile_document(path, document, data, figures=()):

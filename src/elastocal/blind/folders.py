@@ -1,0 +1,161 @@
+"""The folder that an analyst gets, and the sealed truth that he does not. A campaign's format is a contract of both sides."""
+
+import hashlib
+import json
+import platform
+from dataclasses import asdict
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import yaml
+
+from elastocal.campaigns.campaign import write_campaign
+from elastocal.io.atomic_writes import appearing_whole
+from elastocal.plant.campaigns import measured_table
+from elastocal.plant.dynamic import DYNAMIC, dynamic_table
+
+ROBOT_FILE = "robot.yaml"
+
+
+def robot_document(document, arm, declared, gravity_m_s2):
+    """Contents of the campaign's own robot file.
+
+    Parameters
+    ----------
+    document : dict
+        Of the robot file of which this is a specimen.
+    arm : Arm
+    declared : tuple of LinkMass
+        What the analyst is told of the weights; where it is nothing, the file says nothing of them.
+    gravity_m_s2 : tuple of float
+
+    Returns
+    -------
+    dict
+    """
+    told = {key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")}
+    if declared:
+        told["masses"] = [
+            {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
+            for m in declared
+        ]
+    told |= {"gravity_m_s2": list(gravity_m_s2), "payload_kg": round(arm.payload_kg, 1), "gear_ratio": list(arm.gear_ratio)}
+    if arm.compensated:
+        told["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
+    return told
+
+
+def campaign_document(name, arm, design):
+    """Contents of campaign.yaml; nothing in it depends on the defects."""
+    document = {
+        "campaign": name,
+        "robot": ROBOT_FILE,
+        "measured": design.measured,
+        "frame": design.frame,
+        "targets": {f"{point}": {"point": point, "offset_m": [0, 0, 0]} for point in design.targets_on(arm)},
+        "compliance": "identify",
+        "declared": list(design.declared),
+        "holdout": {"poses": list(range(design.poses - design.held_out, design.poses))},
+    }
+    if design.declared_noise is not None:
+        document["noise"] = dict(zip(("position_m", "orientation_rad"), design.declared_noise, strict=True))
+    return document
+
+
+def write_blind_campaign(folder, name, robot_file, robot, design, schedule, declared=(), kind="parquet"):
+    """Measure, and write what the analyst gets.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The campaign's own.
+    name : str
+        Of the campaign; must not give the truth away.
+    robot_file : str or Path
+        Of which the robot is a specimen.
+    robot : PhysicalRobot
+    design : Design
+    schedule : Schedule
+    declared : tuple of LinkMass
+        What the analyst is told of the weights.
+    kind : {"parquet", "csv"}
+
+    Returns
+    -------
+    dict
+        What a truth document says of the making of the data.
+    """
+    table, outliers = measured_table(robot, design, schedule)
+    write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
+    _write_robot(folder, robot_file, robot, declared)
+    return {
+        "campaign": name,
+        "robot": Path(robot_file).stem,
+        "seed": schedule.seed,
+        "design": asdict(design),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+        "masses": [asdict(mass) for mass in robot.structure.masses],
+        "declared_masses": [asdict(mass) for mass in declared],
+        "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},
+        "outliers": [list(outlier) for outlier in outliers],
+        "readings": len(table["pose"]),
+        "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
+    }
+
+
+def write_dynamic_campaign(folder, name, robot_file, robot, readings, seed, declared=()):
+    """Measure a moving arm, and write what the analyst gets: for benchmarks of many readings.
+
+    Parameters
+    ----------
+    folder, name, robot_file, robot, declared
+        As in `write_blind_campaign`.
+    readings : int
+        At 1,000 a second, without a load.
+    seed : int
+    """
+    document = campaign_document(name, robot.arm, DYNAMIC) | {
+        "compliance": "nominal",
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": robot.tracker.sigma_m},
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+    write_campaign(folder, document, dynamic_table(robot, readings, seed), robot.arm.joints, "parquet")
+    _write_robot(folder, robot_file, robot, declared)
+
+
+def _write_robot(folder, robot_file, robot, declared):
+    described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
+    with appearing_whole(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
+        yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
+
+
+def write_truth(path, truth, campaign_folder):
+    """Seal a truth document: sorted JSON, outside of the campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+    truth : dict
+    campaign_folder : str or Path
+
+    Returns
+    -------
+    str
+        SHA-256 of the file, to be published before any diagnosis.
+
+    Raises
+    ------
+    ValueError
+        The file would lie in the campaign's folder.
+    """
+    path, folder = Path(path), Path(campaign_folder)
+    if folder.resolve() in path.resolve().parents:
+        raise ValueError(f"{path}: the truth must not lie in the campaign's folder {folder}")
+    text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+        file.write(text)
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,4 @@
+"""A measured campaign: its files, checked as they are read; simulated ones; other people's data and their importers.
+
+Imports `mechanics` and `io`; fits nothing.
+"""

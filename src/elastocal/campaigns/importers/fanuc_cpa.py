@@ -1,0 +1,74 @@
+"""FANUC R-2000iC/165F, one joint moved at a time (RABKKK/LaserTrackerPoseData4KinIdent): a text file as a campaign."""
+
+import numpy as np
+
+from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.errors import InputError
+
+ROBOT, TARGETS = "fanuc_cpa", ("D", "E", "F")
+# Three reflectors in mm, six zeros, six angles of the controller in degrees.
+_COLUMNS, _ANGLES = 21, slice(15, 21)
+# This source has no repeats; those of fanuc_static scatter so, pooled over its poses, reflectors and coordinates.
+NOISE = {"position_m": 5.2e-5}
+
+
+def read(path):
+    """Readings of the text file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    joint_angles : ndarray (N, 6)
+        As the controller reports them, in rad.
+    positions : dict of str to ndarray (N, 3)
+        m, tracker frame.
+
+    Raises
+    ------
+    InputError
+        No file, a row of another length, something that is no number.
+    """
+    try:
+        with open(path, encoding="utf-8") as file:
+            lines = [line.split() for line in file]
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    rows = []
+    for number, cells in enumerate(lines, 1):
+        if not cells:
+            continue
+        try:
+            rows.append([float(cell) for cell in cells])
+        except ValueError:
+            raise InputError(path, f"line {number}", "a cell that is no number", "numbers separated by blanks") from None
+        if len(cells) != _COLUMNS or not np.isfinite(rows[-1]).all():
+            raise InputError(path, f"line {number}", f"{len(cells)} numbers", f"{_COLUMNS} finite numbers")
+    if not rows:
+        raise InputError(path, "", "no row of data", f"rows of {_COLUMNS} numbers")
+    values = np.array(rows)
+    return np.radians(values[:, _ANGLES]), {name: 1e-3 * values[:, 3 * i : 3 * i + 3] for i, name in enumerate(TARGETS)}
+
+
+def write_campaign(path, folder, name="fanuc_cpa", holdout=None):
+    """Write the text file as a campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``N1N2N3Jval.csv``.
+    folder : str or Path
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    write_reflectors(folder, name, ROBOT, *read(path), holdout, NOISE)

@@ -1,0 +1,44 @@
+"""Both sessions of the FANUC as one campaign: one robot, two tools, two tracker frames."""
+
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.campaigns.campaign import read_robot
+from elastocal.campaigns.campaign import write_campaign as write_folder
+from elastocal.campaigns.importers import fanuc_cpa, fanuc_static
+from elastocal.campaigns.importers.reflectors import reflector_table
+from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.unloaded import unloaded_document
+
+# Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
+ROBOT = "fanuc_measured"
+
+
+def write_campaign(static_path, cpa_path, folder, robots_folder, name="fanuc_joint", holdout=None):
+    """Write both sources as the sessions 0 (static) and 1 (cpa) of one campaign.
+
+    Parameters
+    ----------
+    static_path, cpa_path : str or Path
+        As for `fanuc_static` and `fanuc_cpa`.
+    folder : str or Path
+    robots_folder : str or Path
+        Holds the robot files of both sources, which say how each counts its angles.
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+
+    Raises
+    ------
+    InputError
+        As in the ``read`` of both, and a robot file that is not there.
+    """
+    tables = []
+    for session, (source, path) in enumerate(((fanuc_static, static_path), (fanuc_cpa, cpa_path))):
+        reported, positions = source.read(path)
+        robot = read_robot(Path(robots_folder) / f"{source.ROBOT}.yaml")
+        tables.append(reflector_table(*pose_and_repeat(reported), robot.model_angles(reported), positions, session))
+    table = {column: np.concatenate([part[column] for part in tables]) for column in tables[0]}
+    targets = (*fanuc_static.TARGETS, *fanuc_cpa.TARGETS)
+    write_folder(folder, unloaded_document(name, ROBOT, "position", targets, holdout), table, robot.joints)

@@ -1,0 +1,62 @@
+"""FANUC R-2000iC/165F, 24 configurations with 10 repeats (Sarrasor/RoboticManipulators): a MAT file as a campaign."""
+
+import numpy as np
+import scipy.io
+
+from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.errors import InputError
+
+ROBOT, TARGETS = "fanuc_static", ("A", "B", "C")
+
+
+def read(path):
+    """Readings of the MAT file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    joint_angles : ndarray (N, 6)
+        As in the file, rad.
+    positions : dict of str to ndarray (N, 3)
+        m, tracker frame.
+
+    Raises
+    ------
+    InputError
+        No MAT file, a variable that is missing or has another shape.
+    """
+    names = ("q", *(f"m{target}" for target in TARGETS))
+    try:
+        found = scipy.io.loadmat(path, variable_names=names)
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except Exception as error:  # the reader lets through whatever broken bytes make of its parts
+        raise InputError(path, "", f"no readable MAT file ({error})", "a MAT file of version 5") from None
+    for name in names:
+        shape, width = np.shape(found.get(name, ())), 6 if name == "q" else 3
+        if len(shape) != 2 or shape != (len(found["q"]), width) or found[name].dtype.kind != "f" or not len(found["q"]):
+            raise InputError(path, name, f"shape {shape}" if name in found else "nothing", f"(readings, {width}) numbers")
+    return found["q"], {target: found[f"m{target}"] for target in TARGETS}
+
+
+def write_campaign(path, folder, name="fanuc_static", holdout=None):
+    """Write the MAT file as a campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``calibration_dataset.mat``.
+    folder : str or Path
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    write_reflectors(folder, name, ROBOT, *read(path), holdout)

@@ -1,0 +1,84 @@
+"""Universal Robots UR5 and Barrett WAM with one reflector (pauljac7700/serial_robots_datasets): tables as campaigns.
+
+Measured with a GTS3800 laser tracker for P. Jacobi's master's thesis (Tsinghua University 2025). A file holds the commanded
+position of the reflector, which the nominal chain and a tool along its last axis reproduce to 12 um, and a difference from it.
+"""
+
+import numpy as np
+
+from elastocal.campaigns.campaign import write_campaign as write_folder
+from elastocal.campaigns.importers.csv_columns import numbers, read_columns
+from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.errors import InputError
+
+TARGET = "SMR"
+# Robots of the source by their number of joints.
+ROBOTS = {6: "ur5", 7: "wam"}
+# The tracker's maker: 15 um + 6 um/m; how far it stood is not told. The least that a reading scatters: what the joints add is
+# the error common to a pose, which is estimated.
+NOISE = {"position_m": 1.5e-5}
+COMMANDED, DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
+
+
+def read(path):
+    """Readings of one file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    joint_angles : ndarray (N, n)
+        As commanded, rad.
+    position : ndarray (N, 3)
+        m, in the frame in which the tracker was set to the robot's base. The source does not state the sign of the difference;
+        with this one the sums have six decimals of a millimetre, as the tracker gives them, with the other one fifteen.
+
+    Raises
+    ------
+    InputError
+        No file, a column that is missing, something that is no number, another number of joints.
+    """
+    kind = "a file of serial_robots_datasets"
+    cells = read_columns(path, ",", (*COMMANDED, *DIFFERENCE), kind)
+    joints = sum(name.startswith("joint_") for name in cells)
+    names = [f"joint_{number + 1}" for number in range(joints)]
+    if joints not in ROBOTS or not set(names) <= set(cells):
+        found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
+        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOTS))}")
+
+    def table(names):
+        return np.column_stack([numbers(path, name, cells[name]) for name in names])
+
+    return np.radians(table(names)), 1e-3 * (table(COMMANDED) + table(DIFFERENCE))
+
+
+def write_campaign(path, folder, name, holdout=None, noise=NOISE):
+    """Write one file as a campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``3D_..._uncalibrated_grid_cleaned.csv`` or ``..._random_cleaned.csv``.
+    folder : str or Path
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+    noise : dict or None
+        The same.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    angles, position = read(path)
+    pose, repeat = pose_and_repeat(angles)
+    table = {"pose": pose, "load": np.zeros(len(pose), int), "repeat": repeat, "target": np.full(len(pose), TARGET)}
+    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
+    table |= {axis: position[:, i] for i, axis in enumerate("xyz")}
+    joints = angles.shape[1]
+    document = unloaded_document(name, ROBOTS[joints], "position", [TARGET], holdout, noise, f"{joints}DoF")
+    write_folder(folder, document, table, joints)

@@ -1,0 +1,52 @@
+"""Campaigns of several reflectors on one flange, unloaded: what both FANUC sources are."""
+
+import numpy as np
+
+from elastocal.campaigns.campaign import write_campaign
+from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.unloaded import unloaded_document
+
+
+def reflector_table(pose, repeat, joint_angles, positions, session=None):
+    """Columns of measurements, one row for each reflector of each reading.
+
+    Parameters
+    ----------
+    pose, repeat : ndarray of int (N,)
+    joint_angles : ndarray (N, n)
+        rad.
+    positions : dict of str to ndarray (N, 3)
+        m, by reflector.
+    session : int, optional
+        No such column without.
+
+    Returns
+    -------
+    dict of str to ndarray (N * reflectors,)
+    """
+    names, count = list(positions), len(pose)
+    readings = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
+    rows = np.repeat(np.arange(count), len(names))
+    table = {} if session is None else {"session": np.full(len(rows), session)}
+    table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows], "target": np.tile(names, count)}
+    table |= {f"q{j + 1}": angles[rows] for j, angles in enumerate(joint_angles.T)}
+    return table | {axis: readings[:, i] for i, axis in enumerate("xyz")}
+
+
+def write_reflectors(folder, name, robot, joint_angles, positions, holdout=None, noise=None):
+    """Write readings of one session as a campaign's folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+    name, robot : str
+    joint_angles : ndarray (N, n)
+        As the controller reports them, rad.
+    positions : dict of str to ndarray (N, 3)
+        m, by reflector.
+    holdout, noise : dict, optional
+        As in ``campaign.yaml``.
+    """
+    table = reflector_table(*pose_and_repeat(joint_angles), joint_angles, positions)
+    document = unloaded_document(name, robot, "position", positions, holdout, noise)
+    write_campaign(folder, document, table, joint_angles.shape[1])

@@ -1,0 +1,107 @@
+"""Universal Robots UR10 with a T-Mac on its flange (christianlandgraf/ipa-robot-accuracy): Series A and B as campaigns."""
+
+from datetime import datetime
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.campaign import write_campaign as write_folder
+from elastocal.campaigns.importers.csv_columns import numbers, read_columns
+from elastocal.campaigns.importers.repeats import pose_and_repeat
+from elastocal.campaigns.importers.unloaded import unloaded_document
+
+ROBOT, TARGET = "ur10", "TMac"
+# One reading of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median and
+# less what the chain explains of their distance. Orientations: the 255 repeats of Series B, by their median.
+NOISE = {"position_m": 2.1e-5, "orientation_rad": 3.0e-5}
+TIME, TEMPERATURE = "Timestamp", "measurement_temperature"
+ANGLES = (
+    "shoulder_pan_joint",
+    "shoulder_lift_joint",
+    "elbow_joint",
+    "wrist_1_joint",
+    "wrist_2_joint",
+    "wrist_3_joint",
+)
+POSITION = ("measurement_x", "measurement_y", "measurement_z")
+ORIENTATION = ("measurement_rx", "measurement_ry", "measurement_rz")
+# Turned about x, then the new y, then the new z: the angle between any two measured orientations must be that of the flange's,
+# whatever the frame and the T-Mac's own turn. Read so, they differ by 1.1 mrad (Series A) and 0.9 mrad (B) in the median, with
+# fixed axes by 5 and 23 mrad, as rotation vectors by 48 and 10 mrad. The source's own reader does the same.
+_EULER = "XYZ"
+# The controller's angles of a pose that is approached again scatter by less; different poses are 500 times as far apart.
+_SAME_POSE_RAD = 1e-4
+_TIME_FORMAT = "%Y%m%d%H%M%S"
+
+
+def read(path):
+    """Readings of one series.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    dict of str to ndarray
+        ``joint_angles`` (N, 6) rad, ``position`` (N, 3) m, ``rotation_vector`` (N, 3) rad, ``temperature_c`` (N,) where it is
+        there, ``time_s`` (N,) since the first row where the time stamps are whole.
+
+    Raises
+    ------
+    InputError
+        No file, a column that is missing, something that is no number.
+    """
+    cells = read_columns(path, ";", (*ANGLES, *POSITION, *ORIENTATION), "a series of ipa-robot-accuracy")
+
+    def table(names):
+        return np.column_stack([numbers(path, name, cells[name], ",") for name in names])
+
+    found = {
+        "joint_angles": table(ANGLES),
+        "position": 1e-3 * table(POSITION),
+        "rotation_vector": Rotation.from_euler(_EULER, table(ORIENTATION), degrees=True).as_rotvec(),
+    }
+    if TEMPERATURE in cells:
+        found["temperature_c"] = numbers(path, TEMPERATURE, cells[TEMPERATURE], ",")
+    times = _times(cells[TIME]) if TIME in cells else None
+    return found if times is None else found | {"time_s": times}
+
+
+def write_campaign(path, folder, name, holdout=None, noise=NOISE):
+    """Write one series as a campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``measurements_grid.csv`` or ``measurements_joint_configurations.csv``.
+    folder : str or Path
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+    noise : dict or None
+        The same.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    readings = read(path)
+    angles = readings["joint_angles"]
+    pose, repeat = pose_and_repeat(angles, _SAME_POSE_RAD)
+    table = {"pose": pose, "load": np.zeros(len(pose), int), "repeat": repeat, "target": np.full(len(pose), TARGET)}
+    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
+    table |= {axis: readings["position"][:, i] for i, axis in enumerate("xyz")}
+    table |= {f"r{axis}": readings["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
+    table |= {covariate: readings[covariate] for covariate in ("time_s", "temperature_c") if covariate in readings}
+    write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
+
+
+def _times(cells):
+    """Seconds since the first row; None where a spreadsheet has cut the stamps down to 2,02011E+13."""
+    try:
+        stamps = [datetime.strptime(cell, _TIME_FORMAT) for cell in cells]
+    except ValueError:
+        return None
+    return np.array([(stamp - stamps[0]).total_seconds() for stamp in stamps])

@@ -1,0 +1,60 @@
+"""Readings to columns of tables and back."""
+
+import numpy as np
+
+from elastocal.campaigns.campaign import Readings
+from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
+
+IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
+
+
+def reading_columns(readings):
+    """Columns of the readings table."""
+    count, joints = readings.joint_angles.shape
+    columns = {name: getattr(readings, name) for name in IDENTITY}
+    columns |= {f"q{j + 1}": readings.joint_angles[:, j] for j in range(joints)}
+    columns |= dict(zip(WRENCH_NAMES, readings.wrench.T, strict=True))
+    columns |= dict(zip("xyz", readings.position.T, strict=True))
+    columns |= dict(zip(("rx", "ry", "rz"), _or_missing(readings.rotation_vector, (count, 3)).T, strict=True))
+    approach = _or_missing(readings.approach, (count, joints))
+    columns |= {f"approach{j + 1}": approach[:, j] for j in range(joints)}
+    return columns | {name: _or_missing(getattr(readings, name), (count,)) for name in ("time_s", "temperature_c")}
+
+
+def readings_from(columns):
+    """Readings from the columns of their table."""
+    joints = sum(name.startswith("approach") for name in columns)
+    return Readings(
+        **{name: columns[name] for name in IDENTITY},
+        joint_angles=np.column_stack([columns[f"q{j}"] for j in range(1, joints + 1)]),
+        wrench=np.column_stack([columns[name] for name in WRENCH_NAMES]),
+        position=np.column_stack([columns[axis] for axis in "xyz"]),
+        rotation_vector=_or_none(np.column_stack([columns[f"r{axis}"] for axis in "xyz"])),
+        approach=_or_none(np.column_stack([columns[f"approach{j}"] for j in range(1, joints + 1)])),
+        time_s=_or_none(columns["time_s"]),
+        temperature_c=_or_none(columns["temperature_c"]),
+    )
+
+
+def residual_columns(readings, held_out, outside, position, before, after):
+    """Columns of the residuals table."""
+    count, joints = readings.joint_angles.shape
+    columns = {name: getattr(readings, name) for name in IDENTITY}
+    columns |= {"held_out": np.full(count, held_out), "outside_range": outside}
+    columns |= {"time_s": _or_missing(readings.time_s, (count,))}
+    columns |= {f"q{j + 1}": readings.joint_angles[:, j] for j in range(joints)}
+    columns |= dict(zip(WRENCH_NAMES, readings.wrench.T, strict=True))
+    columns |= dict(zip("xyz", position.T, strict=True))
+    for stage, residual in (("before", before), ("after", after)):
+        whole = np.full((count, 6), np.nan)
+        whole[:, : residual.shape[1]] = residual
+        columns |= {f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)}
+    return columns
+
+
+def _or_missing(values, shape):
+    return np.full(shape, np.nan) if values is None else values
+
+
+def _or_none(values):
+    return None if np.isnan(values).all() else values

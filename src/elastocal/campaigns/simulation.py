@@ -1,0 +1,93 @@
+"""Campaigns of a simulated robot: ladders of loads at random poses, read with noise, as a calibrator would measure them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.elastostatics import generalized_forces, wrench_of_offset_force
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.random_streams import stream
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is measured.
+
+    Attributes
+    ----------
+    points : tuple of str
+        Measuring points with a target each.
+    poses : int
+    force_N : float
+        Largest force of the ladder; the direction is random in each pose.
+    ladder : tuple of float
+        Shares of it, 0 first: each is a load.
+    offset_m : tuple of float
+        From the end-effector to where the force acts, base axes.
+    repeats, repeated_poses : int
+        How often the loads 0 and 1 of the first poses are approached.
+    noise_m, noise_rad : float
+        Standard deviation of each component of a reading.
+    """
+
+    points: tuple
+    poses: int
+    force_N: float
+    ladder: tuple
+    offset_m: tuple
+    repeats: int
+    repeated_poses: int
+    noise_m: float
+    noise_rad: float
+
+
+def simulated_measurements(robot, plan, seed, name):
+    """Readings of a robot with elastic joints and, where it has them, elastic links.
+
+    Parameters
+    ----------
+    robot : Robot
+    plan : Plan
+    seed : int
+    name : str
+        Of the campaign; part of the name of the random stream.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Columns of a file of measurements.
+    """
+    draws = stream(seed, name, "campaign", 0)
+    low, high = robot.joint_limits.T
+    angles = low + (high - low) * draws.random((plan.poses, robot.joints))
+    direction = draws.standard_normal((plan.poses, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    visits = [
+        (pose, load, repeat)
+        for pose in range(plan.poses)
+        for load in range(len(plan.ladder))
+        for repeat in range(plan.repeats if pose < plan.repeated_poses and load < 2 else 1)
+    ]
+    pose, load, repeat = np.array(visits).T
+    force = plan.force_N * np.array(plan.ladder)[load, None] * direction[pose]
+    wrench = wrench_of_offset_force(force, plan.offset_m)
+    chain = extended_chain(robot)
+    coordinates = np.zeros((len(pose), chain.coordinates))
+    coordinates[:, : robot.joints] = angles[pose]
+    jacobian = poses_and_jacobians(chain, coordinates, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
+    bent = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(robot)
+    parts = []
+    for point in plan.points:
+        position, rotation = poses(chain, bent, chain.point(point))
+        position = position + plan.noise_m * draws.standard_normal(position.shape)
+        turned = Rotation.from_rotvec(plan.noise_rad * draws.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
+        part = {"pose": pose, "load": load, "repeat": repeat, "target": np.full(len(pose), point)}
+        part |= {f"q{joint + 1}": angles[pose, joint] for joint in range(robot.joints)}
+        part |= dict(zip(WRENCH_NAMES, wrench.T, strict=True))
+        part |= dict(zip("xyz", position.T, strict=True))
+        part |= dict(zip(("rx", "ry", "rz"), turned.as_rotvec().T, strict=True))
+        parts.append(part)
+    return {column: np.concatenate([part[column] for part in parts]) for column in parts[0]}

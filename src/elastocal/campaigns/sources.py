@@ -1,0 +1,71 @@
+"""Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
+
+import re
+
+from elastocal.campaigns.campaign import DOCUMENT, read_descriptions
+from elastocal.errors import InputError
+from elastocal.io.documents import document_path, named_document
+
+
+def campaign_sources(config, folder, source="config.yaml"):
+    """Where the campaigns that a configuration names come from.
+
+    Parameters
+    ----------
+    config : dict
+        Checked.
+    folder : str or Path
+        Holds ``campaigns/`` and ``robots/``.
+    source : str
+        File of the configuration, named in errors.
+
+    Returns
+    -------
+    dict of str to dict
+        Documents by the names of their files; a simulated one has the document of its robot under ``robot_document``.
+
+    Raises
+    ------
+    InputError
+        The first fault found.
+    """
+    found = {}
+    for name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+        document = named_document(folder, "campaigns", "campaign_source", name, source)
+        if document["source"] == "simulated":
+            path = document_path(folder, "campaigns", name)
+            document["robot_document"] = named_document(folder, "robots", "robot", document["robot"], path)
+            named_document(folder, "robots", "robot", document["declared_robot"], path)
+        found[name] = document
+    return found
+
+
+def user_campaign(config, robots_folder):
+    """A user's own campaign, checked as a whole before any job starts.
+
+    Parameters
+    ----------
+    config : dict
+        ``campaign`` is its folder.
+    robots_folder : str or Path
+
+    Returns
+    -------
+    dict of str to str
+        Its folder by its name; empty where there is none.
+
+    Raises
+    ------
+    InputError
+        A name that no file can have or that a campaign of this project has.
+    """
+    folder = config.get("campaign")
+    if not folder:
+        return {}
+    document, _ = read_descriptions(folder, robots_folder)
+    name, source = document["campaign"], f"{folder}/{DOCUMENT}"
+    if not re.fullmatch(r"[\w.-]+", name):
+        raise InputError(source, "campaign", repr(name), "letters, digits, _, - and . for the name of its folder of results")
+    if name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+        raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
+    return {name: str(folder).rstrip("/")}

@@ -1,0 +1,507 @@
+"""Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the readings then fit.
+
+One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the readings as written are
+absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
+targets that stand elsewhere, then two changes together. Senses, axes and units are facts, not parameters: each is tried, none
+is fitted.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from itertools import combinations, permutations, product
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.data_checks.placement import (
+    FAR_BETTER,
+    IMPLAUSIBLE_M,
+    IMPLAUSIBLE_RAD,
+    placed,
+    rms,
+    robustly_placed,
+    spread,
+    trimmed_rms,
+)
+from elastocal.data_checks.protocol import Fault, Value
+
+NAMES, FAMILY, AFTER = (
+    ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target"),
+    "data",
+    ("constant_columns",),
+)
+
+# Poses enough to compare some two hundred hypotheses.
+_POSES = 40
+# What a correction leaves as it is may come out this much larger by chance.
+_NO_WORSE = 1.2
+# Hypotheses whose misfits differ by less than this share, or by less than a tracker could tell, fit alike.
+_ALIKE, _ALIKE_M = 1.1, 1e-4
+_MOST_ALIKE = 5
+# A base that stands less far off than this may be the zero of the first joint or the height of the column: for physics to
+# tell, and a warning here. Ten times what geometric errors of industrial robots reach.
+_NEAR_M, _NEAR_RAD = 0.05, 0.05
+# Faults that are mended one after the other.
+_ROUNDS = 3
+# Metres for each unit that people write for metres.
+_LENGTHS = {
+    "millimetres": 1e-3,
+    "centimetres": 1e-2,
+    "decimetres": 0.1,
+    "inches": 0.0254,
+    "feet": 0.3048,
+    "tenths of what they should be": 10.0,
+    "hundredths of what they should be": 100.0,
+    "thousandths of what they should be": 1e3,
+}
+# What rotation vectors were multiplied by before they were written.
+_TURNS = {
+    0.5: "halves of what they should be",
+    2.0: "doubles of what they should be",
+    180 / np.pi: "degrees",
+    np.pi / 180: "radians converted twice",
+}
+# Angles that people write for a rotation vector, as letters of scipy: capital ones turn about the moved axes.
+_EULER = {"XYZ": "Euler angles about the moved x, y, z", "xyz": "angles about the fixed x, y, z (roll, pitch, yaw)"}
+
+
+@dataclass(frozen=True)
+class Change:
+    """One way in which the file may have to be read otherwise.
+
+    Attributes
+    ----------
+    name : str
+        Of the fault that it would be.
+    detail : str
+        One sentence in plain words.
+    correct : callable
+        ``(campaign, readings)`` to those read otherwise.
+    joints : tuple of int
+        From 1.
+    parameters : tuple of Value
+    placement : {"", "frame", "targets"}
+        What it fits; its sentence and its numbers then come from the fit.
+    """
+
+    name: str
+    detail: str
+    correct: Callable = field(compare=False)
+    joints: tuple = ()
+    parameters: tuple = ()
+    placement: str = ""
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What is left of positions (m) and orientations (rad)."""
+
+    position_m: float
+    orientation_rad: float
+
+    @property
+    def together(self):
+        """Both as a length, m."""
+        return float(np.hypot(self.position_m, IMPLAUSIBLE_M / IMPLAUSIBLE_RAD * self.orientation_rad))
+
+    @property
+    def implausible(self):
+        """Whether no geometric error and no deflection could make it."""
+        return self.position_m > IMPLAUSIBLE_M or self.orientation_rad > IMPLAUSIBLE_RAD
+
+
+def find(campaign, readings):
+    """The simplest ways to read the file otherwise that let absurd readings fit.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    list of Fault
+        Each beside the alternatives that fit as well.
+    """
+    some = spread(readings, _POSES)
+    found = _one_after_the_other(campaign, some)
+    if found or campaign.measured == "position":
+        return found
+    # Where orientations do not go with positions in any way, positions alone may still tell.
+    found = _one_after_the_other(replace(campaign, measured="position"), replace(some, rotation_vector=None))
+    return [replace(fault, detail=f"{fault.detail} (positions alone: orientations do not go with them)") for fault in found]
+
+
+def _one_after_the_other(campaign, some):
+    campaign, found = replace(campaign, readings=some), []
+    for _ in range(_ROUNDS):
+        new, campaign, some = _mended(campaign, some)
+        known = {(fault.name, fault.detail) for fault in found}
+        new = [fault for fault in new if (fault.name, fault.detail) not in known]
+        found += new
+        if not any(fault.decisive for fault in new):
+            break
+    return found
+
+
+def single_changes(campaign):
+    """Every discrete change that is tried alone.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    list of Change
+        The commonest mistakes first: of two that fit alike the first is named.
+    """
+    oriented = campaign.measured == "pose"
+    found = [*_senses(campaign.robot.joints), *_lengths_of_positions(), *_lengths_of_targets(campaign)]
+    if oriented:
+        found += _rotations()
+    return [*found, *_axes(campaign.frame == "tracker" and not oriented, oriented)]
+
+
+def placements(campaign):
+    """Changes that fit where the base or the targets are, as far as the campaign says that it knows them.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    list of Change
+    """
+    found = []
+    if campaign.frame == "base":
+        found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
+    if any(target.offset_m is not None for target in campaign.targets):
+
+        def unknown(campaign, readings):
+            seen = set(readings.target.tolist())
+            targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
+            return replace(campaign, targets=tuple(targets)), readings
+
+        found.append(Change("wrong_target", "", unknown, placement="targets"))
+    return found
+
+
+def pairs(campaign):
+    """Two changes at once, where neither alone lets the readings fit.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    list of tuple of Change
+    """
+    placed_elsewhere = placements(campaign)
+    found = [tuple(placed_elsewhere)] if len(placed_elsewhere) == 2 else []
+    for change in placed_elsewhere:
+        if change.placement == "frame":
+            oriented = campaign.measured == "pose"
+            found += [(change, other) for other in single_changes(replace(campaign, frame="tracker"))]
+            if oriented:
+                found += [(change, other) for other in _axes(True, False)]
+    return [*found, *combinations(_single_senses(campaign.robot.joints), 2)]
+
+
+def _mended(campaign, readings):
+    """Faults of the simplest alternative that mends the readings, and campaign and readings as they are then read."""
+    written = robustly_placed(campaign, readings)
+    # All readings but a few, or all: a joint may move in a few poses only.
+    measures = [measure for measure in (trimmed_rms, rms) if _misfit(written, measure).implausible]
+    if not measures:
+        return [], campaign, readings
+    one, fitted = [(change,) for change in single_changes(campaign)], [(change,) for change in placements(campaign)]
+    for stages in ((one, fitted), (pairs(campaign),)):
+        tried = [[_tried(campaign, readings, changes) for changes in stage] for stage in stages]
+        for measure in measures:
+            before = _misfit(written, measure)
+            winners = [winner for stage in tried if (winner := _winner(stage, before, measure))]
+            # What is fitted is preferred to what is discrete only where it is far better.
+            winner = winners[0] if winners else None
+            for other in winners[1:]:
+                if other.after.together < winner.after.together / FAR_BETTER:
+                    winner = other
+            if winner:
+                return winner.faults(written, before, readings), winner.tried.campaign, winner.tried.readings
+    return [], campaign, readings
+
+
+@dataclass(frozen=True)
+class _Tried:
+    changes: tuple
+    campaign: object
+    readings: object
+    placement: object
+
+
+def _tried(campaign, readings, changes):
+    for change in changes:
+        campaign, readings = change.correct(campaign, readings)
+    return _Tried(changes, campaign, readings, placed(campaign, readings))
+
+
+@dataclass(frozen=True)
+class _Winner:
+    tried: _Tried
+    placement: object
+    after: Misfit
+    evidence: tuple
+    alike: tuple
+
+    def faults(self, written, before, readings):
+        """One fault for each change."""
+        found = []
+        for change in self.tried.changes:
+            detail, parameters, decisive = change.detail, change.parameters, True
+            if change.placement == "frame":
+                detail, parameters, decisive = _frame_told(self.placement.estimate, before, self.after)
+            if change.placement == "targets":
+                detail, parameters = _targets_told(self.tried.campaign.targets, written.estimate, self.placement.estimate)
+            parameters = (*parameters, Value("poses compared", float(len(np.unique(readings.pose))), "–"))
+            alike = self.alike if len(self.tried.changes) == 1 else ()
+            found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
+        return found
+
+
+def _winner(tried, before, measure):
+    """The first of the alternatives that fit best, if it convinces."""
+    if not tried:
+        return None
+    misfits = [_misfit(one.placement, measure) for one in tried]
+    together = np.array([misfit.together for misfit in misfits])
+    # One of two faults may concern positions alone, or orientations alone.
+    keys = (
+        together,
+        *(
+            np.array([getattr(misfit, name) for misfit in misfits]) + 1e-3 * together
+            for name in ("position_m", "orientation_rad")
+        ),
+    )
+    for key in keys:
+        alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
+        best = tried[alike[0]]
+        placement = robustly_placed(best.campaign, best.readings)
+        after = _misfit(placement, measure)
+        evidence = _evidence(before, after, _extent(placement, best.readings))
+        if evidence:
+            others = [
+                tried[number].changes[0].detail for number in alike[1 : 1 + _MOST_ALIKE] if len(tried[number].changes) == 1
+            ]
+            return _Winner(best, placement, after, evidence, tuple(detail for detail in others if detail))
+    return None
+
+
+def _misfit(placement, measure):
+    return Misfit(measure(placement.distance), 0.0 if placement.turn is None else measure(placement.turn))
+
+
+def _extent(placement, readings):
+    """RMS distance of the predicted places of a target from their middle, m."""
+    largest = 0.0
+    for group in np.unique(np.column_stack([readings.session, readings.target]), axis=0):
+        points = placement.predicted[(readings.session == group[0]) & (readings.target == group[1])]
+        largest = max(largest, rms(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    return largest
+
+
+def _evidence(written, corrected, extent_m):
+    """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
+    positions = written.position_m, corrected.position_m
+    orientations = written.orientation_rad, corrected.orientation_rad
+    # Where the robot hardly moves, anything that gathers the readings in one place would fit.
+    limit = min(IMPLAUSIBLE_M, extent_m / FAR_BETTER)
+    for (before, after), (other_before, other_after), implausible, needed, plausible in (
+        (positions, orientations, IMPLAUSIBLE_M, limit, IMPLAUSIBLE_RAD),
+        (orientations, positions, IMPLAUSIBLE_RAD, IMPLAUSIBLE_RAD, IMPLAUSIBLE_M),
+    ):
+        improved = before > implausible and after < min(before / FAR_BETTER, needed)
+        if improved and other_after <= max(_NO_WORSE * other_before, plausible):
+            return before, after
+    return None
+
+
+def _senses(joints):
+    """Joints counted the other way round, or from their neighbours."""
+    unit, found = np.eye(joints), _single_senses(joints)
+    for j in range(joints - 1):
+        for sign, word in ((1.0, "added to"), (-1.0, "taken from")):
+            detail = f"joint {j + 2} is counted from joint {j + 1}: readings fit with the angle of joint {j + 1} {word} it"
+            matrix = unit + sign * np.outer(unit[j + 1], unit[j])
+            found.append(Change("wrong_sign", detail, _with_angles(matrix), (j + 1, j + 2)))
+    return found
+
+
+def _single_senses(joints):
+    return [
+        Change(
+            "wrong_sign",
+            f"joint {j + 1} has the wrong sense: readings fit with its sign turned",
+            _with_angles(np.diag(1.0 - 2.0 * np.eye(joints)[j])),
+            (j + 1,),
+        )
+        for j in range(joints)
+    ]
+
+
+def _lengths_of_positions():
+    found = []
+    for unit, metres in _LENGTHS.items():
+        detail = f"the positions look like {unit}: readings fit {metres:g} times the written positions"
+        factor = Value("metres for each unit of position written", metres, "m")
+        found.append(Change("wrong_unit", detail, _with_positions(metres * np.eye(3)), (), (factor,)))
+    return found
+
+
+def _lengths_of_targets(campaign):
+    """Of all targets, or of one where there are several."""
+    known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
+    groups = [known, *([name] for name in known if len(known) > 1)] if known else []
+    found = []
+    for names, (unit, metres) in product(groups, _LENGTHS.items()):
+        which = (
+            "the target offset" if len(known) == 1 else "the target offsets" if names == known else f"the offset of {names[0]}"
+        )
+        looks = "looks" if len(names) == 1 else "look"
+        detail = f"{which} {looks} like {unit}: readings fit {metres:g} times what is written for {', '.join(names)}"
+        factor = Value("metres for each unit of target offset written", metres, "m")
+        found.append(Change("wrong_unit", detail, _with_offsets(names, metres), (), (factor,)))
+    return found
+
+
+def _rotations():
+    detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
+    found = [Change("wrong_sign", detail, _with_rotations(np.negative))]
+    for factor, words in _TURNS.items():
+        detail = f"the rotation vectors look like {words}: readings fit {1 / factor:.4g} times the written rotation vectors"
+        value = Value("radians for each unit of rotation vector written", 1 / factor, "rad")
+        found.append(Change("wrong_unit", detail, _with_rotations(lambda turned, factor=factor: turned / factor), (), (value,)))
+    for letters, words in _EULER.items():
+
+        def vectors(turned, letters=letters):
+            return Rotation.from_euler(letters, turned).as_rotvec()
+
+        detail = f"the columns of the rotation vector look like {words}, in rad"
+        found.append(Change("wrong_unit", detail, _with_rotations(vectors)))
+    return found
+
+
+def _axes(mirrored_only, oriented):
+    """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
+    if mirrored_only:
+        detail = "the readings are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
+        return [Change("swapped_axes", detail, _with_positions(np.diag([1.0, 1.0, -1.0])))]
+    ways = [
+        np.array(signs)[:, None] * np.eye(3)[list(order)]
+        for order in permutations(range(3))
+        for signs in product((1.0, -1.0), repeat=3)
+    ]
+    ways.sort(key=lambda matrix: np.abs(matrix - np.eye(3)).sum())
+    found = []
+    for matrix in ways[1:]:
+        detail = f"the axes are exchanged: readings fit with {_axes_told(matrix)}"
+        found.append(Change("swapped_axes", detail, _with_positions(matrix)))
+        handed = np.linalg.det(matrix)
+        for sign in sorted({1.0, handed}) if oriented else ():
+            turned = _with_positions_and_rotations(matrix, sign * matrix)
+            words = f"{detail}, and their rotation vectors likewise{', turned round' if sign * handed > 0 > handed else ''}"
+            found.append(Change("swapped_axes", words, turned))
+    return found
+
+
+def _axes_told(matrix):
+    """Such as ``x = -y, y = x``: what is to be read for the axes that change."""
+    told = []
+    for axis, row in zip("xyz", matrix, strict=True):
+        source = int(np.argmax(np.abs(row)))
+        written = f"{'-' if row[source] < 0 else ''}{'xyz'[source]}"
+        if written != axis:
+            told.append(f"{axis} = {written}")
+    return ", ".join(told)
+
+
+def _with_angles(matrix):
+    def correct(campaign, readings):
+        # The sign of a column of the file, which counts from where the controller counts.
+        reported = campaign.robot.reported_angles(readings.joint_angles)
+        return campaign, replace(readings, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
+
+    return correct
+
+
+def _with_positions(matrix):
+    return _with_positions_and_rotations(matrix, None)
+
+
+def _with_positions_and_rotations(matrix, turning):
+    def correct(campaign, readings):
+        vectors = readings.rotation_vector
+        vectors = vectors if turning is None or vectors is None else vectors @ turning.T
+        return campaign, replace(readings, position=readings.position @ matrix.T, rotation_vector=vectors)
+
+    return correct
+
+
+def _with_rotations(function):
+    def correct(campaign, readings):
+        return campaign, replace(readings, rotation_vector=function(readings.rotation_vector))
+
+    return correct
+
+
+def _with_offsets(names, factor):
+    def correct(campaign, readings):
+        targets = [
+            replace(target, offset_m=tuple(factor * value for value in target.offset_m)) if target.name in names else target
+            for target in campaign.targets
+        ]
+        return replace(campaign, targets=tuple(targets)), readings
+
+    return correct
+
+
+def _frame_told(estimate, before, after):
+    """Sentence and numbers of a base that stands elsewhere, and whether that is too far for physics."""
+    parameters, away, turned = [], 0.0, 0.0
+    for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
+        vector = Rotation.from_matrix(rotation).as_rotvec()
+        of = f"of the base in the frame of {f'session {session}' if len(estimate.sessions) > 1 else 'the readings'}"
+        parameters += [Value(f"{axis} {of}", float(value), "m") for axis, value in zip("xyz", position, strict=True)]
+        parameters += [
+            Value(f"rotation vector {axis} {of}", float(value), "rad") for axis, value in zip("xyz", vector, strict=True)
+        ]
+        away, turned = max(away, float(np.linalg.norm(position))), max(turned, float(np.linalg.norm(vector)))
+    distance = f"{away:.3g} m" if away >= 0.1 else f"{1e3 * away:.2g} mm"
+    where = f"{distance} away, turned by {np.degrees(turned):.3g}°"
+    if away > _NEAR_M or turned > _NEAR_RAD:
+        return f"readings do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
+    better = before.together / max(after.together, 1e-12)
+    return f"readings would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
+
+
+def _targets_told(targets, written, fitted):
+    parameters, farthest, turned = [], ("", 0.0), 0.0
+    for number, target in enumerate(targets):
+        offset = fitted.target_offset[number]
+        vector = Rotation.from_matrix(fitted.target_rotation[number]).as_rotvec()
+        away = float(np.linalg.norm(offset - written.target_offset[number]))
+        turned = max(turned, float(np.linalg.norm(vector)))
+        farthest = max(farthest, (target.name, away), key=lambda pair: pair[1])
+        parameters += [
+            Value(f"{target.name} offset {axis}", float(value), "m") for axis, value in zip("xyz", offset, strict=True)
+        ]
+        if vector.any():
+            parameters += [
+                Value(f"{target.name} rotation vector {axis}", float(value), "rad")
+                for axis, value in zip("xyz", vector, strict=True)
+            ]
+    name, away = farthest
+    words = f"{name} would sit {1e3 * away:.3g} mm from there" if away > IMPLAUSIBLE_M else ""
+    words += f"{' and ' if words else 'it would be '}turned by {np.degrees(turned):.3g}°" if turned > IMPLAUSIBLE_RAD else ""
+    return f"targets do not sit where the campaign says: {words}", tuple(parameters)

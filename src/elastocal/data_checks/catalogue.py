@@ -1,0 +1,61 @@
+"""All faults that are looked for: each module of this package that has NAMES."""
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+import elastocal.data_checks
+
+
+@cache
+def fault_modules():
+    """Modules that look for faults by their own names, each behind those that it comes after.
+
+    Returns
+    -------
+    dict of str to module
+    """
+    names = sorted(module.name for module in pkgutil.iter_modules(elastocal.data_checks.__path__))
+    modules = {name: import_module(f"elastocal.data_checks.{name}") for name in names}
+    waiting = {name: module for name, module in modules.items() if hasattr(module, "NAMES")}
+    ordered = {}
+    while waiting:
+        ready = [name for name, module in waiting.items() if not set(module.AFTER) & set(waiting)]
+        if not ready:
+            raise ValueError(f"faults that come after each other: {', '.join(waiting)}")
+        ordered |= {name: waiting.pop(name) for name in ready}
+    return ordered
+
+
+def known_faults():
+    """Names of all faults that may be found.
+
+    Returns
+    -------
+    set of str
+    """
+    return {name for module in fault_modules().values() for name in module.NAMES}
+
+
+def faults(campaign, readings):
+    """Every fault that some readings show.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    tuple of Fault
+        A fault is not looked for where another one makes that meaningless: see `faults.protocol`.
+    """
+    found, decisive = [], set()
+    for name, module in fault_modules().items():
+        if decisive & set(module.AFTER):
+            continue
+        new = module.find(campaign, readings)
+        found += new
+        if any(fault.decisive for fault in new):
+            decisive.add(name)
+    return tuple(found)

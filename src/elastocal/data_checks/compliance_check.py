@@ -1,0 +1,68 @@
+"""Joint compliances that no robot has: negative, or many times off what its data sheet says."""
+
+import numpy as np
+
+from elastocal.data_checks.placement import IMPLAUSIBLE_M
+from elastocal.fitting.model import joint_compliances
+
+# Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
+# that was taken for a joint's.
+MOST_OFF_NOMINAL = 5.0
+# So many standard errors beyond what robots have are no chance.
+_SURE = 2.0
+
+
+def fitted_compliance_warnings(fitted):
+    """`compliance_warnings` of a fit.
+
+    Parameters
+    ----------
+    fitted : Fit
+
+    Returns
+    -------
+    list of str
+        None where compliances are not identified, nor where readings are wrong by centimetres: they mean nothing there.
+    """
+    model = fitted.model
+    off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())
+    if not model.identifies_compliance or off > IMPLAUSIBLE_M:
+        return []
+    mine = [owner == "joint_compliance" for owner, _ in fitted.parameters]
+    deviations = np.sqrt(np.diag(fitted.covariance))[mine]
+    return compliance_warnings(joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance)
+
+
+def compliance_warnings(compliance, std_error, nominal):
+    """Name the identified joint compliances that are negative, or far off nominal either way.
+
+    Parameters
+    ----------
+    compliance, std_error : array_like (n,)
+        Identified, rad/(N m); standard error 0 where a compliance was not identified.
+    nominal : array_like (n,)
+        Of the robot file.
+
+    Returns
+    -------
+    list of str
+        One sentence with value and standard error of each, or none.
+    """
+    compliance, std_error, nominal = (1e6 * np.asarray(values, float) for values in (compliance, std_error, nominal))
+    low, high = nominal / MOST_OFF_NOMINAL, MOST_OFF_NOMINAL * nominal
+    beyond = np.maximum(low - compliance, compliance - high)
+    named = [
+        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint])}"
+        f"{'' if beyond[joint] > _SURE * std_error[joint] else ', perhaps by chance'})"
+        for joint in np.flatnonzero((std_error > 0) & (beyond > 0))
+    ]
+    if not named:
+        return []
+    return [
+        f"joint compliances beyond what robots have, in µrad/(N·m): {', '.join(named)};"
+        " check the sign and the unit of the loads, and whether something else yields too"
+    ]
+
+
+def _off(value, nominal):
+    return f"negative, nominal {nominal:.3g}" if value < 0 else f"{value / nominal:.2g} times nominal"

@@ -1,0 +1,59 @@
+"""Positions that stay where they are while the robot moves, or joint angles that do not move while the readings do."""
+
+import numpy as np
+
+from elastocal.data_checks.placement import IMPLAUSIBLE_M, placed, spread
+from elastocal.data_checks.protocol import Fault, Value
+
+NAMES, FAMILY, AFTER = ("constant_columns",), "data", ()
+
+# Below the last digit that any sensor writes (0.1 µm) and any controller reports (1e-6 rad or so).
+_SAME_M, _SAME_RAD = 1e-6, 1e-6
+_FEWEST_POSES = 3
+
+
+def find(campaign, readings):
+    """Columns that are the same in all poses and cannot be.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    list of Fault
+        One for each kind, of the first target that shows it.
+    """
+    some = spread(readings)
+    predicted = placed(campaign, some).predicted
+    found = []
+    for group in np.unique(np.column_stack([some.session, some.target]), axis=0):
+        members = (some.session == group[0]) & (some.target == group[1])
+        poses = len(np.unique(some.pose[members]))
+        if poses < _FEWEST_POSES:
+            continue
+        measured, angles = some.position[members], some.joint_angles[members]
+        # Standard deviations along the main axes, the smallest first: a plane seen in its own axes has one constant column.
+        needed = _extents(predicted[members])
+        still = np.ptp(measured, axis=0) < _SAME_M
+        count = Value("poses", float(poses), "–")
+        who = campaign.targets[group[1]].name
+        if still.any() and needed[still.sum() - 1] > IMPLAUSIBLE_M:
+            axes = ", ".join(np.array(list("xyz"))[still])
+            verb = "are" if still.sum() > 1 else "is"
+            where = "zero" if not measured[:, still].any() else "the same"
+            detail = f"{axes} of {who} {verb} {where} in all {poses} poses, though by its joint angles the robot moved"
+            found.append(Fault(NAMES[0], (), detail, (count,), (float(needed[-1]), 0.0), (), True))
+        moved = _extents(measured)[-1]
+        if np.ptp(angles, axis=0).max() < _SAME_RAD and moved > IMPLAUSIBLE_M:
+            detail = f"the joint angles are the same in all {poses} poses, though the readings of {who} lie {moved:.2g} m apart"
+            found.append(Fault(NAMES[0], (), detail, (count,), (float(moved), 0.0), (), True))
+    # One of each kind speaks for all targets.
+    return list({fault.detail.split(" of ")[0]: fault for fault in reversed(found)}.values())
+
+
+def _extents(points):
+    """Standard deviations of points along their main axes, rising, ndarray (3,), m."""
+    off = points - points.mean(axis=0)
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))

@@ -1,0 +1,365 @@
+"""What the loads did to the robot, beside what the written loads should have done by its nominal compliances.
+
+No NAMES: what the faults of loads have in common.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
+from elastocal.fitting.least_squares import solve_identifiable
+from elastocal.fitting.observations import state_clusters
+from elastocal.mechanics.elastostatics import generalized_forces, regressor
+from elastocal.mechanics.kinematics import poses_and_jacobians
+
+_GRAVITY, _POUND = 9.80665, 4.4482216
+_MANY_POSES = 150
+# Compliances of a robot and those of its data sheet differ by no more; all together by less.
+_RATIO, _MEAN_RATIO = 1.7, 1.35
+# A joint says something if its compliance is known so well, and so many joints must.
+_WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
+# As written the deflections must fit so much worse, and corrected loads must explain that share of them.
+_FAR_WORSE, _UNEXPLAINED = 2.0, 0.5
+_FEWEST_POSES = 4
+_ROUNDING_M = 1e-9
+# Compliances are sought only within these multiples of the nominal ones.
+_RATIOS_OF_ROBOTS = 0.3, 3.0
+_APART, _REJECTIONS = 6.0, 4
+# Below this share of their square, loads of one pose do not differ.
+_DIFFERING = 1e-6
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Units in which loads may have been written.
+
+    Attributes
+    ----------
+    force, moment : float
+        N and N m for each unit written.
+    detail : str
+        Empty for N and N m themselves.
+    """
+
+    force: float
+    moment: float
+    detail: str
+
+
+UNITS = (
+    Unit(1.0, 1.0, ""),
+    Unit(_GRAVITY, _GRAVITY, "the loads look like kilogram-force: readings fit 9.81 times the written loads"),
+    Unit(1 / _GRAVITY, 1 / _GRAVITY, "readings fit the written loads over 9.81, as if they had been converted twice"),
+    Unit(1e3, 1e3, "the loads look like kilonewtons: readings fit 1000 times the written loads"),
+    Unit(1e-3, 1e-3, "the loads look like millinewtons: readings fit a thousandth of the written loads"),
+    Unit(_POUND, _POUND, "the loads look like pounds-force: readings fit 4.45 times the written loads"),
+    Unit(1 / _POUND, 1 / _POUND, "readings fit the written loads over 4.45, as if they had been converted twice"),
+    Unit(1.0, 1e-3, "the moments look like newton millimetres: readings fit a thousandth of the written moments"),
+    Unit(1e3, 1.0, "the forces look like kilonewtons: readings fit 1000 times the written forces"),
+    Unit(_GRAVITY, 1.0, "the forces look like kilogram-force: readings fit 9.81 times the written forces"),
+)
+
+
+@dataclass(frozen=True)
+class Deflections:
+    """Deflections, and what each joint should have made of them; rows are the coordinates of the readings.
+
+    Attributes
+    ----------
+    seen : ndarray (R,)
+        m.
+    by_force, by_moment : ndarray (R, n)
+        Part of each joint at its nominal compliance, m.
+    poses : int
+        Behind the rows.
+    """
+
+    seen: np.ndarray
+    by_force: np.ndarray
+    by_moment: np.ndarray
+    poses: int
+
+
+@dataclass(frozen=True)
+class UnitFound:
+    """Sign and unit in which the loads explain the deflections.
+
+    Attributes
+    ----------
+    sign : float
+        +1, or -1 where the loads are turned round.
+    unit : Unit
+    slope : float
+        Deflection seen over the one expected as written, the mean over the joints.
+    rms_as_written, rms_corrected : float
+        Residual at nominal compliances, m.
+    """
+
+    sign: float
+    unit: Unit
+    slope: float
+    rms_as_written: float
+    rms_corrected: float
+
+
+def deflections(campaign, readings):
+    """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    Deflections or None
+        None without loads, or with too few poses.
+    """
+    if not readings.wrench.any():
+        return None
+    readings = _some_poses(readings)
+    # Frames and targets from the lowest loads: those of a wrong unit must not enter.
+    estimate = robustly_placed(campaign, spread(readings)).estimate
+    residual, jacobian, end, rotation, origin = _linearized(campaign, readings, estimate)
+    at_rest = readings.wrench.copy()
+    parts = []
+    for part in (slice(0, 3), slice(3, 6)):
+        wrench = np.zeros_like(at_rest)
+        wrench[:, part] = readings.wrench[:, part]
+        parts.append(regressor(jacobian, generalized_forces(end, wrench)) * campaign.robot.compliance)
+    pose = state_clusters(readings)
+    count = int(pose.max()) + 1
+    if count < _FEWEST_POSES:
+        return None
+    group = pose * len(campaign.targets) + readings.target
+    centred = [_centred(values, group) for values in (residual[..., None], *parts)]
+    whole = sum((part**2).sum() for part in parts)
+    if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * whole:
+        centred = _off_geometry(campaign, readings, residual, parts, jacobian, rotation, origin)
+    flat = [values.reshape(3 * len(readings), -1) for values in centred]
+    return Deflections(flat[0][:, 0], flat[1], flat[2], count)
+
+
+def unit_of_loads(bent):
+    """The sign and unit that explain the deflections far better than the loads as written.
+
+    Parameters
+    ----------
+    bent : Deflections
+
+    Returns
+    -------
+    UnitFound or None
+        None where the loads as written do, or where nothing does.
+    """
+    as_written = bent.by_force + bent.by_moment
+    best = None
+    for unit in UNITS:
+        corrected = unit.force * bent.by_force + unit.moment * bent.by_moment
+        fitted = _ratios(bent, corrected)
+        if fitted is None:
+            continue
+        ratios, kept, rms_free = fitted
+        sign = float(np.sign(ratios.sum()))
+        mean = np.exp(np.log(np.abs(ratios)).mean())
+        scaled = np.abs(np.log(ratios / sign / mean)) if (ratios * sign > 0).all() else np.array([np.inf])
+        if scaled.max() > np.log(_RATIO) or abs(np.log(mean)) > np.log(_MEAN_RATIO):
+            continue
+        before = rms((bent.seen - as_written.sum(axis=1))[kept])
+        after = rms((bent.seen - sign * corrected.sum(axis=1))[kept])
+        if rms_free > _UNEXPLAINED * rms(bent.seen[kept]) or before < _FAR_WORSE * after:
+            continue
+        if best is None or after < 0.9 * best.rms_corrected:
+            along = as_written[kept].sum(axis=1)
+            slope = float(along @ bent.seen[kept] / (along @ along))
+            best = UnitFound(sign, unit, slope, before, after)
+    return best
+
+
+@dataclass(frozen=True)
+class StateDeflections:
+    """Loaded less unloaded mean of each target, for S loaded states; zero where a target was not read.
+
+    Attributes
+    ----------
+    wrench : ndarray (S, 6)
+    seen : ndarray (S, T, 3)
+        m.
+    jacobian : ndarray (S, T, 3, n)
+        Of the targets.
+    end_jacobian : ndarray (S, 6, n)
+    targets : ndarray (S,)
+        How many were read.
+    rows : tuple of tuple of int
+        Loaded rows of the file behind each state.
+    """
+
+    wrench: np.ndarray
+    seen: np.ndarray
+    jacobian: np.ndarray
+    end_jacobian: np.ndarray
+    targets: np.ndarray
+    rows: tuple
+
+    def misfits(self, compliance, seen=None):
+        """RMS over the targets of what the load of each state (columns) leaves of the deflections of each state (rows).
+
+        Parameters
+        ----------
+        compliance : ndarray (n,)
+            rad/(N m).
+        seen : ndarray (S, T, 3), optional
+            Other deflections.
+
+        Returns
+        -------
+        ndarray (S, S)
+            m.
+        """
+        seen = self.seen if seen is None else seen
+        per_wrench = (self.jacobian * compliance) @ self.end_jacobian[:, None].transpose(0, 1, 3, 2)
+        linear = np.einsum("stck,stc->sk", per_wrench, seen)
+        square = np.einsum("stck,stcl->skl", per_wrench, per_wrench)
+        products = np.einsum("ik,il->ikl", self.wrench, self.wrench).reshape(len(self.wrench), -1)
+        total = (seen**2).sum(axis=(1, 2))[:, None] - 2 * linear @ self.wrench.T
+        total += square.reshape(len(square), -1) @ products.T
+        return np.sqrt(np.maximum(total, 0.0) / self.targets[:, None])
+
+    def sizes(self):
+        """RMS over the targets of the deflections of each state, ndarray (S,), m."""
+        return np.sqrt((self.seen**2).sum(axis=(1, 2)) / self.targets)
+
+    def compliance(self, states, loads, nominal):
+        """Compliances that fit the deflections of some states best under some loads, near the nominal ones.
+
+        Parameters
+        ----------
+        states, loads : ndarray of int (K,)
+        nominal : ndarray (n,)
+
+        Returns
+        -------
+        ndarray (n,)
+        """
+        torques = generalized_forces(self.end_jacobian[states], self.wrench[loads]) * nominal
+        left = (self.jacobian[states] * torques[:, None, None, :]).reshape(-1, len(nominal))
+        ratios = np.linalg.lstsq(left, self.seen[states].reshape(-1), rcond=1e-6)[0]
+        return nominal * np.clip(ratios, *_RATIOS_OF_ROBOTS)
+
+
+def state_deflections(campaign, readings):
+    """Deflections of every loaded state that has an unloaded one of its pose beside it.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    StateDeflections or None
+        None where there is none.
+    """
+    pose = state_clusters(readings)
+    compared = np.isin(pose, pose[readings.load == 0]) & np.isin(pose, pose[readings.wrench.any(axis=1)])
+    if not compared.any():
+        return None
+    readings = readings.select(compared)
+    estimate = robustly_placed(campaign, spread(readings)).estimate
+    residual, jacobian, end, _, _ = _linearized(campaign, readings, estimate)
+    keys = np.column_stack([readings.session, readings.pose, readings.load])
+    states, first, state = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    state, targets = state.ravel(), len(campaign.targets)
+    cell = state * targets + readings.target
+    count = np.bincount(cell, minlength=len(states) * targets).reshape(len(states), targets)
+    seen = np.zeros((len(states) * targets, 3))
+    np.add.at(seen, cell, residual)
+    seen = seen.reshape(len(states), targets, 3) / np.maximum(count, 1)[..., None]
+    at_target = np.zeros((len(states) * targets, *jacobian.shape[1:]))
+    at_target[cell] = jacobian
+    at_target = at_target.reshape(len(states), targets, *jacobian.shape[1:])
+    # np.unique sorts: the unloaded state of a pose, where there is one, is its first.
+    pose_of = np.unique(states[:, :2], axis=0, return_index=True, return_inverse=True)
+    unloaded = pose_of[1][pose_of[2].ravel()]
+    both = (count > 0) & (count[unloaded] > 0)
+    loaded = readings.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
+    if not loaded.any():
+        return None
+    rows = tuple(tuple(readings.row[state == number].tolist()) for number in np.flatnonzero(loaded))
+    return StateDeflections(
+        readings.wrench[first][loaded],
+        ((seen - seen[unloaded]) * both[..., None])[loaded],
+        (at_target * both[..., None, None])[loaded],
+        end[first][loaded],
+        both.sum(axis=1)[loaded],
+        rows,
+    )
+
+
+def _ratios(bent, expected):
+    """Compliance over nominal of the joints that are well known, the rows that agree, and their RMS residual."""
+    joints = expected.shape[1]
+    kept = np.ones(len(bent.seen), bool)
+    for _ in range(_REJECTIONS):
+        left, right = expected[kept], bent.seen[kept]
+        solution = np.linalg.lstsq(left, right, rcond=1e-10)[0]
+        residual = bent.seen - expected @ solution
+        kept = np.abs(residual) <= _APART * max(robust_sigma(np.abs(residual), 1), _ROUNDING_M)
+        if kept.sum() < 4 * joints:
+            return None
+    level = max(rms(residual[kept]), _ROUNDING_M)
+    step, covariance, held = solve_identifiable(expected[kept] / level, bent.seen[kept] / level, np.ones(joints))
+    # Readings of one pose have their errors in common: poses count, not readings.
+    deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * bent.poses), 1.0))
+    well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
+    if well.sum() < min(_FEWEST_JOINTS, joints):
+        return None
+    return step[well], kept, level
+
+
+def _some_poses(readings):
+    pose = state_clusters(readings)
+    chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
+    return readings.select(np.isin(pose, chosen))
+
+
+def _linearized(campaign, readings, estimate):
+    """Measured less predicted without load (N, 3), Jacobians of target and end, rotation of the target's point, positions."""
+    chain, angles = campaign.robot.chain, readings.joint_angles
+    position, rotation = np.empty((len(readings), 3)), np.empty((len(readings), 3, 3))
+    jacobian = np.empty((len(readings), 3, chain.coordinates))
+    for index, target in enumerate(campaign.targets):
+        mask = readings.target == index
+        point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
+        position[mask], rotation[mask], at_target = poses_and_jacobians(chain, angles[mask], point)
+        jacobian[mask] = at_target[:, :3]
+    end = poses_and_jacobians(chain, angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
+    session = np.searchsorted(estimate.sessions, readings.session)
+    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
+    measured = (into_base @ (readings.position - estimate.frame_position[session])[..., None])[..., 0]
+    return measured - position, jacobian, end, rotation, position
+
+
+def _centred(values, group):
+    """Values less the mean of their group."""
+    total = np.zeros((group.max() + 1, *values.shape[1:]))
+    np.add.at(total, group, values)
+    return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
+
+
+def _off_geometry(campaign, readings, residual, parts, jacobian, rotation, position):
+    """Residual and parts less what frames, targets and joint offsets can explain of them."""
+    columns = [jacobian]
+    if campaign.frame == "tracker":
+        turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
+        rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
+        columns += [rigid * (readings.session == session)[:, None, None] for session in np.unique(readings.session)]
+    for index, target in enumerate(campaign.targets):
+        if target.offset_m is None:
+            columns.append(rotation * (readings.target == index)[:, None, None])
+    flat = np.concatenate(columns, axis=-1).reshape(residual.size, -1)
+    left, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+    basis = left[:, sizes > 1e-9 * sizes[0]]
+    values = [part.reshape(residual.size, -1) for part in (residual, *parts)]
+    return [value - basis @ (basis.T @ value) for value in values]

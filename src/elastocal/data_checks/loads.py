@@ -1,0 +1,41 @@
+"""Loads turned round, or in another unit than newtons and newton metres.
+
+A load has no size that is absurd in itself. Only the compliances tell: all joints give way by the same factor more, or less,
+than nominally. One between a half and two is nobody's unit.
+"""
+
+from elastocal.data_checks.deflections import deflections, unit_of_loads
+from elastocal.data_checks.protocol import Fault, Value
+
+NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns", "alternatives")
+
+
+def find(campaign, readings):
+    """Sign and unit in which the loads explain the readings, where they are not those that they must have.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    list of Fault
+    """
+    bent = deflections(campaign, readings)
+    found = unit_of_loads(bent) if bent else None
+    if found is None:
+        return []
+    evidence, faults = (found.rms_as_written, found.rms_corrected), []
+    slope = Value("deflection over the one expected", found.slope, "–")
+    if found.sign < 0:
+        detail = "the loads fit turned round, as if they were written as what the robot does to its surroundings"
+        faults.append(Fault("wrong_sign", (), detail, (slope,), evidence, (), True))
+    if found.unit.detail:
+        parameters = (
+            Value("newtons for each unit of force written", found.unit.force, "N"),
+            Value("newton metres for each unit of moment written", found.unit.moment, "N m"),
+            slope,
+        )
+        faults.append(Fault("wrong_unit", (), found.unit.detail, parameters, evidence, (), True))
+    return faults

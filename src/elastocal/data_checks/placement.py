@@ -1,0 +1,201 @@
+"""Where the nominal robot puts each reading, without loads, once frames and targets are fitted to most of the readings.
+
+No NAMES: what the faults of positions have in common.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from elastocal.fitting.model import declared_model, measured_in_base
+from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.registration import registered
+from elastocal.mechanics.kinematics import poses, rotation_vectors
+
+# Poses enough to tell what concerns all readings.
+MANY_POSES = 80
+# No geometric error, no deflection moves a robot so far.
+IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
+# A correction must lower the residual by this factor.
+FAR_BETTER = 5.0
+# Share of the readings that frames and targets are first fitted to, and steps of fitting to those that fit best.
+_CORE, _CORE_STEPS = 0.6, 5
+# Readings beyond so many robust standard deviations take no part in the last fit.
+_APART = 5.0
+# Largest distances that an RMS leaves out: single readings say nothing of all.
+_TRIMMED = 0.1
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Readings beside the nominal robot, in base axes.
+
+    Attributes
+    ----------
+    estimate : Estimate
+        Frames and targets.
+    predicted, measured : ndarray (N, 3)
+        m.
+    predicted_rotation, measured_rotation : ndarray (N, 3, 3) or None
+    """
+
+    estimate: object
+    predicted: np.ndarray
+    measured: np.ndarray
+    predicted_rotation: np.ndarray | None
+    measured_rotation: np.ndarray | None
+
+    @property
+    def distance(self):
+        """From the predicted to the measured position, ndarray (N,), m."""
+        return np.linalg.norm(self.measured - self.predicted, axis=1)
+
+    @property
+    def turn(self):
+        """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
+        if self.measured_rotation is None:
+            return None
+        relative = self.measured_rotation @ self.predicted_rotation.transpose(0, 2, 1)
+        return np.linalg.norm(rotation_vectors(relative), axis=1)
+
+
+def placed(campaign, readings):
+    """Fit frames and targets to all readings alike.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    Placement
+    """
+    return placed_by(campaign, readings, _registered(campaign, readings))
+
+
+def robustly_placed(campaign, readings):
+    """Fit frames and targets to the readings that agree with each other.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    Placement
+    """
+    found = placed(campaign, readings)
+    if campaign.frame == "base" and all(target.offset_m is not None for target in campaign.targets):
+        return found
+    for step in range(_CORE_STEPS + 1):
+        distance, kept = found.distance, np.zeros(len(readings), bool)
+        for members in _groups(readings):
+            limit = np.quantile(distance[members], _CORE)
+            if step == _CORE_STEPS:
+                limit = max(limit, _APART * robust_sigma(distance[members], 3))
+            kept[members] = distance[members] <= limit
+        found = placed_by(campaign, readings, _registered(campaign, readings.select(kept)))
+    return found
+
+
+def placed_by(campaign, readings, estimate):
+    """Readings beside the nominal robot in given frames and targets, without loads: they move it by millimetres only.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+    estimate : Estimate
+
+    Returns
+    -------
+    Placement
+    """
+    predicted, rotation = np.empty((len(readings), 3)), np.empty((len(readings), 3, 3))
+    for index, target in enumerate(campaign.targets):
+        mask = readings.target == index
+        point = replace(campaign.robot.chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
+        predicted[mask], rotation[mask] = poses(campaign.robot.chain, readings.joint_angles[mask], point)
+    measured, seen = measured_in_base(estimate, single_observations(readings))
+    expected = None if seen is None else rotation @ estimate.target_rotation[readings.target]
+    return Placement(estimate, predicted, measured, expected, seen)
+
+
+def spread(readings, poses=MANY_POSES):
+    """Readings of some poses all over the campaign, at the lowest load of each.
+
+    Parameters
+    ----------
+    readings : Readings
+    poses : int
+        At most so many of each target in each session.
+
+    Returns
+    -------
+    Readings
+    """
+    chosen = []
+    for members in _groups(readings):
+        order = members[np.lexsort((readings.repeat[members], readings.load[members], readings.pose[members]))]
+        first = order[np.unique(readings.pose[order], return_index=True)[1]]
+        chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
+    return readings.select(np.sort(np.concatenate(chosen)))
+
+
+def single_observations(readings):
+    """Every reading as an observation in a state of its own.
+
+    Parameters
+    ----------
+    readings : Readings
+
+    Returns
+    -------
+    Observations
+        In the order of the readings.
+    """
+    states = States(
+        readings.session,
+        readings.pose,
+        readings.load,
+        readings.joint_angles,
+        readings.wrench,
+        np.ones(len(readings), int),
+        readings.approach,
+        readings.time_s,
+        readings.temperature_c,
+    )
+    rotation = None if readings.rotation_vector is None else Rotation.from_rotvec(readings.rotation_vector).as_matrix()
+    return Observations(states, np.arange(len(readings)), readings.target, readings.position, rotation)
+
+
+def rms(values):
+    """Root of the mean square."""
+    return float(np.sqrt((values**2).mean()))
+
+
+def trimmed_rms(distance):
+    """RMS without the largest tenth."""
+    return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
+
+
+def robust_sigma(distance, components):
+    """Standard deviation of each component of vectors, from the median of their lengths."""
+    return float(np.median(distance) / np.sqrt(chi2.median(components)))
+
+
+def _groups(readings):
+    """Indices of the readings of each target in each session."""
+    pairs = np.column_stack([readings.session, readings.target])
+    _, number = np.unique(pairs, axis=0, return_inverse=True)
+    number = number.ravel()
+    return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
+
+
+def _registered(campaign, readings):
+    model = replace(declared_model(campaign), effects=())
+    return registered(model, single_observations(readings))

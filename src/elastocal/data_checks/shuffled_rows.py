@@ -1,0 +1,298 @@
+"""Positions beside the angles, or loads beside the deflections, of other rows.
+
+A row is out of place where it is absurdly far from the nominal robot as it stands, and where another place is not only better
+but clearly nearer than chance would have it: among many points some point is always near.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial import cKDTree
+
+from elastocal.data_checks.deflections import state_deflections
+from elastocal.data_checks.placement import (
+    FAR_BETTER,
+    IMPLAUSIBLE_M,
+    placed,
+    placed_by,
+    rms,
+    robust_sigma,
+    robustly_placed,
+    spread,
+    trimmed_rms,
+)
+from elastocal.data_checks.protocol import Fault, Value
+from elastocal.fitting.observations import state_clusters
+
+NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives", "loads")
+
+# A row is out of place beyond so many robust standard deviations of the others, and back in place within so many.
+_OUT_OF_PLACE, _IN_PLACE = 20.0, 5.0
+# A place is no chance if it is so much nearer than other poses are to each other; so for this share of the rows.
+_NO_CHANCE, _MOST = 0.25, 0.8
+_FEWEST_ROWS = 2
+# Places closer than this are one place.
+_SAME_PLACE_M = 1e-3
+# Rows in place tell how well rows in place fit, if they are so many.
+_FEWEST_IN_PLACE = 10
+_MATCHING_ROUNDS = 10
+# Orientations tell places apart as points at this distance from the target would, m.
+_ARM_M = 0.5
+# A shift concerns all rows: more than this share is absurdly far, and all but a few come right.
+_MANY, _CURED = 0.01, 0.9
+# A load is out of place where it misses the deflection by this share of it, and by so many times what others miss; back in
+# place within so many.
+_MISSED, _MISSED_MORE, _MISSED_LIKE_OTHERS = 0.5, 6.0, 3.0
+_MOST_STATES = 1500
+_ROUNDS_OF_COMPLIANCE = 4
+# A matching of loads is no chance if it leaves so much less than one of the deflections of other poses.
+_CHANCE_LOADS = 1.0 / 3.0
+
+
+@dataclass(frozen=True)
+class _Shift:
+    """Measured columns that belong so many rows of a kind further down."""
+
+    steps: int
+    kind: str
+
+
+def find(campaign, readings):
+    """Rows whose measured columns, or whose loads, belong to other rows.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    readings : Readings
+
+    Returns
+    -------
+    list of Fault
+    """
+    return [*_of_positions(campaign, readings), *_of_loads(campaign, readings)]
+
+
+def _of_positions(campaign, readings):
+    some = robustly_placed(campaign, spread(readings))
+    # One fit to some poses serves all: it only has to be good to a few centimetres.
+    as_written = placed_by(campaign, readings, some.estimate)
+    far = (as_written.distance > IMPLAUSIBLE_M).mean()
+    if far * len(readings) < _FEWEST_ROWS:
+        return []
+    found = _shifted(campaign, readings, as_written) if far > _MANY else []
+    if not found and trimmed_rms(some.distance) > IMPLAUSIBLE_M:
+        return _all_matched(campaign, readings, as_written)
+    return found or _matched(readings, as_written, as_written, as_written)
+
+
+def _shifted(campaign, readings, as_written):
+    """All rows fit once the measured columns are moved by one row."""
+    shifts = [_Shift(steps, kind) for kind in ("row", "row of its target", "pose") for steps in (1, -1)]
+    moved = [_moved(readings, shift) for shift in shifts]
+    plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
+    best = int(np.argmin(plain))
+    estimate = robustly_placed(campaign, spread(moved[best])).estimate
+    before, after = as_written.distance, placed_by(campaign, moved[best], estimate).distance
+    # Neighbouring rows may be near each other: those that are not tell.
+    cured = (after > IMPLAUSIBLE_M).mean() < (1 - _CURED) * (before > IMPLAUSIBLE_M).mean()
+    if not cured or trimmed_rms(after) > min(trimmed_rms(before), IMPLAUSIBLE_M) or rms(after) > rms(before) / FAR_BETTER:
+        return []
+    shift = shifts[best]
+    detail = f"the measured columns fit one {shift.kind} further {'down' if shift.steps > 0 else 'up'}"
+    return [Fault(NAMES[0], (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
+
+
+def _moved(readings, shift):
+    """Readings with the measured columns moved down; those that fall off the end are left out."""
+    order = np.argsort(readings.row, kind="stable")
+    key = np.zeros((len(readings), 1), int)
+    if shift.kind == "row of its target":
+        key = readings.target[:, None]
+    if shift.kind == "pose":
+        key = np.column_stack([readings.target, readings.load, readings.repeat])
+    _, group = np.unique(np.column_stack([readings.session, key]), axis=0, return_inverse=True)
+    group = group.ravel()
+    source = np.full(len(readings), -1)
+    for number in range(group.max() + 1):
+        members = order[group[order] == number]
+        if shift.steps > 0:
+            source[members[1:]] = members[:-1]
+        else:
+            source[members[:-1]] = members[1:]
+    return _with_measured(readings, np.maximum(source, 0)).select(source >= 0)
+
+
+def _with_measured(readings, source):
+    """Readings with the measured columns of other rows."""
+    turned = readings.rotation_vector
+    return replace(readings, position=readings.position[source], rotation_vector=None if turned is None else turned[source])
+
+
+def _all_matched(campaign, readings, as_written):
+    """Frames, targets and rows found together, from the main axes of all points: most rows are out of place."""
+    starts = [as_written.estimate]
+    if campaign.frame == "tracker":
+        starts += _by_main_axes(campaign, readings, as_written)
+    nearest = []
+    for start in starts:
+        beside = placed_by(campaign, readings, start)
+        nearest.append((_gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))[0], start))
+    _, estimate = min(nearest, key=lambda entry: trimmed_rms(entry[0]))
+    before = None
+    for _ in range(_MATCHING_ROUNDS):
+        beside = placed_by(campaign, readings, estimate)
+        _, source = _gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))
+        if before is not None and (source == before).all():
+            break
+        before = source
+        estimate = placed(campaign, spread(_with_measured(readings, source))).estimate
+    return _matched(readings, as_written, beside, None)
+
+
+def _by_main_axes(campaign, readings, as_written):
+    """Estimates whose frames turn the main axes of the predicted points into those of the measured ones."""
+    found, estimate = [], as_written.estimate
+    unknown = [target.offset_m is None for target in campaign.targets]
+    offset = np.where(np.array(unknown)[:, None], 0.0, estimate.target_offset)
+    estimate = replace(estimate, target_offset=offset)
+    predicted = placed_by(campaign, readings, estimate).predicted
+    for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        rotation, position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
+        for number, session in enumerate(estimate.sessions):
+            mask = readings.session == session
+            ours, theirs = predicted[mask], readings.position[mask]
+            from_axes, to_axes = _main_axes(ours), _main_axes(theirs) * [first, second, first * second]
+            rotation[number] = to_axes @ from_axes.T
+            position[number] = theirs.mean(axis=0) - rotation[number] @ ours.mean(axis=0)
+        found.append(replace(estimate, frame_rotation=rotation, frame_position=position))
+    return found
+
+
+def _main_axes(points):
+    axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
+    return axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
+
+
+def _matched(readings, as_written, beside, rest):
+    """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
+    distance = beside.distance
+    out = distance > IMPLAUSIBLE_M
+    level = IMPLAUSIBLE_M
+    if rest is not None and (~out).sum() >= _FEWEST_IN_PLACE:
+        sigma = robust_sigma(distance[~out], 3)
+        out &= distance > _OUT_OF_PLACE * sigma
+        # Loads move some targets much more than others.
+        level = max(_IN_PLACE * sigma, 2.0 * np.quantile(distance[~out], 0.95), _SAME_PLACE_M)
+    rows = np.flatnonzero(out)
+    if len(rows) < _FEWEST_ROWS:
+        return []
+    predicted = _places(beside.predicted, beside.predicted_rotation)
+    left, source = _gaps(readings, predicted, _places(beside.measured, beside.measured_rotation), rows)
+    back = (left < level) & (left < _NO_CHANCE * _spacing(readings, predicted, rows)) & (source != rows)
+    # Each reading has one place: one that stands for many is no permutation.
+    pose = state_clusters(readings)
+    taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
+    if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
+        return []
+    before, after = rms(as_written.distance[rows]), rms(left[back])
+    if after > before / FAR_BETTER:
+        return []
+    detail = f"{back.sum()} of {len(readings)} rows fit with the measured columns of another one of them"
+    concerned = tuple(sorted(readings.row[rows[back]].tolist()))
+    share = Value("share of the readings", float(back.mean() * len(rows) / len(readings)), "–")
+    return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
+
+
+def _places(position, rotation):
+    """Positions and, where they are measured, orientations as points whose distances are in m, ndarray (N, 3 or 12)."""
+    if rotation is None:
+        return position
+    # A small angle changes the nine entries, taken together, by the square root of two times itself.
+    return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
+
+
+def _gaps(readings, predicted, measured, rows):
+    """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
+    left, source = np.empty(len(rows)), np.empty(len(rows), int)
+    for session in np.unique(readings.session[rows]):
+        members = np.flatnonzero(readings.session[rows] == session)
+        tree = cKDTree(measured[rows[members]])
+        left[members], number = tree.query(predicted[rows[members]])
+        source[members] = rows[members[number]]
+    return left, source
+
+
+def _spacing(readings, predicted, rows):
+    """For each of some rows how far the next place is among those predicted for them."""
+    spacing = np.zeros(len(rows))
+    for session in np.unique(readings.session[rows]):
+        members = np.flatnonzero(readings.session[rows] == session)
+        points = predicted[rows[members]]
+        # One of each place.
+        places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
+        near = cKDTree(places).query(points, k=min(4, len(places)))[0].reshape(len(points), -1)
+        other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
+        spacing[members] = np.where(np.isfinite(other), other, 0.0)
+    return spacing
+
+
+def _of_loads(campaign, readings):
+    states = state_deflections(campaign, readings)
+    if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
+        return []
+    every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
+    compliance = nominal
+    for _ in range(_ROUNDS_OF_COMPLIANCE):
+        missed = np.diag(states.misfits(compliance))
+        out = missed > _MISSED * states.sizes()
+        if (~out).sum() < _FEWEST_IN_PLACE:
+            break
+        compliance = states.compliance(every[~out], every[~out], nominal)
+    if out.sum() < _FEWEST_ROWS:
+        return []
+    if (~out).sum() >= max(_FEWEST_IN_PLACE, len(out) / 2):
+        return _some_loads_matched(states, compliance, missed, out)
+    return _all_loads_matched(states, nominal)
+
+
+def _some_loads_matched(states, compliance, missed, out):
+    """Most loads are in place and tell how well the others must fit where they belong."""
+    sigma = np.median(missed[~out])
+    if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_ROWS:
+        return []
+    # By chance the load of another state may miss by little.
+    rows = np.flatnonzero(missed > _MISSED_LIKE_OTHERS * sigma)
+    cost = states.misfits(compliance)[np.ix_(rows, rows)]
+    there = linear_sum_assignment(cost**2)[1]
+    left = cost[np.arange(len(rows)), there]
+    back = left < _MISSED_LIKE_OTHERS * sigma
+    if back.mean() < _MOST:
+        return []
+    return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
+
+
+def _all_loads_matched(states, nominal):
+    """Most loads are out of place; the matching must fit far better than one of deflections that these loads did not make."""
+    every, compliance = np.arange(len(states.wrench)), nominal
+    before = np.diag(states.misfits(nominal))
+    for _ in range(_ROUNDS_OF_COMPLIANCE):
+        cost = states.misfits(compliance)
+        there = linear_sum_assignment(cost**2)[1]
+        compliance = states.compliance(every, there, nominal)
+    left = cost[every, there]
+    strange = states.misfits(compliance, np.roll(states.seen, len(every) // 2, axis=0))
+    chance = strange[linear_sum_assignment(strange**2)]
+    if np.median(left) > _CHANCE_LOADS * np.median(chance):
+        return []
+    return _loads_fault(states, every, there, before, left)
+
+
+def _loads_fault(states, here, there, before, left):
+    moved = here != there
+    if moved.sum() < _FEWEST_ROWS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
+        return []
+    count, rows = int(moved.sum()), sorted(row for state in here[moved] for row in states.rows[state])
+    detail = f"{count} of {len(states.wrench)} loaded states fit with the load of another one of them"
+    share = Value("share of the loaded states", count / len(states.wrench), "–")
+    return [Fault(NAMES[0], (), detail, (share,), (rms(before[moved]), rms(left[moved])), tuple(rows), True)]

@@ -1,1 +1,0 @@
-"""Faults of the data that are looked for before any physics, one module each."""

@@ -1,0 +1,70 @@
+"""What every step needs of a campaign, put together again from its tables."""
+
+from dataclasses import asdict, dataclass, fields
+
+import numpy as np
+
+from elastocal.campaigns.campaign import Campaign, described_campaign
+from elastocal.campaigns.reading_columns import readings_from
+from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.fitting.model import Model, declared_model
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import Observations, averaged, without_wild_repeats
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.sites import sites_of
+
+
+@dataclass(frozen=True)
+class Case:
+    """A campaign ready to be fitted.
+
+    Attributes
+    ----------
+    campaign : Campaign
+        Its readings are those to fit.
+    observations : Observations
+        Their repeats averaged, without the wild ones.
+    model : Model
+        As declared.
+    candidates : dict of str to Candidate
+        Everything that the model might lack.
+    """
+
+    campaign: Campaign
+    observations: Observations
+    model: Model
+    candidates: dict
+
+
+def case_from(descriptions, columns):
+    """Put a campaign together.
+
+    Parameters
+    ----------
+    descriptions : dict
+        With ``campaign`` and ``robot``, as step 1 writes them.
+    columns : dict of str to ndarray
+        Of the readings table.
+
+    Returns
+    -------
+    Case
+    """
+    source = descriptions["source"]
+    robot = robot_from_document(descriptions["robot"], source)
+    campaign = described_campaign(descriptions["campaign"], robot, readings_from(columns), source)
+    sites = sites_of(robot)
+    model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
+    candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
+    return Case(campaign, averaged(without_wild_repeats(campaign.readings)), model, candidates)
+
+
+def noise_facts(noise):
+    """Noise as a JSON document."""
+    return asdict(noise) | {"joint_rad": noise.joint_rad.tolist()}
+
+
+def noise_from(facts):
+    """Noise from its JSON document, or from a verdict, which tells more of it."""
+    known = {entry.name: facts["noise"][entry.name] for entry in fields(Noise)}
+    return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})

@@ -1,0 +1,232 @@
+"""Noise of the readings: a sensor part, alike in all directions, and the repeatability of the joints, seen through the
+Jacobian.
+
+Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
+targets together, while the sensor errs for each target on its own.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import helmert
+from scipy.optimize import minimize
+from scipy.stats import chi2
+
+from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.observations import each_approach, select_states, without_wild_repeats
+
+# Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.
+FEWEST_FOR_JOINTS = 60
+# Fewer than this say nothing of their own.
+FEWEST = 9
+# So many tell every deviation to a percent; more only take time.
+MOST = 20_000
+# No sensor repeats to less than this, m or rad: a sixtieth of the wavelength of a laser.
+FINEST = 1e-8
+# How sure the joint part should be to be no smaller than taken: too small a value raises false alarms, too large one costs
+# power.
+_UPPER = 0.8
+_SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of one reading.
+
+    Attributes
+    ----------
+    source : {"repeats", "declared"}
+    position_m, orientation_rad : float
+        Sensor part, each component.
+    joint_rad : ndarray (n,)
+        Repeatability of each joint.
+    degrees_of_freedom : int
+        Contrasts of repeats behind the figures; 0 where they are declared.
+    pose_rad : float
+        Error of each joint that all readings of a pose have in common.
+    """
+
+    source: str
+    position_m: float
+    orientation_rad: float
+    joint_rad: np.ndarray
+    degrees_of_freedom: int = 0
+    pose_rad: float = 0.0
+
+    @property
+    def of_readings(self):
+        """The same without what the readings of a pose have in common."""
+        return replace(self, pose_rad=0.0)
+
+    def scaled(self, factor):
+        """The same with the noise of single readings multiplied."""
+        return replace(
+            self,
+            position_m=factor * self.position_m,
+            orientation_rad=factor * self.orientation_rad,
+            joint_rad=factor * self.joint_rad,
+        )
+
+
+def declared_noise(campaign):
+    """Noise as a campaign declares it, without a joint part; None where it does not."""
+    if not campaign.noise:
+        return None
+    position = campaign.noise["position_m"]
+    return Noise("declared", position, campaign.noise.get("orientation_rad", position), np.zeros(campaign.robot.joints))
+
+
+def noise_from_repeats(model, estimate, readings):
+    """Noise by restricted maximum likelihood from the differences between repeats.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+        Its frames turn readings into base axes; nothing else of it matters.
+    readings : Readings
+
+    Returns
+    -------
+    Noise or None
+        None where there are too few repeats, or where they do not differ at all.
+    """
+    contrasts, jacobians = _contrasts(model, estimate, readings)
+    total = sum(part.size for part in contrasts)
+    if total < FEWEST:
+        return None
+    rows, joints = model.rows, model.sites.joints
+    every = np.concatenate([part.reshape(-1, rows) for part in contrasts])
+    position = np.sqrt((every[:, :3] ** 2).mean())
+    orientation = np.sqrt((every[:, 3:] ** 2).mean()) if rows == 6 else position
+    if min(position, orientation) < FINEST:
+        # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
+        return None
+    sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
+    if total < FEWEST_FOR_JOINTS:
+        return sensor
+    data, nothing = (contrasts, jacobians, rows), np.full(joints, np.log(_SMALLEST_RAD))
+    both = [np.log(position), np.log(orientation)][: rows // 3]
+    start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
+    bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
+    fitted = minimize(_negative_log_likelihood, start, data, "L-BFGS-B", jac=True, bounds=bounds)
+    # Akaike: the joints' part must be worth its parameters.
+    if fitted.fun + joints > _negative_log_likelihood(np.concatenate([both, nothing]), *data)[0]:
+        return sensor
+    values = np.exp(fitted.x)
+    # Each approach draws a joint once, however many targets are read.
+    per_joint = max(min(total // (joints + 1), sum(len(part) for part in contrasts)), 1)
+    inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
+    return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
+
+
+def taken_noise(campaign, model, estimate, readings):
+    """Noise from repeats where there are enough, else as declared.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    model, estimate, readings
+        As in `noise_from_repeats`.
+
+    Returns
+    -------
+    noise : Noise or None
+        None where there are neither.
+    warnings : list of str
+    """
+    repeats, declared = noise_from_repeats(model, estimate, readings), declared_noise(campaign)
+    if repeats is None:
+        return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
+    if declared is None:
+        return repeats, []
+    ratio = repeats.position_m / declared.position_m
+    of_positions = repeats.degrees_of_freedom * 3 // model.rows
+    low, high = np.sqrt(chi2.ppf([0.005, 0.995], of_positions) / of_positions)
+    if low < ratio < high:
+        return repeats, []
+    return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
+
+
+def reading_covariances(noise, jacobians, rows):
+    """Covariance of all readings of one approach.
+
+    Parameters
+    ----------
+    noise : Noise
+    jacobians : ndarray (G, k, rows, n)
+        Of the k targets, with respect to the joints.
+    rows : int
+        3 for positions, 6 for poses.
+
+    Returns
+    -------
+    ndarray (G, k * rows, k * rows)
+    """
+    groups, targets = jacobians.shape[:2]
+    stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
+    sensor = np.tile(np.repeat([noise.position_m, noise.orientation_rad], 3)[:rows] ** 2, targets)
+    covariance = stacked @ stacked.transpose(0, 2, 1)
+    covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += sensor
+    return covariance
+
+
+def _contrasts(model, estimate, readings):
+    """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
+    if not len(readings) or not np.ptp(readings.repeat):
+        return [], []
+    bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
+    observations, repeated = each_approach(without_wild_repeats(readings))
+    first = np.flatnonzero(np.diff(repeated, prepend=-1))
+    # The targets that an approach saw, beside those of the first approach to its state.
+    seen = np.bincount(observations.state)
+    start = np.concatenate([[0], np.cumsum(seen)])
+    targets = np.full((len(seen), seen.max()), -1)
+    targets[observations.state, np.arange(len(observations)) - start[observations.state]] = observations.target
+    alike = (targets == targets[first[repeated]]).all(axis=1)
+    number = np.bincount(repeated, alike).astype(int)
+    told = (number - 1) * seen[first] * model.rows
+    # As many as tell, of states spread over the campaign.
+    wanted = np.flatnonzero(number > 1)
+    share = told.sum() / MOST
+    wanted = wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)] if share > 1 else wanted
+    chosen = alike & np.isin(repeated, wanted)
+    if not chosen.any():
+        return [], []
+    some = select_states(observations, chosen)
+    line = linearize(bare, at, some, circumstances(bare, at, some.states))
+    state, seen = repeated[chosen], seen[chosen]
+    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
+    first = np.flatnonzero(np.diff(state, prepend=-1))
+    many = np.diff(first, append=len(state))
+    contrasts, jacobians = {}, {}
+    for repeats, count in np.unique(np.column_stack([many, seen[first]]), axis=0):
+        mine = first[(many == repeats) & (seen[first] == count)]
+        of_first = start[mine][:, None] + np.arange(count)
+        members = start[mine[:, None] + np.arange(repeats)][..., None] + np.arange(count)
+        residual = line.residual[members].reshape(len(mine), repeats, -1)
+        found = (helmert(repeats) @ residual).reshape(-1, residual.shape[2])
+        jacobian = line.coordinate_jacobian[of_first][..., : model.sites.joints]
+        contrasts.setdefault(count, []).append(found)
+        jacobians.setdefault(count, []).append(np.repeat(jacobian, repeats - 1, axis=0))
+    return tuple([np.concatenate(parts) for parts in found.values()] for found in (contrasts, jacobians))
+
+
+def _negative_log_likelihood(logs, contrasts, jacobians, rows):
+    """Half of minus twice the logarithm of the likelihood, and its derivatives by the logarithms of the deviations."""
+    values = np.exp(logs)
+    sensors = rows // 3
+    noise = Noise("", values[0], values[sensors - 1], values[sensors:])
+    total, slope = 0.0, np.zeros(len(values))
+    for vectors, jacobian in zip(contrasts, jacobians, strict=True):
+        groups, targets = jacobian.shape[:2]
+        inverse = np.linalg.inv(reading_covariances(noise, jacobian, rows))
+        told = (inverse @ vectors[..., None])[..., 0]
+        total += 0.5 * ((vectors * told).sum() - np.linalg.slogdet(inverse)[1].sum())
+        # By an element of the covariance: half of (inverse - told told^T).
+        sensor = (np.diagonal(inverse, axis1=1, axis2=2) - told**2).reshape(groups, targets, sensors, 3).sum(axis=(0, 1, 3))
+        slope[:sensors] += values[:sensors] ** 2 * sensor
+        stacked = jacobian.reshape(groups, targets * rows, -1)
+        joint = (stacked * (inverse @ stacked)).sum(axis=1) - (told[:, None] @ stacked)[:, 0] ** 2
+        slope[sensors:] += values[sensors:] ** 2 * joint.sum(axis=0)
+    return total, slope

@@ -1,0 +1,40 @@
+"""Steps 2 and 3: the noise of the readings, and the model as declared."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from elastocal.fitting.case import noise_facts, noise_from
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise import FINEST, Noise, taken_noise
+from elastocal.fitting.registration import registered
+
+_ASSUMED_M = 1e-4
+
+
+def estimated_noise(case):
+    """Noise as `noise_of`, and the warnings, as objects."""
+    facts = noise_of(case)
+    return noise_from(facts), facts["warnings"]
+
+
+def noise_of(case):
+    """Noise from repeats or as declared; from the residual of the declared model where there is neither.
+
+    Parameters
+    ----------
+    case : Case
+
+    Returns
+    -------
+    dict
+        ``noise`` and ``warnings``, JSON-serialisable.
+    """
+    start = registered(case.model, case.observations)
+    noise, warnings = taken_noise(case.campaign, case.model, start, case.campaign.readings)
+    if noise is None:
+        assumed = Noise("residual", _ASSUMED_M, _ASSUMED_M, np.zeros(case.campaign.robot.joints))
+        left = fit(case.model, case.observations, assumed, start).residual
+        typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
+        noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
+    return {"noise": noise_facts(noise), "warnings": warnings}

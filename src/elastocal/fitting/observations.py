@@ -1,0 +1,324 @@
+"""Readings as the loop uses them: repeats averaged, grouped by the state of the robot in which they were taken."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.groups import groups_of
+
+# Readings this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
+_WILD = 12.0
+
+
+@dataclass(frozen=True)
+class States:
+    """Each pose, load and sense of approach once; arrays of S.
+
+    Attributes
+    ----------
+    session, pose, load : ndarray (S,)
+    joint_angles : ndarray (S, n)
+        rad.
+    wrench : ndarray (S, 6)
+        N, N m, at the origin of the last measuring point, base axes.
+    repeats : ndarray (S,)
+        How many approaches were averaged.
+    approach : ndarray (S, n) or None
+        Sense in which each joint was approached, -1, 0, +1.
+    time_s, temperature_c : ndarray (S,) or None
+    row : ndarray (S,) or None
+        First row of the file that belongs to the state.
+    """
+
+    session: np.ndarray
+    pose: np.ndarray
+    load: np.ndarray
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    repeats: np.ndarray
+    approach: np.ndarray | None = None
+    time_s: np.ndarray | None = None
+    temperature_c: np.ndarray | None = None
+    row: np.ndarray | None = None
+
+    def __len__(self):
+        return len(self.pose)
+
+
+@dataclass(frozen=True)
+class Observations:
+    """One averaged reading of one target in one state; M of them, in the order of the states.
+
+    Attributes
+    ----------
+    states : States
+    state, target : ndarray (M,)
+        Index of the state and of the target.
+    position : ndarray (M, 3)
+        m, in the frame of the session.
+    rotation : ndarray (M, 3, 3) or None
+        Measured orientation, where poses are measured.
+    """
+
+    states: States
+    state: np.ndarray
+    target: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray | None
+
+    def __len__(self):
+        return len(self.state)
+
+    @property
+    def rows(self):
+        """Numbers in one observation: 3 for a position, 6 for a pose."""
+        return 3 if self.rotation is None else 6
+
+    @property
+    def cluster(self):
+        """ndarray (M,): number of the (session, pose) that each observation belongs to, 0 .. P-1."""
+        return state_clusters(self.states)[self.state]
+
+
+def state_clusters(states):
+    """Number of the (session, pose) of each state, 0 .. P-1.
+
+    Parameters
+    ----------
+    states : States or Readings
+        Of readings, that of each reading.
+
+    Returns
+    -------
+    ndarray (S,)
+    """
+    return groups_of(np.column_stack([states.session, states.pose]))[1]
+
+
+def averaged(readings):
+    """Observations with the repeats averaged that were approached alike.
+
+    Parameters
+    ----------
+    readings : Readings
+        Of `campaign`.
+
+    Returns
+    -------
+    Observations
+    """
+    return _observations(readings, _approached_alike(readings))
+
+
+def each_approach(readings):
+    """Observations of every single approach: repeats are states of their own.
+
+    Parameters
+    ----------
+    readings : Readings
+
+    Returns
+    -------
+    observations : Observations
+    repeated : ndarray (S,)
+        Number of the state that would hold this approach if repeats were averaged.
+    """
+    key = _approached_alike(readings)
+    single = np.column_stack([key, readings.repeat])
+    return _observations(readings, single), groups_of(key[groups_of(single)[0]])[1]
+
+
+def without_wild_repeats(readings):
+    """Readings without those that are far from the other repeats of their state and target.
+
+    A wild one would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is wild.
+
+    Parameters
+    ----------
+    readings : Readings
+
+    Returns
+    -------
+    Readings
+    """
+    group = groups_of(np.column_stack([_approached_alike(readings), readings.target]))[1]
+    off = np.abs(readings.position - _medians(readings.position, group)[group])
+    telling = np.bincount(group)[group] > 2
+    if not telling.any():
+        return readings
+    apart = off[telling]
+    # The middle one of an odd number is not off at all, and tells nothing of the others.
+    usual = np.median(apart[apart > 0]) if apart.any() else 0.0
+    return readings.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
+
+
+def _medians(values, group):
+    """Median of each column in each group, ndarray (G, k)."""
+    count = np.bincount(group)
+    start = np.concatenate([[0], np.cumsum(count)[:-1]])
+    rising = np.column_stack([column[np.lexsort((column, group))] for column in values.T])
+    return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
+
+
+def _approached_alike(readings):
+    key = np.column_stack([readings.session, readings.pose, readings.load])
+    return key if readings.approach is None else np.column_stack([key, readings.approach])
+
+
+def _observations(readings, key):
+    first, state_of = groups_of(key)
+    pairs = np.column_stack([state_of, readings.target])
+    first_pair, pair_of = groups_of(pairs)
+    pairs = pairs[first_pair]
+
+    def of_states(values):
+        return None if values is None else _means(values, state_of)
+
+    repeats = np.full(len(first), len(readings))
+    np.minimum.at(repeats, pairs[:, 0], np.bincount(pair_of))
+    first_row = readings.row[first].copy()
+    np.minimum.at(first_row, state_of, readings.row)
+    states = States(
+        session=readings.session[first],
+        pose=readings.pose[first],
+        load=readings.load[first],
+        joint_angles=of_states(readings.joint_angles),
+        wrench=of_states(readings.wrench),
+        repeats=repeats,
+        approach=None if readings.approach is None else readings.approach[first],
+        time_s=of_states(readings.time_s),
+        temperature_c=of_states(readings.temperature_c),
+        row=first_row,
+    )
+    rotation = None
+    if readings.rotation_vector is not None:
+        rotation = _mean_rotations(Rotation.from_rotvec(readings.rotation_vector), pair_of)
+    return Observations(states, pairs[:, 0], pairs[:, 1], _means(readings.position, pair_of), rotation)
+
+
+def select_states(observations, kept):
+    """The part of some observations that was taken in some of their states.
+
+    Parameters
+    ----------
+    observations : Observations
+    kept : ndarray of bool (S,)
+
+    Returns
+    -------
+    Observations
+    """
+    states = States(
+        **{name: None if value is None else value[kept] for name, value in vars(observations.states).items()},
+    )
+    mask = kept[observations.state]
+    number = np.cumsum(kept) - 1
+    rotation = None if observations.rotation is None else observations.rotation[mask]
+    return Observations(
+        states, number[observations.state[mask]], observations.target[mask], observations.position[mask], rotation
+    )
+
+
+def parts_of(observations, most):
+    """Some observations in parts of whole poses, in their order.
+
+    Parameters
+    ----------
+    observations : Observations
+        Those of a pose one after the other, as `averaged` gives them.
+    most : int
+        About so many observations in a part.
+
+    Returns
+    -------
+    list of (slice, slice)
+        States and observations of each part; one part where they are few.
+    """
+    first = np.flatnonzero(np.diff(state_clusters(observations.states), prepend=-1))
+    place = np.searchsorted(observations.state, first)
+    chosen = np.unique(np.searchsorted(place, np.arange(0, len(observations), most)).clip(max=len(first) - 1))
+    states, seen = [*first[chosen].tolist(), len(observations.states)], [*place[chosen].tolist(), len(observations)]
+    edges = zip(states, states[1:], seen, seen[1:], strict=False)
+    return [(slice(a, b), slice(c, d)) for a, b, c, d in edges]
+
+
+def part_at(observations, states, seen):
+    """One of the `parts_of` observations.
+
+    Parameters
+    ----------
+    observations : Observations
+    states, seen : slice
+        Of the states and of the observations.
+
+    Returns
+    -------
+    Observations
+    """
+    some = States(**{name: None if value is None else value[states] for name, value in vars(observations.states).items()})
+    rotation = None if observations.rotation is None else observations.rotation[seen]
+    return Observations(
+        some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation
+    )
+
+
+def spread_poses(observations, most):
+    """Which states belong to poses evenly spread over a campaign, so many that about `most` observations are left.
+
+    Parameters
+    ----------
+    observations : Observations
+    most : int
+
+    Returns
+    -------
+    ndarray of bool (S,)
+        True throughout where there are no more.
+    """
+    if len(observations) <= most:
+        return np.ones(len(observations.states), bool)
+    pose = state_clusters(observations.states)
+    poses = pose.max() + 1
+    chosen = np.zeros(poses, bool)
+    chosen[np.linspace(0, poses - 1, max(int(poses * most / len(observations)), 2)).round().astype(int)] = True
+    return chosen[pose]
+
+
+def sample_of(observations, most):
+    """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target.
+
+    Parameters
+    ----------
+    observations : Observations
+    most : int
+
+    Returns
+    -------
+    Observations
+    """
+    if len(observations) <= most:
+        return observations
+    some = select_states(observations, spread_poses(observations, most))
+    sessions = np.isin(observations.states.session, some.states.session).all()
+    return some if sessions and np.isin(observations.target, some.target).all() else observations
+
+
+def _means(values, group):
+    count = np.bincount(group)
+    if len(count) == len(values):
+        # Nothing to average, whatever the order.
+        total = np.empty(values.shape)
+        total[group] = values
+        return total
+    total = np.zeros((len(count), *values.shape[1:]))
+    np.add.at(total, group, values)
+    return total / count.reshape(-1, *[1] * (values.ndim - 1))
+
+
+def _mean_rotations(rotations, group):
+    """Mean of rotations close to each other: the mean turn from the first of each group."""
+    first = np.unique(group, return_index=True)[1]
+    reference = rotations[first]
+    turns = (rotations * reference[group].inv()).as_rotvec()
+    return (Rotation.from_rotvec(_means(turns, group)) * reference).as_matrix()

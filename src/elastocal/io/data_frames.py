@@ -1,0 +1,77 @@
+"""Tables on disk as pandas data frames, and data frames as the tables that people read."""
+
+import pandas as pd
+
+from elastocal.io.atomic_writes import write_text
+from elastocal.io.storage import read_provenance, read_table
+
+
+def read_frame(path, schema, columns=None):
+    """A table as a data frame, checked as in `storage.read_blocks`.
+
+    Parameters
+    ----------
+    path : str
+    schema : TableSchema
+    columns : sequence of str, optional
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    return pd.DataFrame(read_table(path, schema, columns))
+
+
+def read_long(paths, schema):
+    """Tables of many strategies in one frame, headed by what their provenance says: robot, noise_um, strategy (its name).
+
+    Parameters
+    ----------
+    paths : iterable of str
+    schema : callable
+        Number of joints to TableSchema.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Columns of robots with fewer joints are empty for the joints that they lack.
+    """
+    frames = [pd.DataFrame({"robot": [], "noise_um": [], "strategy": []})]
+    for path in paths:
+        origin = read_provenance(path)
+        joints = len(origin["configuration"]["robot"]["compliance_urad_per_Nm"])
+        heads = {
+            "robot": origin["robot"],
+            "noise_um": float(origin["noise"]),
+            "strategy": origin["configuration"]["strategy"]["name"],
+        }
+        frames.append(pd.DataFrame(heads | read_table(path, schema(joints))))
+    return pd.concat(frames[1:] or frames, ignore_index=True)
+
+
+def write_csv(path, frame):
+    """Write a data frame; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+    frame : pandas.DataFrame
+    """
+    write_text(path, frame.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+
+
+def write_markdown(path, frame):
+    """Write a frame of strings as a Markdown table."""
+    write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n")
+
+
+def write_latex(path, frame):
+    """Write a frame of strings as a LaTeX tabular."""
+    shown = frame.rename(columns=_latex).map(_latex)
+    write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]))
+
+
+def _latex(text):
+    for plain, escaped in (("_", r"\_"), ("%", r"\%"), ("±", r"$\pm$"), ("µ", r"\textmu{}")):
+        text = str(text).replace(plain, escaped)
+    return text

@@ -1,0 +1,34 @@
+"""JSON files of the steps, read and written with nothing but the standard library behind it: jobs start quickly."""
+
+import json
+
+from elastocal.io.atomic_writes import write_text
+
+
+def read_json(path):
+    """Contents of a JSON file.
+
+    Parameters
+    ----------
+    path : str
+
+    Returns
+    -------
+    object
+    """
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def write_json(path, contents, **options):
+    """Write a JSON file that people can read too; it appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+    contents : object
+        JSON-serialisable.
+    **options
+        Passed on to ``json.dumps``.
+    """
+    write_text(path, json.dumps(contents, indent=1, **options) + "\n")

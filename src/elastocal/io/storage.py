@@ -1,0 +1,275 @@
+"""Tables on disk: Parquet files that carry their units, their provenance and a digest of their contents.
+
+A file is one tidy table. Each column's unit and meaning stand in its field metadata; the file's own metadata hold the name of
+the schema, the provenance and, for each row group and column, a SHA-256 of the values. Row groups are blocks of data sets, so
+that any number of them is worked off in the same memory.
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from elastocal.errors import InputError
+from elastocal.io.atomic_writes import appearing_whole
+
+_TABLE, _PROVENANCE, _DIGESTS = "elastocal.table", "elastocal.provenance", "elastocal.sha256"
+_AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    name : str
+    type : {"float64", "float32", "int32", "bool", "string", "text"}
+        A string column has one value for each row group, a text column one for each row.
+    unit : str
+        Empty for counts, names and shares.
+    meaning : str
+    missing : bool
+        Whether a floating-point column may hold not-a-number or infinity.
+    minimum : float or None
+    """
+
+    name: str
+    type: str
+    unit: str
+    meaning: str
+    missing: bool = False
+    minimum: float | None = None
+
+
+@dataclass(frozen=True)
+class TableSchema:
+    """Name and columns of a table."""
+
+    name: str
+    columns: tuple
+
+    def column(self, name):
+        """The column called `name`."""
+        return next(column for column in self.columns if column.name == name)
+
+
+def write_table(path, schema, blocks, provenance):
+    """Write a table block by block, each a row group; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+    schema : TableSchema
+    blocks : iterable of dict of str to array
+        One value or array for each column; all arrays of a block have the same length.
+    provenance : dict
+        JSON-serialisable; says from what the table was made.
+
+    Raises
+    ------
+    InputError
+        A column that is missing, too many, not finite or out of range.
+    """
+    fields = [pa.field(c.name, _arrow_type(c), False, {"unit": c.unit, "meaning": c.meaning}) for c in schema.columns]
+    floats = [c.name for c in schema.columns if c.type.startswith("float")]
+    digests = []
+    with (
+        appearing_whole(path) as partial,
+        pq.ParquetWriter(
+            partial,
+            pa.schema(fields),
+            compression="zstd",
+            compression_level=1,
+            use_dictionary=[c.name for c in schema.columns if c.name not in floats],
+            use_byte_stream_split=floats,
+        ) as writer,
+    ):
+        for block in blocks:
+            values = _checked(path, schema, block)
+            if not len(next(iter(values.values()))):
+                continue
+            digests.append({c.name: _digest(c, values[c.name]) for c in schema.columns})
+            arrays = [_to_arrow(c, values[c.name], len(next(iter(values.values())))) for c in schema.columns]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), row_group_size=2**30)
+        metadata = {_TABLE: schema.name, _PROVENANCE: provenance, _DIGESTS: digests}
+        writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
+
+
+def read_blocks(path, schema, columns=None, **where):
+    """Read a table block by block, checked against its schema and its digests.
+
+    Parameters
+    ----------
+    path : str
+    schema : TableSchema
+    columns : sequence of str, optional
+        Only these; all without.
+    **where
+        Column = value: only row groups with this value throughout.
+
+    Yields
+    ------
+    dict of str to ndarray
+
+    Raises
+    ------
+    InputError
+        A file that cannot be read, is another table, or whose contents are not those written.
+    """
+    wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
+    with _opened(path) as file:
+        name = _metadata(path, file, _TABLE, schema.name)
+        if name != schema.name:
+            raise InputError(path, f"metadata {_TABLE}", name, schema.name)
+        fields = file.schema_arrow
+        for column in schema.columns:
+            index = fields.get_field_index(column.name)
+            if index < 0 or fields.field(index).type != _arrow_type(column):
+                found = "nothing" if index < 0 else f"type {fields.field(index).type}"
+                raise InputError(path, f"column {column.name}", found, f"type {_arrow_type(column)}")
+        digests = _metadata(path, file, _DIGESTS)
+        if len(digests) != file.num_row_groups:
+            raise InputError(path, "row groups", str(file.num_row_groups), f"{len(digests)}: {_AS_WRITTEN}")
+        positions = {file.metadata.schema.column(i).path: i for i in range(file.metadata.num_columns)}
+        for group in range(file.num_row_groups):
+            if any(_constant(file, group, positions[name]) != value for name, value in where.items()):
+                continue
+            try:
+                table = file.read_row_group(group, [c.name for c in wanted], use_threads=False)
+            except (OSError, pa.ArrowException) as error:
+                raise InputError(path, f"row group {group}", f"unreadable data ({error})", _AS_WRITTEN) from None
+            block = {c.name: _to_numpy(c, table.column(c.name)) for c in wanted}
+            for column in wanted:
+                if _digest(column, block[column.name]) != digests[group][column.name]:
+                    where = f"column {column.name}, row group {group}"
+                    raise InputError(path, where, "values that were edited", _AS_WRITTEN)
+            yield block
+
+
+def read_table(path, schema, columns=None, **where):
+    """Read a whole table; as `read_blocks`, with the blocks joined.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    blocks = list(read_blocks(path, schema, columns, **where))
+    if not blocks and not where:
+        wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
+        return {c.name: np.zeros(0, object if c.type in ("string", "text") else c.type) for c in wanted}
+    if not blocks:
+        raise InputError(path, ", ".join(where), ", ".join(map(repr, where.values())), "values in the file")
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def read_provenance(path):
+    """What `write_table` was told of where the table comes from.
+
+    Parameters
+    ----------
+    path : str
+
+    Returns
+    -------
+    dict
+    """
+    with _opened(path) as file:
+        return _metadata(path, file, _PROVENANCE)
+
+
+def _opened(path):
+    try:
+        return pq.ParquetFile(path)
+    except (OSError, pa.ArrowException) as error:
+        raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None
+
+
+def _metadata(path, file, key, allowed=_AS_WRITTEN):
+    text = (file.metadata.metadata or {}).get(key.encode())
+    if text is None:
+        raise InputError(path, f"metadata {key}", "nothing", allowed)
+    return json.loads(text)
+
+
+def _constant(file, group, column):
+    statistics = file.metadata.row_group(group).column(column).statistics
+    return statistics.min if statistics and statistics.min == statistics.max else None
+
+
+def _arrow_type(column):
+    if column.type == "text":
+        return pa.string()
+    return pa.dictionary(pa.int32(), pa.string()) if column.type == "string" else pa.type_for_alias(column.type)
+
+
+def _checked(path, schema, block):
+    names = [c.name for c in schema.columns]
+    if set(block) != set(names):
+        raise InputError(path, "columns", ", ".join(sorted(set(block) ^ set(names))), f"those of {schema.name}")
+    values = {}
+    for column in schema.columns:
+        value = block[column.name]
+        if column.type == "text":
+            value = np.array(value, dtype=object)
+        elif column.type != "string":
+            value = np.ascontiguousarray(value, dtype=column.type)
+            if column.type.startswith("float") and not column.missing and not np.isfinite(value).all():
+                row = int(np.argmin(np.isfinite(value)))
+                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), "finite numbers")
+            if column.minimum is not None and (value < column.minimum).any():
+                row = int(np.argmax(value < column.minimum))
+                raise InputError(path, f"column {column.name}, row {row}", str(value[row]), f">= {column.minimum}")
+        values[column.name] = value
+    lengths = {len(v) for c, v in values.items() if not isinstance(v, str)}
+    if len(lengths) != 1:
+        raise InputError(path, "rows", f"columns of {sorted(lengths)} rows", "columns of one length")
+    rows = lengths.pop()
+    return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
+
+
+def _digest(column, array):
+    if column.type in ("string", "text"):
+        data = "\n".join(dict.fromkeys(array) if column.type == "string" else array).encode()
+    else:
+        data = np.ascontiguousarray(array)
+    return hashlib.sha256(data).hexdigest()[:32]
+
+
+# Arrays go to and from Arrow through their buffers: every other way makes pyarrow import pandas, which takes longer than a job.
+def _to_arrow(column, array, rows):
+    if column.type == "string":
+        text = array[0].encode()
+        name = pa.Array.from_buffers(pa.string(), 1, [None, _buffer(np.array([0, len(text)], np.int32)), pa.py_buffer(text)])
+        return pa.DictionaryArray.from_arrays(_plain(pa.int32(), np.zeros(rows, np.int32)), name)
+    if column.type == "text":
+        return pa.array(array.tolist(), pa.string())
+    return _plain(_arrow_type(column), np.packbits(array, bitorder="little") if column.type == "bool" else array, rows)
+
+
+def _plain(arrow_type, array, rows=None):
+    return pa.Array.from_buffers(arrow_type, len(array) if rows is None else rows, [None, _buffer(array)])
+
+
+def _buffer(array):
+    return pa.py_buffer(np.ascontiguousarray(array))
+
+
+def _to_numpy(column, chunked):
+    array = chunked.combine_chunks() if chunked.num_chunks != 1 else chunked.chunk(0)
+    if column.type == "string":
+        names = np.array(array.dictionary.to_pylist(), dtype=object)
+        return names[_values(array.indices, np.int32)]
+    if column.type == "text":
+        return np.array(array.to_pylist(), dtype=object)
+    if column.type == "bool":
+        bits = np.unpackbits(np.frombuffer(array.buffers()[1], np.uint8), bitorder="little")
+        return bits[array.offset : array.offset + len(array)].astype(bool)
+    return _values(array, column.type)
+
+
+def _values(array, dtype):
+    return np.frombuffer(array.buffers()[1], dtype)[array.offset : array.offset + len(array)]

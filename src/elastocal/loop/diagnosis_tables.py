@@ -1,0 +1,219 @@
+"""A diagnosis as files, and back: the only writer and the only reader of its tables."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from elastocal.diagnosis.confounding import angles_between, nearest_angles
+from elastocal.diagnosis.diagnose import Diagnosis, Step
+from elastocal.diagnosis.search import first_look
+from elastocal.fitting.case import noise_facts, noise_from
+from elastocal.fitting.least_squares import fit
+from elastocal.io.storage import Column, TableSchema
+from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
+from elastocal.loop.schemas import PARAMETER_COLUMNS
+
+STEPS = TableSchema(
+    "steps",
+    (
+        Column("step", "int32", "", "number of the model on the way from the nominal robot to all effects found", minimum=0),
+        *PARAMETER_COLUMNS,
+    ),
+)
+
+MODELS = TableSchema(
+    "models",
+    (
+        Column("model", "int32", "", "rank of the model, 0 the most probable", minimum=0),
+        Column("probability", "float64", "", "posterior probability"),
+        Column("log_odds", "float64", "", "posterior log odds against the declared model"),
+        Column("mechanisms", "text", "", "its mechanisms, joined by +; nothing, and other, are mechanisms here"),
+        Column("units", "text", "", "its candidates with shape values, joined by ;"),
+        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the readings of a pose"),
+    ),
+)
+
+CANDIDATES = TableSchema(
+    "candidates",
+    (
+        Column("candidate", "text", "", "effect @ joints [variant]"),
+        Column("effect", "text", "", "name in the catalogue"),
+        Column("family", "text", "", "family in the catalogue"),
+        Column("joints", "text", "", "joints concerned, from 1, joined by +"),
+        Column("shape", "float64", "", "value of the shape parameter, where there is one", missing=True),
+        Column("parameters", "int32", "", "number of its parameters", minimum=0),
+        Column(
+            "log_bayes_factor", "float64", "", "of it alone against the declared model, averaged over its size", missing=True
+        ),
+        Column("probability", "float64", "", "posterior probability that it is in the model", missing=True),
+        Column("noncentrality", "float64", "", "of a test for it if it had its plausible size", missing=True),
+        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
+        Column("chosen", "bool", "", "whether the most probable model has it"),
+        Column("note", "text", "", "why it was not tested"),
+    ),
+)
+
+CONFOUNDING = TableSchema(
+    "confounding",
+    (
+        Column("one", "text", "", "candidate"),
+        Column("other", "text", "", "candidate"),
+        Column("angle_deg", "float64", "deg", "smallest angle between their sensitivities beyond the declared model"),
+    ),
+)
+
+
+def step_blocks(diagnosis):
+    """Blocks of the steps table."""
+    for number, step in enumerate(diagnosis.steps):
+        columns = parameter_columns(step.fitted)
+        yield {"step": np.full(len(columns["value"]), number)} | columns
+
+
+def final_correlations(diagnosis):
+    """Columns of the correlations table, of the final model."""
+    return correlation_columns(diagnosis.final)
+
+
+def diagnosis_facts(diagnosis):
+    """What diagnosis.json holds."""
+    steps = [
+        {
+            "name": step.name,
+            "kind": step.kind,
+            "noise": noise_facts(step.fitted.noise),
+            "effects": [effect.key for effect in step.fitted.model.effects],
+        }
+        for step in diagnosis.steps
+    ]
+    return {"document": diagnosis.document, "steps": steps}
+
+
+def final_parameters(facts, columns):
+    """Parameters of the final model.
+
+    Parameters
+    ----------
+    facts : dict
+        Of diagnosis.json.
+    columns : dict of str to ndarray
+        Of the steps table.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Columns of the steps table, of the last step.
+    """
+    last = len(facts["steps"]) - 1
+    return {name: values[columns["step"] == last] for name, values in columns.items()}
+
+
+def diagnosis_from(case, facts, columns):
+    """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
+
+    Parameters
+    ----------
+    case : Case
+        Of the training poses.
+    facts : dict
+        Of `diagnosis_facts`.
+    columns : dict of str to ndarray
+        Of the steps table.
+
+    Returns
+    -------
+    Diagnosis
+    """
+    sessions = np.unique(case.observations.states.session)
+    known = {effect.key: effect for effect in case.model.effects} | case.candidates
+    steps = []
+    for number, step in enumerate(facts["steps"]):
+        mine = {name: values[columns["step"] == number] for name, values in columns.items()}
+        effects = tuple(_with_priors(known[key], mine) for key in step["effects"])
+        model = replace(case.model, effects=effects)
+        estimate = estimate_from(mine, model, sessions)
+        fitted = fit(model, case.observations, noise_from({"noise": step["noise"]}), estimate)
+        steps.append(Step(step["name"], step["kind"], fitted))
+    return Diagnosis(case, tuple(steps), None, facts["document"])
+
+
+def model_columns(diagnosis):
+    """Columns of the models table."""
+    if not diagnosis.evidence:
+        return {column.name: np.zeros(0) for column in MODELS.columns}
+    found, units = diagnosis.evidence.posterior, diagnosis.evidence.linearized.problem.units
+    members = [[units[number] for number in model.units] for model in found.models]
+    return {
+        "model": np.arange(len(members)),
+        "probability": found.probabilities,
+        "log_odds": np.array([model.log_odds for model in found.models]),
+        "mechanisms": [" + ".join(sorted({unit.mechanism for unit in each})) or "nothing" for each in members],
+        "units": ["; ".join(unit.key for unit in each) for each in members],
+        "pose_error_rad": np.array([model.pose_error_rad for model in found.models]),
+    }
+
+
+def candidate_columns(diagnosis):
+    """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
+    evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
+    rows = []
+    if evidence:
+        problem = evidence.linearized.problem
+        factors = first_look(problem)[1]
+        inclusion = np.zeros(len(problem.units))
+        for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
+            inclusion[list(model.units)] += probability
+        best = evidence.conclusion.best
+        chosen = set(evidence.posterior.models[best.model].units) if best.named else set()
+        angles = nearest_angles(problem, [number for number in chosen if problem.units[number].candidate])
+        for number in np.argsort(-factors):
+            unit = problem.units[number]
+            if unit.candidate:
+                gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
+                shape = unit.shapes[0] if unit.shapes else np.nan
+                told = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
+                rows.append((unit.candidate, shape, *told, ""))
+    tested = {row[0].key for row in rows}
+    untestable = evidence.linearized.untestable if evidence else dict.fromkeys(candidates, "the readings are at fault")
+    for key, candidate in candidates.items():
+        if key not in tested:
+            rows.append((candidate, np.nan, np.nan, np.nan, np.nan, np.nan, False, untestable[key]))
+    return {
+        "candidate": [row[0].key for row in rows],
+        "effect": [row[0].effect for row in rows],
+        "family": [row[0].family for row in rows],
+        "joints": ["+".join(map(str, row[0].joints)) for row in rows],
+        "shape": np.array([row[1] for row in rows], float),
+        "parameters": np.array([len(row[0].parameters) for row in rows], int),
+        "log_bayes_factor": np.array([row[2] for row in rows], float),
+        "probability": np.array([row[3] for row in rows], float),
+        "noncentrality": np.array([row[4] for row in rows], float),
+        "angle_deg": np.array([row[5] for row in rows], float),
+        "chosen": np.array([row[6] for row in rows], bool),
+        "note": [row[7] for row in rows],
+    }
+
+
+def confounding_columns(diagnosis):
+    """Columns of the confounding table: every pair of tested candidates once."""
+    if not diagnosis.evidence:
+        return {"one": [], "other": [], "angle_deg": np.zeros(0)}
+    problem = diagnosis.evidence.linearized.problem
+    numbers = [number for number, unit in enumerate(problem.units) if unit.candidate]
+    rows, columns = np.tril_indices(len(numbers), -1)
+    angles = angles_between(problem, numbers)
+    names = [problem.units[n].key for n in numbers]
+    return {"one": [names[r] for r in rows], "other": [names[c] for c in columns], "angle_deg": angles[rows, columns]}
+
+
+def _with_priors(effect, columns):
+    """An effect with the priors under which it was fitted."""
+    mine = columns["owner"] == effect.key
+    prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))
+    priors = [None if np.isnan(prior[p.name]) else float(prior[p.name]) for p in effect.parameters]
+    # A prior that the catalogue does not have is one whose size was estimated.
+    parameters = tuple(
+        replace(p, prior_std=deviation, sized=deviation != p.prior_std)
+        for p, deviation in zip(effect.parameters, priors, strict=True)
+    )
+    return replace(effect, parameters=parameters)

@@ -1,0 +1,40 @@
+"""Step 1: a campaign's folder to descriptions and readings, those to fit apart from those to test."""
+
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, held_out_campaign, read_campaign, read_descriptions, split
+from elastocal.effects.catalogue import effects
+from elastocal.io.documents import read_document
+
+
+def taken_in(folder, robots_folder):
+    """Read a campaign and part its readings.
+
+    Parameters
+    ----------
+    folder, robots_folder : str
+        As in `campaign.read_campaign`.
+
+    Returns
+    -------
+    descriptions : dict
+        ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the test, or None.
+    training, held_out : Readings
+
+    Raises
+    ------
+    InputError
+    """
+    campaign = read_campaign(folder, robots_folder, effects())
+    descriptions = _descriptions(folder, robots_folder)
+    training, held_out = split(campaign)
+    other = held_out_campaign(campaign, folder, robots_folder, effects())
+    if other is None:
+        return descriptions | {"held_out": None}, training, held_out
+    elsewhere = f"{folder}/{campaign.holdout['campaign']}"
+    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.readings
+
+
+def _descriptions(folder, robots_folder):
+    document, robot_path = read_descriptions(folder, robots_folder)
+    # What a campaign may leave out is said here, so that no later step has to know what its absence means.
+    said = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
+    return {"source": f"{folder}/{DOCUMENT}", "campaign": said, "robot": read_document(robot_path)}

@@ -1,0 +1,142 @@
+"""Equations 6-10: what a wrench does to a chain of springs.
+
+Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflections are (displacement, rotation vector) in m
+and rad, base axes. Compliances of rotary springs are in rad/(N m).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
+
+
+def wrench_of_offset_force(force, offset_m, rotation=None):
+    """Wrench at the end-effector of a force whose line of action is shifted from it.
+
+    Parameters
+    ----------
+    force : ndarray (..., 3)
+        N, base axes.
+    offset_m : array_like (3,)
+        From the end-effector to the point of application, m.
+    rotation : ndarray (..., 3, 3), optional
+        Orientation of the end-effector where the offset turns with the tool; without it the offset is along base axes.
+
+    Returns
+    -------
+    ndarray (..., 6)
+    """
+    lever = np.asarray(offset_m, float)
+    if rotation is not None:
+        lever = rotation @ lever
+    return np.concatenate([force, np.cross(lever, force)], axis=-1)
+
+
+def transport_wrench(wrench, from_position, to_position):
+    """State a wrench at another point of the same rigid body: M' = M + (p - p') x F.
+
+    Parameters
+    ----------
+    wrench : ndarray (..., 6)
+    from_position, to_position : ndarray (..., 3)
+
+    Returns
+    -------
+    ndarray (..., 6)
+    """
+    force, moment = wrench[..., :3], wrench[..., 3:]
+    return np.concatenate([force, moment + np.cross(from_position - to_position, force)], axis=-1)
+
+
+def generalized_forces(jacobian, wrench):
+    """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
+
+    Parameters
+    ----------
+    jacobian : ndarray (..., 6, n)
+        Of the point where the wrench is stated.
+    wrench : ndarray (..., 6)
+
+    Returns
+    -------
+    ndarray (..., n)
+    """
+    return sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6))
+
+
+def loaded_point(chain, point, wrench_at):
+    """Where the wrench acts that deflects a measuring point (reading R6).
+
+    Parameters
+    ----------
+    chain : Chain
+    point : MeasuringPoint
+    wrench_at : {"end_effector", "measuring_point"}
+
+    Returns
+    -------
+    MeasuringPoint
+        The end-effector itself, whatever target sits on it; or the measuring point.
+    """
+    return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else point
+
+
+def joint_torques(chain, joint_angles, wrench, at):
+    """Torques that a wrench puts on the joints.
+
+    Parameters
+    ----------
+    chain : Chain
+    joint_angles : ndarray (..., n)
+        rad.
+    wrench : ndarray (..., 6)
+    at : MeasuringPoint
+        Where the wrench is stated, see `loaded_point`.
+
+    Returns
+    -------
+    ndarray (..., n)
+        N m.
+    """
+    return generalized_forces(jacobians(chain, joint_angles, at), wrench)
+
+
+def regressor(jacobian, torques, out=None):
+    """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9).
+
+    Parameters
+    ----------
+    jacobian : ndarray (..., 6, n)
+        Of the measuring point.
+    torques : ndarray (..., n)
+        N m; J^T w of the loaded point.
+    out : ndarray (..., 6, n), optional
+        Overwritten with the result; may be the Jacobian itself.
+
+    Returns
+    -------
+    ndarray (..., 6, n)
+        m or rad per rad/(N m).
+    """
+    return np.multiply(jacobian, torques[..., None, :], out=out)
+
+
+def exact_deflections(chain, coordinates, spring_deflections, point):
+    """Deflection of a measuring point by the exact kinematics: the pose at q + theta against the pose at q.
+
+    Parameters
+    ----------
+    chain : Chain
+        May be an extended chain; then `coordinates` and `spring_deflections` cover its link springs too.
+    coordinates, spring_deflections : ndarray (..., n)
+        q (zero for link springs) and theta of equation 7, rad or m.
+    point : MeasuringPoint
+
+    Returns
+    -------
+    ndarray (..., 6)
+    """
+    unloaded = poses(chain, coordinates, point)
+    loaded = poses(chain, coordinates + spring_deflections, point)
+    return pose_differences(*loaded, *unloaded)

@@ -1,0 +1,120 @@
+"""Equation 5: the extended model, a six-dimensional spring at the end of each link, from a thick-walled tube."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
+
+
+def tube_compliance(tube, length_m):
+    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending, St Venant torsion).
+
+    Parameters
+    ----------
+    tube : Tube
+    length_m : float
+
+    Returns
+    -------
+    ndarray (6, 6)
+        Deflection (m, rad) per wrench (N, N m), both at the tip, in the frame of the beam.
+    """
+    outer, inner, length = tube.outer_diameter_m, tube.outer_diameter_m - 2 * tube.wall_m, length_m
+    area = np.pi * (outer**2 - inner**2) / 4
+    bending = tube.youngs_modulus_Pa * np.pi * (outer**4 - inner**4) / 64
+    torsion = tube.shear_modulus_Pa * np.pi * (outer**4 - inner**4) / 32
+    compliance = np.diag(
+        [
+            length / (tube.youngs_modulus_Pa * area),
+            length**3 / (3 * bending),
+            length**3 / (3 * bending),
+            length / torsion,
+            length / bending,
+            length / bending,
+        ]
+    )
+    compliance[1, 5] = compliance[5, 1] = length**2 / (2 * bending)
+    compliance[2, 4] = compliance[4, 2] = -(length**2) / (2 * bending)
+    return compliance
+
+
+def link_compliance(link):
+    """Compliance of a link at its far end, in the frame of the chain there.
+
+    Parameters
+    ----------
+    link : Link
+
+    Returns
+    -------
+    ndarray (6, 6)
+    """
+    along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
+    # A round tube has no preferred lateral axes: any right-handed triad with x along the link will do.
+    helper = np.eye(3)[np.argmin(np.abs(along))]
+    across = np.cross(along, helper) / np.linalg.norm(np.cross(along, helper))
+    turn = np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
+    return turn @ tube_compliance(link.tube, np.linalg.norm(link.vector_m)) @ turn.T
+
+
+def extended_chain(robot):
+    """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Returns
+    -------
+    Chain
+        Coordinates 0..n-1 are the joints as before, then six for each link in turn.
+    """
+    transforms, count, new_index = [], robot.joints, {}
+    ends = {link.after for link in robot.links}
+    for index in range(len(robot.chain.transforms) + 1):
+        if index in ends:
+            for number in range(6):
+                transforms.append(Transform("TTTRRR"[number], number % 3, 0.0, count + number))
+            count += 6
+        new_index[index] = len(transforms)
+        if index < len(robot.chain.transforms):
+            transforms.append(robot.chain.transforms[index])
+    points = tuple(MeasuringPoint(p.name, new_index[p.after], p.offset_m) for p in robot.chain.points)
+    return Chain(tuple(transforms), points, count)
+
+
+def spring_compliance(robot):
+    """Aggregated compliance of all springs of the extended chain, the inverse of K_theta in equation 7.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Returns
+    -------
+    ndarray (m, m)
+        Block diagonal: joints, then links. Without links, the diagonal of the joint compliances.
+    """
+    n = robot.joints
+    compliance = np.zeros((n + 6 * len(robot.links),) * 2)
+    compliance[:n, :n] = np.diag(robot.compliance)
+    for number, link in enumerate(robot.links):
+        block = slice(n + 6 * number, n + 6 * number + 6)
+        compliance[block, block] = link_compliance(link)
+    return compliance
+
+
+def with_tube(robot, tube):
+    """The same robot with every link made of `tube`.
+
+    Parameters
+    ----------
+    robot : Robot
+    tube : Tube
+
+    Returns
+    -------
+    Robot
+    """
+    return replace(robot, links=tuple(replace(link, tube=tube) for link in robot.links))

@@ -1,0 +1,266 @@
+"""Where a robot can deviate from its chain: small displacements at the base, at each joint and at the far end of each link.
+
+Every physical effect moves the robot through some of these coordinates. The chain that holds them all gives exact poses, and
+its Jacobian the sensitivity of a measured point to each of them.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from elastocal.mechanics.kinematics import motion, poses
+from elastocal.mechanics.robot import STANDING, Chain, Compensator, MeasuringPoint, Robot, Transform
+
+# Below this a link is a point.
+_SHORTEST_M = 1e-6
+
+
+@dataclass(frozen=True)
+class Sites:
+    """A chain with every coordinate in which the robot can deviate.
+
+    Attributes
+    ----------
+    chain : Chain
+        Coordinates 0..n-1 are the joints as before. All others are zero in the nominal robot.
+    joints : int
+        n.
+    base : tuple of int
+        Tx Ty Tz Rx Ry Rz of the foot, base axes.
+    tilt : tuple of tuple of int
+        For each joint Rx Ry Rz just behind it, in the frame that turns with it.
+    link_end : tuple of tuple of int
+        For each link 0..n Tx Ty Tz Rx Ry Rz at its far end, in the frame of the chain there. Link 0 is the column before joint
+        1, link n the flange behind the last joint.
+    joint_axes : tuple of int
+        0, 1, 2 for a joint about x, y, z of its frame.
+    link_vectors_m : ndarray (n + 1, 3)
+        From the near to the far end of each link, in the frame of its far end. A link ends at a passive joint; what lies behind
+        that and before the next joint belongs to no link.
+    link_rotations : ndarray (n + 1, 3, 3)
+        From the frame at the far end of each link to that at its near end: fixed rotations between two joints.
+    joint_signs : tuple of float
+        Sense in which each joint turns about its axis, +1 or -1.
+    prismatic : tuple of bool
+        Which joints shift along their axis instead; theirs are metres and newtons.
+    masses : tuple of Mass
+        What the links weigh, where the robot file says so.
+    gravity_m_s2 : tuple of float
+        Base axes.
+    gear_ratio : tuple of float or None
+    compensator : Compensator or None
+    payload_kg : float or None
+        As in `Robot`.
+    """
+
+    chain: Chain
+    joints: int
+    base: tuple
+    tilt: tuple
+    link_end: tuple
+    joint_axes: tuple
+    link_vectors_m: np.ndarray
+    link_rotations: np.ndarray
+    joint_signs: tuple
+    prismatic: tuple
+    masses: tuple = ()
+    gravity_m_s2: tuple = STANDING
+    gear_ratio: tuple | None = None
+    compensator: Compensator | None = None
+    payload_kg: float | None = None
+
+    def lever_of_weight(self, joint_angles, joint, link):
+        """Torque on a joint per newton of weight at the far end of a link.
+
+        Parameters
+        ----------
+        joint_angles : ndarray (..., n)
+            rad.
+        joint : int
+            From 0.
+        link : int
+            0 is the column.
+
+        Returns
+        -------
+        ndarray (...,)
+            N m / N.
+        """
+        coordinates = np.zeros((np.size(joint_angles) // self.joints, self.chain.coordinates))
+        coordinates[:, : self.joints] = np.reshape(joint_angles, (-1, self.joints))
+        end = self.far_end(link)
+        moved = motion(self.chain, coordinates, [end])
+        jacobian = moved.jacobian(end.after, moved.position[0], rows=3)
+        return (self.down @ jacobian[:, joint]).reshape(np.shape(joint_angles)[:-1])
+
+    def far_end(self, link):
+        """The far end of a link, 0 for the column, as a measuring point."""
+        return MeasuringPoint("far end", self._behind(self.link_end[link][-1]))
+
+    def body(self, link):
+        """The frame in which the centre of mass of a link is stated: behind its joint, or the foot for the column."""
+        return MeasuringPoint("body", self._behind(self.tilt[link - 1][-1] if link else self.base[-1]))
+
+    def _behind(self, coordinate):
+        return 1 + next(place for place, t in enumerate(self.chain.transforms) if t.coordinate == coordinate)
+
+    @cached_property
+    def followed(self):
+        """Points whose motion tells the load on the coordinates: the end, the far ends of links 0..n, and what has a mass."""
+        end = MeasuringPoint("end", self.chain.end_effector.after)
+        far_ends = [self.far_end(link) for link in range(self.joints + 1)]
+        return (end, *far_ends, *(self.body(mass.link) for mass in self.masses))
+
+    @property
+    def down(self):
+        """Unit vector along gravity, base axes."""
+        return np.array(self.gravity_m_s2) / np.linalg.norm(self.gravity_m_s2)
+
+    @property
+    def shoulder(self):
+        """Index of the first joint that the weight of its links can turn, or None."""
+        loaded = (j for j in range(self.joints) if self.carried_links(j))
+        return next(loaded, None)
+
+    def carried_links(self, joint):
+        """Links with a length behind a joint whose weight can turn it, as numbers from 1.
+
+        Parameters
+        ----------
+        joint : int
+            From 0.
+
+        Returns
+        -------
+        list of int
+        """
+        links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
+        return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
+
+    def longest_weight_torque_Nm(self, joint):  # noqa: N802 - units in names keep their case
+        """Torque on a joint by the weight of all declared masses behind it, each at its longest lever.
+
+        Parameters
+        ----------
+        joint : int
+            From 0.
+
+        Returns
+        -------
+        float
+            A mass counts as in the middle of its link.
+        """
+        levers, gravity = self._longest_levers[:, joint], np.linalg.norm(self.gravity_m_s2)
+        behind = [mass for mass in self.masses if mass.link > joint]
+        return float(sum(mass.mass_kg * gravity * 0.5 * (levers[mass.link - 1] + levers[mass.link]) for mass in behind))
+
+    def transverse_axes(self, link):
+        """The two axes of the frame at the far end of a link that are least along it."""
+        return sorted(np.argsort(np.abs(self.link_vectors_m[link]), kind="stable")[:2].tolist())
+
+    def moment_turns(self, link, axis, joint):
+        """Whether a first moment along an axis of the frame at the far end of a link can turn a joint by its weight.
+
+        Parameters
+        ----------
+        link : int
+            0 is the column.
+        axis : int
+        joint : int
+            From 0.
+
+        Returns
+        -------
+        bool
+        """
+        return bool(self._largest_turns[link, axis, joint] > _SHORTEST_M)
+
+    @cached_property
+    def _at_random(self):
+        """Motion of the far ends of all links over some poses."""
+        coordinates = np.zeros((16, self.chain.coordinates))
+        coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
+        return motion(self.chain, coordinates, [self.far_end(link) for link in range(self.joints + 1)])
+
+    @cached_property
+    def _longest_levers(self):
+        """Of the weight of each link on each joint over some poses, ndarray (n + 1, n), m."""
+        levers = []
+        for link, position in enumerate(self._at_random.position):
+            jacobian = self._at_random.jacobian(self.far_end(link).after, position, rows=3)[:, : self.joints]
+            levers.append(np.abs(np.tensordot(self.down, jacobian, 1)).max(axis=1))
+        return np.array(levers)
+
+    @cached_property
+    def _largest_turns(self):
+        """Torque on each joint by a unit moment along each axis of each link over some poses, ndarray (n + 1, 3, n)."""
+        found = []
+        for link, rotation in enumerate(self._at_random.rotation):
+            nothing, after = np.zeros_like(rotation[:, 0]), self.far_end(link).after
+            turning = [np.cross(rotation[:, axis], self.down[:, None], axis=0) for axis in range(3)]
+            forces = [self._at_random.generalized_forces(after, nothing, moment)[: self.joints] for moment in turning]
+            found.append([np.abs(force).max(axis=1) for force in forces])
+        return np.array(found)
+
+
+def sites_of(holder):
+    """Put a site at the foot, behind each joint and at the far end of each link.
+
+    Parameters
+    ----------
+    holder : Robot or Chain
+        A robot gives what is known of its masses, gears and gravity as well; a chain alone is a weightless arm on a floor.
+
+    Returns
+    -------
+    Sites
+    """
+    if isinstance(holder, Robot):
+        known = ("masses", "gravity_m_s2", "gear_ratio", "compensator", "payload_kg")
+        return replace(sites_of(holder.chain), **{name: getattr(holder, name) for name in known})
+    chain = holder
+    springs = _Springs(chain.coordinates)
+    base = springs.add("TTTRRR")
+    tilt, link_end, axes, signs, links, moved, start = [], [], [], [], [], {}, 0
+    # A point at the end of a link is moved by the link's end; one inside a link is not.
+    for index, transform in enumerate((*chain.transforms, None)):
+        passive = transform is not None and chain.is_passive(index)
+        if (transform is None or transform.coordinate is not None) and len(link_end) == len(axes):
+            link_end.append(springs.add("TTTRRR"))
+            links.append(_link(chain.transforms[start:index]))
+        moved[index] = len(springs.transforms)
+        if transform is None:
+            break
+        springs.transforms.append(transform)
+        if transform.coordinate is not None and not passive:
+            tilt.append(springs.add("RRR"))
+            axes.append(transform.axis)
+            signs.append(transform.sign)
+            start = index + 1
+    points = tuple(MeasuringPoint(p.name, moved[p.after], p.offset_m) for p in chain.points)
+    extended = Chain(tuple(springs.transforms), points, springs.count)
+    vectors, rotations = (np.array(part) for part in zip(*links, strict=True))
+    ways = tuple(axes), vectors, rotations, tuple(signs), chain.prismatic
+    return Sites(extended, chain.coordinates, base, tuple(tilt), tuple(link_end), *ways)
+
+
+class _Springs:
+    """Transforms so far, and the number of coordinates that they use."""
+
+    def __init__(self, count):
+        self.transforms, self.count = [], count
+
+    def add(self, kinds):
+        first = self.count
+        for number, kind in enumerate(kinds):
+            self.transforms.append(Transform(kind, number % 3, 0.0, first + number))
+        self.count += len(kinds)
+        return tuple(range(first, self.count))
+
+
+def _link(fixed):
+    """Vector along fixed transforms in the frame at their end, and rotation from that frame to the one at their start."""
+    end = MeasuringPoint("end", len(fixed))
+    position, rotation = poses(Chain(tuple(fixed), (end,), 1), np.zeros((1, 1)), end)
+    return rotation[0].T @ position[0], rotation[0]

@@ -1,0 +1,31 @@
+"""Cramér-Rao bounds: the least error that any unbiased estimator can have from the readings that a strategy takes."""
+
+import numpy as np
+
+from elastocal.study.identification import cholesky_triangles, inverse_triangles
+
+
+def squared_error_bounds(information, moment):
+    """Bound of the mean squared end-effector position error, for readings of unit variance.
+
+    Parameters
+    ----------
+    information : ndarray (configurations, n, n, sets)
+        Sum of A^T A over the readings of the first k configurations, for every k (`identification.prefix_information`).
+    moment : ndarray (n, n)
+        Mean over test configurations of A^T A of the end-effector position (`metrics.error_moment`).
+
+    Returns
+    -------
+    ndarray (configurations, sets)
+        trace(M N^-1), m^2 per m^2 of reading variance; infinite where N is singular.
+
+    Notes
+    -----
+    With N = R^T R the trace is that of X^T M X, where X = R^-1.
+    """
+    inverse = inverse_triangles(cholesky_triangles(information))
+    rows = inverse.reshape(*inverse.shape[:2], -1)
+    weighted = (moment @ rows).reshape(inverse.shape)
+    bounds = (weighted * inverse).sum(axis=(1, 2))
+    return np.where(np.isnan(bounds), np.inf, bounds)

@@ -1,0 +1,134 @@
+"""The paper's printed figures beside ours, each with the Monte Carlo spread of a study of this size."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from elastocal.study.tables import deviation_ratio, share_compensated
+
+ACCEPTED_Z = 2.5
+_TABLE2 = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
+_TABLE4 = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
+
+
+@dataclass(frozen=True)
+class OurResults:
+    """Everything that a printed figure may be compared with.
+
+    Attributes
+    ----------
+    tables : dict of str to DataFrame
+        table1 .. table4 and extended.
+    metrics, replicates : DataFrame
+        Long; of all robots and strategies.
+    noise_um : float
+    length : int
+        Noise level and data set length of the tables.
+    """
+
+    tables: dict
+    metrics: pd.DataFrame
+    replicates: pd.DataFrame
+    noise_um: float
+    length: int
+
+
+def comparison_table(reference, ours):
+    """One row for each figure that the paper prints.
+
+    Parameters
+    ----------
+    reference : DataFrame
+        table, robot, strategy, quantity, unit, value as printed; empty strings where a figure belongs to none.
+    ours : OurResults
+
+    Returns
+    -------
+    pandas.DataFrame
+        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, reading. `mc_std` is the standard deviation between
+        studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where one
+        is missing. The paper is a study of the same size with the same spread, so a faithful z has standard deviation 1.4 and
+        about one in thirteen lies beyond 2.5. What the study does not cover is empty.
+    """
+    rows = []
+    for figure in reference.itertuples():
+        value, spread, reading = _RULES[figure.table](figure, ours)
+        z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
+        printed = (figure.table, figure.robot, figure.strategy, figure.quantity, figure.unit, figure.value)
+        rows.append((*printed, value, spread, z, reading))
+    names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "reading"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def _table1_figure(figure, ours):
+    return _pair(ours.tables["table1"], figure.quantity, robot=figure.robot)[0], 0.0, "R1: an input"
+
+
+def _table2_figure(figure, ours):
+    column = _TABLE2[figure.quantity]
+    chosen = (figure.robot, column) == ("kuka_extended", "mean_mm")
+    return *_pair(ours.tables["table2"], column, robot=figure.robot), "R11: the tube was chosen for it" if chosen else "R3"
+
+
+def _table3_figure(figure, ours):
+    return *_pair(ours.tables["table3"], figure.quantity, robot=figure.robot), "R7"
+
+
+def _table4_figure(figure, ours):
+    table, key = ours.tables["table4"], {"strategy": figure.strategy, "robot": figure.robot}
+    column = _TABLE4.get(figure.quantity, figure.quantity)
+    if "k_sigma" not in column:
+        return *_pair(table, column, **key), "R8"
+    whole, first = _pair(table, column, **key), _pair(table, f"{column}_first_stage", **key)
+    return *first, "R7" if first == whole else "R7, R10: joints of the first stage"
+
+
+def _text_figure(figure, ours):
+    return _TEXT[figure.quantity](ours)
+
+
+def _largest_residual(ours):
+    extended = ours.tables["extended"]
+    if extended.empty:
+        return np.nan, np.nan, ""
+    worst = extended.loc[extended.residual_mean_um.idxmax()]
+    return worst.residual_mean_um, worst.residual_mean_um_std_error, "R11: largest of all strategies; the paper prints a bound"
+
+
+def _share_with_links(ours):
+    row = _pair(ours.tables["extended"], "share_compensated_percent", strategy="6DoF")
+    return *row, "R11, strategy 6DoF"
+
+
+def _share_without_links(ours):
+    return *share_compensated(ours.metrics, ours.replicates, "kuka", "6DoF", ours.noise_um, ours.length), "kuka, strategy 6DoF"
+
+
+def _smallest_ratio(ours):
+    ratios = []
+    for _, cells in ours.tables["table4"].groupby("robot", sort=True):
+        best = cells.loc[cells[f"dev_{ours.length}_um"].idxmin()]
+        ratios.append(
+            deviation_ratio(ours.metrics, ours.replicates, best.robot, "6DoF", best.strategy, ours.noise_um, ours.length)
+        )
+    return *min(ratios), "R8: the best strategy of each robot, the smaller robot ratio"
+
+
+_RULES = {"1": _table1_figure, "2": _table2_figure, "3": _table3_figure, "4": _table4_figure, "text": _text_figure}
+_TEXT = {
+    "residual_deviation_upper_bound": _largest_residual,
+    "share_compensated_with_link_elasticity": _share_with_links,
+    "share_compensated_joint_elasticity_only": _share_without_links,
+    "best_over_6DoF_dev_ratio_min": _smallest_ratio,
+}
+
+
+def _pair(table, column, **key):
+    """Value and standard error of one cell; not a number where the table lacks it."""
+    rows = table
+    for name, value in key.items():
+        rows = rows[rows[name] == value]
+    if rows.empty or column not in rows:
+        return np.nan, np.nan
+    return float(rows[column].iloc[0]), float(rows.get(f"{column}_std_error", pd.Series(0.0, rows.index)).iloc[0])

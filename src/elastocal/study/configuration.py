@@ -1,0 +1,96 @@
+"""The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
+
+from dataclasses import dataclass
+
+from elastocal.errors import InputError
+from elastocal.io.documents import check_document, document_path, named_document
+from elastocal.mechanics.robot import robot_from_document
+from elastocal.study.identification import first_solvable_length
+from elastocal.study.strategies import check_strategy, strategy_from_document
+
+
+@dataclass(frozen=True)
+class Study:
+    """A configuration that holds together.
+
+    Attributes
+    ----------
+    robots, strategies : dict of str to dict
+        Documents by the names of their files.
+    points : dict of str to tuple of str
+        Measuring points that each strategy reads.
+    end_effectors : dict of str to str
+        Last measuring point of each robot.
+    """
+
+    robots: dict
+    strategies: dict
+    points: dict
+    end_effectors: dict
+
+
+def check_study(config, folder, source="config.yaml"):
+    """Read the robots and strategies that a configuration names and check everything against everything.
+
+    Parameters
+    ----------
+    config : dict
+    folder : str or Path
+        Holds ``robots/`` and ``strategies/``.
+    source : str
+        File of the configuration, named in errors.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        The first fault found.
+    """
+    check_document(config, "config", source)
+    robots = {name: named_document(folder, "robots", "robot", name, source) for name in config["robots"]}
+    strategies = {name: named_document(folder, "strategies", "strategy", name, source) for name in config["strategies"]}
+    chains = {
+        name: robot_from_document(document, document_path(folder, "robots", name)).chain for name, document in robots.items()
+    }
+    points = {}
+    for name, document in strategies.items():
+        strategy = strategy_from_document(document)
+        points[name] = strategy.points
+        for chain in chains.values():
+            check_strategy(strategy, chain, document_path(folder, "strategies", name))
+        needed = first_solvable_length(strategy, rows_read(config["readings"]["measured"]))
+        if config["configurations"] < needed:
+            raise InputError(
+                source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short"
+            )
+    if all("links" in document for document in robots.values()):
+        raise InputError(
+            source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4"
+        )
+    _check_cells(config, source)
+    return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
+
+
+def rows_read(measured):
+    """Readings of one point in one configuration: 6 where poses are measured, 3 where positions are."""
+    return {"pose": 6, "position": 3}[measured]
+
+
+def _check_cells(config, source):
+    tables, longest = config["tables"], config["configurations"]
+    if tables["classical_strategy"] not in config["strategies"]:
+        raise InputError(
+            source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}"
+        )
+    if tables["noise_um"] not in config["noise_um"]:
+        raise InputError(source, "tables.noise_um", str(tables["noise_um"]), f"one of noise_um {config['noise_um']}")
+    for index, length in enumerate(config["evaluation"]["lengths"]):
+        if length > longest:
+            raise InputError(source, f"evaluation.lengths[{index}]", str(length), f"up to configurations = {longest}")
+    if tables["length"] not in config["evaluation"]["lengths"]:
+        raise InputError(
+            source, "tables.length", str(tables["length"]), f"one of evaluation.lengths {config['evaluation']['lengths']}"
+        )

@@ -1,0 +1,93 @@
+"""Identification on the exact kinematics: Gauss-Newton steps on the pose at q + c J^T w, where equation 11 is linear.
+
+Only an iterative solver gives a meaning to a strategy that "uses the estimate as initial condition".
+"""
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import regressor
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+
+STEPS = 30
+# Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
+# of positions of metres against deflections of millimetres, which the condition number magnifies.
+LAST_STEP = 1e-7
+
+
+def identify_exactly(strategy, chain, joint_angles, torques, deflections, start, lengths):
+    """Compliances by a strategy with the exact kinematics, for some prefix lengths of every data set.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    chain : Chain
+    joint_angles : ndarray (configurations, sets, n)
+        rad.
+    torques : dict of str to ndarray (configurations, sets, n)
+        Joint torques behind the readings of each point, N m.
+    deflections : dict of str to ndarray (configurations, sets, rows)
+        Measured deflection of each point, m and, where there are six rows, rad.
+    start : ndarray (n,)
+        Where joints start that no earlier stage has estimated, rad/(N m).
+    lengths : sequence of int
+        Prefix lengths to solve.
+
+    Returns
+    -------
+    ndarray (lengths, n, sets)
+        rad/(N m); not a number where the steps of a data set do not settle, as in very short prefixes near a singularity.
+    """
+    sets, joints = joint_angles.shape[1:]
+    solved = np.empty((len(lengths), joints, sets))
+    for index, length in enumerate(lengths):
+        compliance = np.tile(start, (sets, 1))
+        for stage in strategy.stages:
+            data = [
+                (chain.point(name), joint_angles[:length], torques[name][:length], deflections[name][:length])
+                for name in stage.points
+            ]
+            compliance = _solve_stage(chain, data, list(stage.identified), compliance)
+        solved[index] = compliance.T
+    return solved
+
+
+def _solve_stage(chain, data, identified, compliance):
+    compliance = compliance.copy()
+    data = [(*readings, poses(chain, readings[1], readings[0])) for readings in data]
+    settled = np.zeros(len(compliance), bool)
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            normal = right = 0.0
+            for point, joint_angles, torques, measured, unloaded in data:
+                sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance)
+                sensitivity = sensitivity[..., identified]
+                normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
+                right = right + np.einsum("ksri,ksr->si", sensitivity, residual, optimize=True)
+            step = _solved(normal, right)
+            compliance[:, identified] += step
+            if settled.all():
+                break
+            settled = np.abs(step).max(axis=1) <= LAST_STEP * np.abs(compliance).max(axis=1)
+    compliance[~settled] = np.nan
+    return compliance
+
+
+def _solved(normal, right):
+    """Solutions of the normal equations; not a number where they are singular."""
+    usable = np.isfinite(normal).all(axis=(1, 2))
+    usable[usable] = np.linalg.cond(normal[usable]) < 1.0 / np.finfo(float).eps
+    solution = np.full_like(right, np.nan)
+    solution[usable] = np.linalg.solve(normal[usable], right[usable, :, None])[..., 0]
+    return solution
+
+
+def _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance):
+    """Derivative of the predicted deflection with respect to the compliances, and what it leaves of the measured one."""
+    rows = measured.shape[-1]
+    *loaded, jacobian = poses_and_jacobians(chain, joint_angles + compliance * torques, point)
+    predicted = pose_differences(*loaded, *unloaded)
+    sensitivity = regressor(jacobian, torques)
+    # A rotation vector r turns with angular velocity w at the rate w - r x w / 2 (first order in r).
+    turn, angular = predicted[..., 3:, None], sensitivity[..., 3:, :]
+    sensitivity[..., 3:, :] = angular - 0.5 * np.cross(turn, angular, axis=-2)
+    return sensitivity[..., :rows, :], measured - predicted[..., :rows]

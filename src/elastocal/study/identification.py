@@ -1,0 +1,346 @@
+"""Equation 11 for every prefix of many data sets in one pass, one strategy at a time.
+
+The least-squares problem of the first k configurations, for every k, is solved by orthogonal elimination that takes one
+configuration after the other and all data sets at once. It gives the solution of the normal equations of equation 11 without
+forming them, so that prefixes of one or two configurations keep their digits.
+
+Inside this module the batch lies last in memory, as (..., configuration, data set).
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from elastocal.study.strategies import without_forgotten_stages
+
+# Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
+# the readings do not determine the compliances.
+LARGEST_CONDITION = 1e7
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What one measuring point contributes.
+
+    Attributes
+    ----------
+    regressor : ndarray (rows, n, configurations, sets)
+        Matrix A of equation 10, base axes.
+    deflection : ndarray (rows, configurations, sets)
+        Measured deflection; rows are three displacements (m), then, where poses are measured, three rotations (rad).
+    """
+
+    regressor: np.ndarray
+    deflection: np.ndarray
+
+
+@dataclass(frozen=True)
+class Estimates:
+    """What a strategy makes of each prefix; the first axis for the prefixes 1, 2, 3 ...
+
+    Attributes
+    ----------
+    compliance : ndarray (configurations, n, sets)
+        rad/(N m); not a number where the readings of the prefix do not determine them.
+    covariance : ndarray (configurations, sets, n, n)
+        Of the compliances for readings with unit variance, through all stages.
+    condition : ndarray (configurations, sets)
+        2-norm condition number of the identification Jacobian, the largest of the stages.
+    """
+
+    compliance: np.ndarray
+    covariance: np.ndarray
+    condition: np.ndarray
+
+
+def first_solvable_length(strategy, rows):
+    """Smallest number of configurations with at least as many readings as unknowns in every stage.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    rows : int
+        Readings of one point in one configuration: 6 for poses, 3 for positions.
+
+    Returns
+    -------
+    int
+    """
+    return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
+
+
+def identify(strategy, readings, joints):
+    """Compliances by a strategy for every prefix length of every data set, with covariance and condition number.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    readings : dict of str to Readings
+        For each measuring point of the strategy.
+    joints : int
+        Number of joints, n.
+
+    Returns
+    -------
+    Estimates
+    """
+    compliance, triangles = estimate_compliance(strategy, readings, joints)
+    spread = covariance(strategy, readings, triangles)
+    condition = condition_numbers(strategy, triangles)
+    undetermined = undetermined_prefixes(strategy, readings, condition)
+    np.moveaxis(compliance, 1, -1)[undetermined] = np.nan
+    spread[undetermined] = np.nan
+    condition[undetermined] = np.nan
+    return Estimates(compliance, spread, condition)
+
+
+def undetermined_prefixes(strategy, readings, condition):
+    """Which prefixes of which data sets do not determine the compliances: too few readings, or not the right ones.
+
+    Parameters
+    ----------
+    strategy, readings
+        As in `identify`.
+    condition : ndarray (configurations, sets)
+        From `condition_numbers`.
+
+    Returns
+    -------
+    ndarray of bool (configurations, sets)
+    """
+    rows = next(iter(readings.values())).regressor.shape[0]
+    undetermined = ~(condition < LARGEST_CONDITION)
+    undetermined[: first_solvable_length(strategy, rows) - 1] = True
+    return undetermined
+
+
+def estimate_compliance(strategy, readings, joints):
+    """Solve the stages of a strategy one after the other (equation 11).
+
+    Parameters
+    ----------
+    strategy, readings, joints
+        As in `identify`.
+
+    Returns
+    -------
+    compliance : ndarray (configurations, n, sets)
+        rad/(N m); meaningless where a prefix is too short, see `first_solvable_length`.
+    triangles : list of ndarray (configurations, pivots, columns, sets)
+        Triangular factor of each stage; columns: joints identified, joints held, right-hand side.
+    """
+    *_, configurations, sets = next(iter(readings.values())).regressor.shape
+    compliance = np.full((configurations, joints, sets), np.nan)
+    triangles = []
+    for stage in strategy.stages:
+        pivots = len(stage.identified)
+        triangle = prefix_triangles(_systems(stage, readings), configurations, pivots)
+        right = triangle[:, :, -1]
+        for column, joint in enumerate(stage.held, pivots):
+            right = right - triangle[:, :, column] * compliance[:, None, joint]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            for row in range(pivots - 1, -1, -1):
+                rest = right[:, row].copy()
+                for column in range(row + 1, pivots):
+                    rest -= triangle[:, row, column] * compliance[:, stage.identified[column]]
+                compliance[:, stage.identified[row]] = rest / triangle[:, row, row]
+        triangles.append(triangle)
+    return compliance, triangles
+
+
+def covariance(strategy, readings, triangles):
+    """Covariance of the estimates for readings of unit variance, through all stages, also where stages share readings.
+
+    Parameters
+    ----------
+    strategy, readings
+        As in `identify`.
+    triangles : list of ndarray
+        From `estimate_compliance`.
+
+    Returns
+    -------
+    ndarray (configurations, sets, n, n)
+
+    Notes
+    -----
+    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced readings
+    z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the covariance of
+    the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared readings) R_t^-1.
+    """
+    joints = next(iter(readings.values())).regressor.shape[1]
+    stages, gains, inverses = without_forgotten_stages(strategy, joints).stages, [], []
+    for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
+        pivots, size = list(stage.identified), len(stage.identified)
+        inverse = _row_major(inverse_triangles(triangle[:, :, :size]))
+        back = inverse @ _row_major(triangle[:, :, size:-1])
+        for gain in gains:
+            gain[..., pivots, :] = -back @ gain[..., list(stage.held), :]
+        gains.append(np.zeros((*inverse.shape[:2], joints, size)))
+        gains[-1][..., pivots, :] = inverse
+        inverses.append(inverse)
+    total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
+    for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
+        if shared := set(earlier.points) & set(later.points):
+            information = _row_major(sum(prefix_information(readings[name].regressor) for name in sorted(shared)))
+            products = information[..., list(earlier.identified), :][..., list(later.identified)]
+            between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
+            cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
+            total += cross + np.swapaxes(cross, -1, -2)
+    return total
+
+
+def condition_numbers(strategy, triangles):
+    """2-norm condition number of the identification Jacobian, the largest of the stages.
+
+    Parameters
+    ----------
+    strategy : Strategy
+    triangles : list of ndarray
+        From `estimate_compliance`; their singular values are those of the regressor.
+
+    Returns
+    -------
+    ndarray (configurations, sets)
+        Infinite where the smallest singular value is zero to rounding.
+    """
+    largest = 1.0
+    for stage, triangle in zip(strategy.stages, triangles, strict=True):
+        matrices = _row_major(triangle[:, :, : len(stage.identified)])
+        eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
+        with np.errstate(divide="ignore"):
+            largest = np.maximum(largest, np.sqrt(eigenvalues[..., -1] / np.maximum(eigenvalues[..., 0], 0.0)))
+    return largest
+
+
+def prefix_triangles(systems, configurations, pivots):
+    """Triangular factor of the first k configurations, for every k, by Householder reflections.
+
+    Parameters
+    ----------
+    systems : iterable of ndarray (rows, columns, sets)
+        Equations of one configuration after the other: unknowns first, right-hand side last. They are overwritten, and each
+        may lie in the memory of the one before.
+    configurations : int
+        How many systems there are.
+    pivots : int
+        How many leading columns are unknowns to eliminate.
+
+    Returns
+    -------
+    ndarray (configurations, pivots, columns, sets)
+        Rows of R and, in the remaining columns, Q^T times them.
+
+    Notes
+    -----
+    The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
+    row of the triangle and the new rows only.
+    """
+    triangles = None
+    for index, new in enumerate(systems):
+        if triangles is None:
+            triangles = np.zeros((configurations, pivots, *new.shape[1:]))
+            products = np.empty_like(new)
+        else:
+            triangles[index] = triangles[index - 1]
+        triangle = triangles[index]
+        for k in range(pivots):
+            head, tail, rest = triangle[k, k], new[:, k], new[:, k + 1 :]
+            dots = np.einsum("rs,rcs->cs", tail, new[:, k:])
+            reflected = -np.copysign(np.sqrt(head * head + dots[0]), head)
+            lead = head - reflected
+            scale = -reflected * lead
+            weight = lead * triangle[k, k + 1 :] + dots[1:]
+            weight /= np.where(scale > 0, scale, 1.0)
+            triangle[k, k + 1 :] -= lead * weight
+            rest -= np.multiply(tail[:, None], weight, out=products[:, k + 1 :])
+            triangle[k, k] = reflected
+    return triangles
+
+
+def inverse_triangles(triangle):
+    """Inverses of upper triangular matrices.
+
+    Parameters
+    ----------
+    triangle : ndarray (configurations, m, m, sets)
+
+    Returns
+    -------
+    ndarray (configurations, m, m, sets)
+        Infinite or not a number where singular.
+    """
+    size = triangle.shape[1]
+    inverse = np.zeros_like(triangle)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for column in range(size):
+            inverse[:, column, column] = 1.0 / triangle[:, column, column]
+            for row in range(column - 1, -1, -1):
+                done = (triangle[:, row, row + 1 : column + 1] * inverse[:, row + 1 : column + 1, column]).sum(axis=1)
+                inverse[:, row, column] = -done * inverse[:, row, row]
+    return inverse
+
+
+def cholesky_triangles(information):
+    """Upper triangular factors R of symmetric matrices R^T R.
+
+    Parameters
+    ----------
+    information : ndarray (configurations, m, m, sets)
+        Only the upper triangles are read.
+
+    Returns
+    -------
+    ndarray (configurations, m, m, sets)
+        Not a number where a matrix is not positive definite to rounding, see `LARGEST_CONDITION`.
+    """
+    size = information.shape[1]
+    triangle = np.zeros_like(information)
+    for row in range(size):
+        rest = information[:, row, row:].copy()
+        for above in range(row):
+            rest -= triangle[:, above, row, None] * triangle[:, above, row:]
+        pivot, diagonal = rest[:, 0], information[:, row, row]
+        pivot[~(pivot > diagonal / LARGEST_CONDITION**2)] = np.nan
+        triangle[:, row, row:] = rest / np.sqrt(pivot)[:, None]
+    return triangle
+
+
+def prefix_information(regressor):
+    """Sum of A^T A over the first k configurations, for every k.
+
+    Parameters
+    ----------
+    regressor : ndarray (rows, n, configurations, sets)
+
+    Returns
+    -------
+    ndarray (configurations, n, n, sets)
+    """
+    _, joints, configurations, sets = regressor.shape
+    information = np.empty((configurations, joints, joints, sets))
+    for i in range(joints):
+        for j in range(i + 1):
+            product = sum(row[i] * row[j] for row in regressor)
+            information[:, i, j] = information[:, j, i] = np.cumsum(product, axis=0)
+    return information
+
+
+def _systems(stage, readings):
+    """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
+    order = stage.identified + stage.held
+    points = [readings[name] for name in stage.points]
+    rows, _, configurations, sets = points[0].regressor.shape
+    system = np.empty((len(points), rows, len(order) + 1, sets))
+    for configuration in range(configurations):
+        for part, point in zip(system, points, strict=True):
+            for column, joint in enumerate(order):
+                part[:, column] = point.regressor[:, joint, configuration]
+            part[:, -1] = point.deflection[:, configuration]
+        yield system.reshape(-1, *system.shape[2:])
+
+
+def _row_major(matrices):
+    """(configurations, m, n, sets) to contiguous (configurations, sets, m, n), as stacked linear algebra wants it."""
+    return np.ascontiguousarray(np.moveaxis(matrices, -1, 1))

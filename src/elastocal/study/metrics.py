@@ -1,0 +1,216 @@
+"""Equations 12-15: how good an identified model is, in its stiffnesses and at the end-effector."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
+from elastocal.mechanics.kinematics import jacobians
+
+# So many models at a time keep their errors at 500 test configurations in a second-level cache.
+MODELS_AT_A_TIME = 400
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Loaded configurations that no identification has seen, ready to score any compliances.
+
+    Attributes
+    ----------
+    reference : ndarray (n,)
+        Compliances about which the prediction is linear, rad/(N m).
+    quadratic_forms : ndarray (tests, (n + 1)(n + 2) / 2)
+        Squared position error at each test configuration as a quadratic form in (c - reference, 1).
+    initial_errors : ndarray (tests,)
+        Position error without any elastostatic model: the deflection itself, m.
+    """
+
+    reference: np.ndarray
+    quadratic_forms: np.ndarray
+    initial_errors: np.ndarray
+
+
+def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
+    """Score sheet of the reduced model on test configurations.
+
+    Parameters
+    ----------
+    robot : Robot
+        Its joint compliances are the reference.
+    experiments : Experiments
+    true_deflection : ndarray (..., 6)
+        Of the end-effector, as simulated with the robot's full model.
+    wrench_at : {"end_effector", "measuring_point"}
+        Reading R6; it matters where a target is offset from the end-effector.
+
+    Returns
+    -------
+    Judge
+
+    Notes
+    -----
+    The position error of a model c is (exact prediction at the reference - truth) + A (c - reference); what this leaves out is
+    of second order in the compliance *error*, below a thousandth of the error itself.
+    """
+    point = robot.chain.end_effector
+    at = loaded_point(robot.chain, point, wrench_at)
+    torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, at)
+    jacobian = jacobians(robot.chain, experiments.joint_angles, point)
+    slope = regressor(jacobian, torques)[..., :3, :].reshape(-1, 3, robot.joints)
+    predicted = exact_deflections(robot.chain, experiments.joint_angles, robot.compliance * torques, point)
+    offset = (predicted - true_deflection)[..., :3].reshape(-1, 3, 1)
+    rows = np.concatenate([slope, offset], axis=-1)
+    first, second = np.triu_indices(robot.joints + 1)
+    forms = (rows[..., first] * rows[..., second]).sum(axis=1) * np.where(first == second, 1.0, 2.0)
+    return Judge(robot.compliance, forms, np.linalg.norm(true_deflection[..., :3], axis=-1).ravel())
+
+
+def error_moment(judge):
+    """Mean over the test configurations of A^T A: the quadratic form of the mean squared position error.
+
+    Parameters
+    ----------
+    judge : Judge
+
+    Returns
+    -------
+    ndarray (n, n)
+        m^2 per (rad/(N m))^2.
+    """
+    size = len(judge.reference) + 1
+    first, second = np.triu_indices(size)
+    moment = np.zeros((size, size))
+    moment[first, second] = judge.quadratic_forms.mean(axis=0) / 2
+    return (moment + moment.T)[:-1, :-1]
+
+
+def scored_parts(groups, models):
+    """Slices of groups of models, small enough for the errors of one to stay in the cache.
+
+    Parameters
+    ----------
+    groups : int
+    models : int
+        In each group.
+
+    Returns
+    -------
+    list of slice
+    """
+    size = max(1, MODELS_AT_A_TIME // models)
+    return [slice(start, start + size) for start in range(0, groups, size)]
+
+
+def position_errors(judge, compliance):
+    """End-effector position error of models at every test configuration.
+
+    Parameters
+    ----------
+    judge : Judge
+    compliance : ndarray (models, n)
+        rad/(N m).
+
+    Returns
+    -------
+    ndarray (models, tests)
+        m.
+    """
+    error = np.column_stack([compliance - judge.reference, np.ones(len(compliance))])
+    first, second = np.triu_indices(error.shape[1])
+    squares = (error[:, first] * error[:, second]) @ judge.quadratic_forms.T
+    return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
+
+
+def mean_deviation(judge, compliance, test_weights=None):
+    """Equation 15: position error of models, mean over the test configurations.
+
+    Parameters
+    ----------
+    judge : Judge
+    compliance : ndarray (groups, models, n)
+    test_weights : ndarray (groups, tests), optional
+        How often each test configuration counts for a group of models; once without.
+
+    Returns
+    -------
+    ndarray (groups, models)
+        m.
+    """
+    if test_weights is None:
+        test_weights = np.ones((len(compliance), len(judge.initial_errors)))
+    groups, models, joints = compliance.shape
+    means = np.empty((groups, models))
+    for part in scored_parts(groups, models):
+        errors = position_errors(judge, compliance[part].reshape(-1, joints)).reshape(-1, models, test_weights.shape[1])
+        means[part] = (errors @ test_weights[part, :, None])[..., 0]
+    return means / test_weights.sum(axis=1, keepdims=True)
+
+
+def relative_stiffness_error(compliance, true_compliance):
+    """Equation 13, (k - k0) / k0 in percent, with k = 1 / c.
+
+    Parameters
+    ----------
+    compliance : ndarray (..., n)
+        Inverse of the averaged stiffness.
+    true_compliance : ndarray (n,)
+
+    Returns
+    -------
+    ndarray (..., n)
+    """
+    return 100.0 * (true_compliance / compliance - 1.0)
+
+
+def k_sigma(compliance, true_compliance, joints=slice(None)):
+    """Equation 14: sum of the relative stiffness errors over joints, in percent.
+
+    Parameters
+    ----------
+    compliance, true_compliance
+        As in `relative_stiffness_error`.
+    joints : sequence of int, optional
+        Only these (reading R10).
+
+    Returns
+    -------
+    ndarray (...)
+    """
+    return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(axis=-1)
+
+
+def first_length_below(values, limit):
+    """First data set length at which a metric is at most `limit` in absolute value.
+
+    Parameters
+    ----------
+    values : ndarray (..., lengths)
+        For the lengths 1, 2, 3 ...; not-a-number counts as above.
+    limit : float
+
+    Returns
+    -------
+    ndarray (...)
+        Infinite where no length reaches it.
+    """
+    below = np.abs(values) <= limit
+    return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
+
+
+def length_to_reach(values, limit):
+    """Data set length at which a metric comes down to `limit`, past the longest one if need be.
+
+    Parameters
+    ----------
+    values : ndarray (..., lengths)
+        For the lengths 1, 2, 3 ...
+    limit : float
+
+    Returns
+    -------
+    ndarray (...)
+        As `first_length_below`; where that is infinite, the metric is continued as a bias of second order, which falls as
+        1 / length.
+    """
+    first, longest = first_length_below(values, limit), values.shape[-1]
+    return np.where(np.isfinite(first), first, longest * np.maximum(np.abs(values[..., -1]) / limit, 1.0))

@@ -1,0 +1,115 @@
+"""Data sets as the paper makes them: random configurations and forces, exact deflections, noise.
+
+Arrays have the axes (data set, configuration, ...).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces, loaded_point, wrench_of_offset_force
+from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.mechanics.links import extended_chain, spring_compliance
+from elastocal.random_streams import draw
+from elastocal.study.experiments import Experiments
+
+
+@dataclass(frozen=True)
+class Loading:
+    """How the robot is moved and loaded.
+
+    Attributes
+    ----------
+    force_N : float
+        Magnitude; the direction is uniform on the sphere.
+    offset_m : tuple of float
+        From the end-effector to where the force acts.
+    offset_frame : {"base", "tool"}
+        Axes of the offset (reading R4).
+    joint_range : {"full_turn", "limits"}
+        Joint angles uniform in +-pi or within the robot's limits (reading R3).
+    """
+
+    force_N: float
+    offset_m: tuple
+    offset_frame: str
+    joint_range: str
+
+
+def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, configurations):
+    """Random configurations and wrenches.
+
+    Parameters
+    ----------
+    chain : Chain
+    limits : ndarray (n, 2)
+        Joint limits in rad.
+    seed : int
+    key : str
+        Name of the robot's file; part of the name of the random streams.
+    loading : Loading
+    purpose : str
+        Part of the name of the random streams: data that identify and data that judge never share one.
+    data_sets : sequence of int
+    configurations : int
+        In each data set; the first k of them do not depend on how many there are.
+
+    Returns
+    -------
+    Experiments
+    """
+    n = chain.coordinates
+    turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
+    low, high = limits.T if loading.joint_range == "limits" else (np.full(n, -np.pi), np.full(n, np.pi))
+    joint_angles = low + (high - low) * turns
+    normal = draw(seed, key, f"{purpose}/force", data_sets, lambda stream: stream.standard_normal((configurations, 3)))
+    force = loading.force_N * normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    rotation = poses(chain, joint_angles, chain.end_effector)[1] if loading.offset_frame == "tool" else None
+    return Experiments(joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation))
+
+
+def true_deflections(robot, experiments, point, wrench_at):
+    """Deflection of a measuring point: theta from equation 7, then the exact kinematics of all springs.
+
+    Parameters
+    ----------
+    robot : Robot
+        Reduced or, where it has links, extended.
+    experiments : Experiments
+    point : MeasuringPoint
+        Of the robot's chain.
+    wrench_at : {"end_effector", "measuring_point"}
+        Where the wrench that deflects a partial point is taken to act (reading R6).
+
+    Returns
+    -------
+    ndarray (sets, configurations, 6)
+        m, rad.
+    """
+    chain = extended_chain(robot)
+    unloaded = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
+    unloaded[..., : robot.joints] = experiments.joint_angles
+    measured = replace(chain.point(point.name), offset_m=point.offset_m)
+    jacobian = jacobians(chain, unloaded, loaded_point(chain, measured, wrench_at))
+    springs = generalized_forces(jacobian, experiments.wrench) @ spring_compliance(robot)
+    return exact_deflections(chain, unloaded, springs, measured)
+
+
+def measurement_noise(seed, key, point_name, data_sets, configurations):
+    """Standard normal noise of the six components at one measuring point; times the noise level it is the measurement error.
+
+    The same numbers serve every noise level, so that levels differ by scale alone.
+
+    Parameters
+    ----------
+    seed, key
+        As in `random_experiments`.
+    point_name : str
+    data_sets : sequence of int
+    configurations : int
+
+    Returns
+    -------
+    ndarray (sets, configurations, 6)
+    """
+    return draw(seed, key, f"noise/{point_name}", data_sets, lambda stream: stream.standard_normal((configurations, 6)))

@@ -1,0 +1,40 @@
+"""Step 4b: what the readings of each strategy could give at best."""
+
+import numpy as np
+
+from elastocal.study.bounds import squared_error_bounds
+from elastocal.study.identification import prefix_information
+from elastocal.study.metrics import error_moment
+from elastocal.study.steps.design import Design
+
+
+def bound_blocks(experiment_blocks, chain, point_sets, rows, wrench_at, judge):
+    """Cramér-Rao bound of the RMS end-effector error for each set of measuring points and each length.
+
+    Parameters
+    ----------
+    experiment_blocks : iterable of dict
+        Blocks of the experiments table.
+    chain : Chain
+    point_sets : iterable of tuple of str
+    rows : int
+        6 where poses are measured, 3 where positions are.
+    wrench_at : {"end_effector", "measuring_point"}
+    judge : Judge
+
+    Yields
+    ------
+    dict
+        Columns of one block of the bounds table.
+    """
+    point_sets = list(dict.fromkeys(tuple(sorted(points)) for points in point_sets))
+    names = sorted({name for points in point_sets for name in points})
+    moment, sums, sets = error_moment(judge), dict.fromkeys(point_sets, 0.0), 0
+    for block in experiment_blocks:
+        regressors = Design(block, chain, names, rows, wrench_at).regressors
+        information = {name: prefix_information(matrix) for name, matrix in regressors.items()}
+        sets += regressors[names[0]].shape[-1]
+        for points in point_sets:
+            sums[points] = sums[points] + squared_error_bounds(sum(information[p] for p in points), moment).sum(axis=1)
+    for points, total in sums.items():
+        yield {"points": "+".join(points), "length": np.arange(1, len(total) + 1), "rms_per_noise": np.sqrt(total / sets)}

@@ -1,0 +1,84 @@
+"""Step 2b: what the experiments of each data set can tell a strategy, before anything is measured.
+
+Covariance and condition number depend on configurations and loads alone, so they are worked out once for all noise levels.
+"""
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.study.identification import Readings, condition_numbers, covariance, estimate_compliance, undetermined_prefixes
+from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_experiments
+from elastocal.study.table_schemas import covariance_columns
+
+
+class Design:
+    """Regressors of one block of data sets, configuration before data set.
+
+    Parameters
+    ----------
+    experiments : dict
+        Block of the experiments table.
+    chain : Chain
+    points : iterable of str
+    rows : int
+        6 where poses are measured, 3 where positions are.
+    wrench_at : {"end_effector", "measuring_point"}
+        Reading R6.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (configurations, sets, n)
+    torques : dict of str to ndarray (configurations, sets, n)
+        Joint torques behind the readings of each point, N m.
+    regressors : dict of str to ndarray (rows, n, configurations, sets)
+    """
+
+    def __init__(self, experiments, chain, points, rows, wrench_at):
+        loads = to_experiments(experiments)
+        self.joint_angles, wrench = configuration_first(loads.joint_angles), configuration_first(loads.wrench)
+        loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
+        measured = {name: chain.point(name) for name in points}
+        movements = {point: jacobians(chain, self.joint_angles, point) for point in {*loaded.values(), *measured.values()}}
+        forces = {point: generalized_forces(movements[point], wrench) for point in {*loaded.values()}}
+        self.torques = {name: forces[loaded[name]] for name in points}
+        # Nothing else needs the Jacobian of a measured point: its regressor takes its place in memory.
+        self.regressors = {
+            name: np.moveaxis(regressor(movements[point], self.torques[name], out=movements[point]), (-2, -1), (0, 1))[:rows]
+            for name, point in measured.items()
+        }
+
+
+def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
+    """Covariances for readings of unit variance and condition numbers of a strategy, in blocks.
+
+    Parameters
+    ----------
+    experiment_blocks : iterable of dict
+        Blocks of the experiments table.
+    chain, strategy, rows, wrench_at
+        As in `Design`.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the design table.
+    """
+    for block in experiment_blocks:
+        sets = data_sets(block)
+        regressors = Design(block, chain, strategy.points, rows, wrench_at).regressors
+        silent = np.zeros((rows, *next(iter(regressors.values())).shape[2:]))
+        readings = {name: Readings(matrix, silent) for name, matrix in regressors.items()}
+        triangles = estimate_compliance(strategy, readings, chain.coordinates)[1]
+        spread, condition = covariance(strategy, readings, triangles), condition_numbers(strategy, triangles)
+        undetermined = undetermined_prefixes(strategy, readings, condition)
+        spread[undetermined], condition[undetermined] = np.nan, np.nan
+        columns = prefix_index_columns(sets, len(condition))
+        for name, i, j in covariance_columns(chain.coordinates):
+            columns[name] = spread[..., i, j].T.ravel()
+        yield columns | {"condition": condition.T.ravel()}
+
+
+def configuration_first(array):
+    """(sets, configurations, k) to (configurations, sets, k) with memory in the order k, configurations, sets."""
+    return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1)

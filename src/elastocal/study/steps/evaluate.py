@@ -1,0 +1,59 @@
+"""Step 4: the metrics of one strategy from its identified compliances."""
+
+import numpy as np
+
+from elastocal.study.evaluation import (
+    accuracy_sums,
+    accuracy_table,
+    average,
+    metrics_table,
+    replicates_table,
+)
+from elastocal.study.metrics import make_judge
+from elastocal.study.steps.columns import data_sets, to_deflections, to_experiments
+from elastocal.study.steps.weights import to_weights
+
+
+def judge_from(robot, test_experiments, test_deflections, wrench_at):
+    """Score sheet from the tables of the test configurations; see `metrics.make_judge`."""
+    return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
+
+
+def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage_joints, method, deviation_of, lengths):
+    """Tables of metrics, bootstrap replicates and accuracy of one strategy.
+
+    Parameters
+    ----------
+    identified_blocks : iterable of dict
+        Blocks of the identified table.
+    weight_blocks : iterable of dict
+        Blocks of the weights table for the same data sets.
+    test_weights : dict
+        The block of the weights table for the test configurations.
+    judge : Judge
+    first_stage_joints : sequence of int
+    method, deviation_of
+        Readings R7 and R8, see `evaluation.average`.
+    lengths : sequence of int
+        For the accuracy of one data set.
+
+    Returns
+    -------
+    metrics, replicates, accuracy : dict of str to ndarray
+    """
+    joints, evaluated_rows, sums = len(judge.reference), np.asarray(lengths) - 1, []
+
+    def weighted():
+        """Estimates with their weights, one pass for both views of them."""
+        for block, counts in zip(identified_blocks, weight_blocks, strict=True):
+            sets = data_sets(block)
+            compliance = np.stack([block[f"c{j + 1}"].reshape(len(sets), -1) for j in range(joints)], axis=-1)
+            sums.append(accuracy_sums(compliance[:, evaluated_rows], judge))
+            yield compliance, to_weights(counts)
+
+    averages = average(weighted(), judge, method, deviation_of, to_weights(test_weights))
+    return (
+        metrics_table(averages, judge.reference, first_stage_joints),
+        replicates_table(averages, judge.reference, first_stage_joints),
+        accuracy_table(sum(sums), lengths),
+    )

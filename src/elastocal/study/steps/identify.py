@@ -1,0 +1,94 @@
+"""Step 3: one strategy on measured data sets, every prefix length."""
+
+import numpy as np
+
+from elastocal.study.gauss_newton import identify_exactly
+from elastocal.study.identification import Readings, estimate_compliance
+from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections
+from elastocal.study.steps.design import Design, configuration_first
+
+
+def paired_blocks(experiments, deflections):
+    """Blocks of the experiments with those of the deflections of the same data sets.
+
+    Parameters
+    ----------
+    experiments : iterable of dict
+    deflections : dict of str to iterable of dict
+        For each measuring point.
+
+    Yields
+    ------
+    experiments : dict
+    deflections : dict of str to dict
+    """
+    for block, *measured in zip(experiments, *deflections.values(), strict=True):
+        yield block, dict(zip(deflections, measured, strict=True))
+
+
+def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=None):
+    """Compliances in blocks; not a number where the design says that a prefix does not determine them.
+
+    Parameters
+    ----------
+    blocks : iterable of (dict, dict of str to dict)
+        Blocks of the experiments table and, for each measuring point, of the deflections table.
+    designs : iterable of dict
+        Blocks of the design table of the strategy, for the same data sets.
+    chain : Chain
+    strategy : Strategy
+    rows : int
+        6 where poses are measured, 3 where positions are.
+    wrench_at : {"end_effector", "measuring_point"}
+        Reading R6.
+    start : float, optional
+        Given, compliances come from Gauss-Newton on the exact kinematics, started there (rad/(N m)); else from equation 11.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the identified table.
+    """
+    for (experiments, deflections), design in zip(blocks, designs, strict=True):
+        sets = data_sets(experiments)
+        situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
+        condition = design["condition"].reshape(len(sets), -1).T
+        if start is None:
+            compliance = estimate_compliance(strategy, situation.readings, chain.coordinates)[0]
+        else:
+            compliance = situation.solved_exactly(start, range(1, len(condition) + 1))
+        np.moveaxis(compliance, 1, -1)[np.isnan(condition)] = np.nan
+        columns = prefix_index_columns(sets, len(compliance))
+        yield columns | {f"c{j + 1}": compliance[:, j].T.ravel() for j in range(chain.coordinates)}
+
+
+class Situation:
+    """Readings of one block, configuration before data set, ready for either solver.
+
+    Parameters
+    ----------
+    experiments : dict
+    deflections : dict of str to dict
+    chain, strategy, rows, wrench_at
+        As in `identified_blocks`.
+
+    Attributes
+    ----------
+    readings : dict of str to Readings
+        For equation 11.
+    """
+
+    def __init__(self, experiments, deflections, chain, strategy, rows, wrench_at):
+        self.chain, self.strategy = chain, strategy
+        self.design = Design(experiments, chain, strategy.points, rows, wrench_at)
+        self.measured = {name: configuration_first(to_deflections(deflections[name]))[..., :rows] for name in strategy.points}
+        self.readings = {
+            name: Readings(self.design.regressors[name], np.moveaxis(self.measured[name], -1, 0)) for name in strategy.points
+        }
+
+    def solved_exactly(self, start, lengths):
+        """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
+        start = np.full(self.chain.coordinates, start)
+        return identify_exactly(
+            self.strategy, self.chain, self.design.joint_angles, self.design.torques, self.measured, start, lengths
+        )

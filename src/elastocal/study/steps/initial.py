@@ -1,0 +1,29 @@
+"""How far each robot bends before any calibration (Table 2), data set by data set."""
+
+import numpy as np
+
+from elastocal.study.steps.columns import data_sets, to_deflections
+
+
+def initial_blocks(ideal_blocks):
+    """Statistics of the end-effector's displacement in each data set.
+
+    Parameters
+    ----------
+    ideal_blocks : iterable of dict
+        Blocks of the deflections table of the end-effector.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the initial table.
+    """
+    for block in ideal_blocks:
+        displacement = np.linalg.norm(to_deflections(block)[..., :3], axis=-1)
+        yield {
+            "data_set": data_sets(block),
+            "configurations": np.full(len(displacement), displacement.shape[1]),
+            "mean": displacement.mean(axis=1),
+            "mean_square": (displacement**2).mean(axis=1),
+            "maximum": displacement.max(axis=1),
+        }

@@ -1,0 +1,31 @@
+"""Step 2: noise on the ideal deflections."""
+
+from elastocal.mechanics.components import COMPONENT_NAMES
+from elastocal.study.simulation import measurement_noise
+from elastocal.study.steps.columns import block_shape, data_sets
+
+
+def measured_blocks(ideal_blocks, key, seed, noise):
+    """Deflections as measured: ideal plus independent normal noise on every component.
+
+    Parameters
+    ----------
+    ideal_blocks : iterable of dict
+        Blocks of the deflections table.
+    key : str
+        Name of the robot's file.
+    seed : int
+    noise : float
+        Standard deviation, the same number in m and rad.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the deflections table.
+    """
+    for block in ideal_blocks:
+        _, configurations = block_shape(block)
+        point = block["point"][0]
+        normal = measurement_noise(seed, key, point, data_sets(block), configurations)
+        measured = {name: block[name] + noise * normal[..., k].ravel() for k, name in enumerate(COMPONENT_NAMES)}
+        yield block | measured | {"point": point}

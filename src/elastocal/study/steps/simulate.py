@@ -1,0 +1,53 @@
+"""Step 1: random configurations and wrenches, and the deflections that they cause, without noise."""
+
+from elastocal.study.simulation import random_experiments, true_deflections
+from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.columns import data_sets, deflection_columns, experiment_columns, to_experiments
+
+
+def experiment_blocks(chain, limits, key, seed, loading, purpose, data_sets, configurations):
+    """Random experiments, in blocks of data sets.
+
+    Parameters
+    ----------
+    chain : Chain
+    limits : ndarray (n, 2)
+        Joint limits in rad.
+    key : str
+        Name of the robot's file.
+    seed : int
+    loading : Loading
+    purpose : {"identification", "test"}
+        Data that identify and data that judge come from different random streams.
+    data_sets, configurations : int
+
+    Yields
+    ------
+    dict
+        Columns of one block of the experiments table.
+    """
+    for first in range(0, data_sets, SETS_PER_BLOCK):
+        sets = range(first, min(first + SETS_PER_BLOCK, data_sets))
+        yield experiment_columns(sets, random_experiments(chain, limits, seed, key, loading, purpose, sets, configurations))
+
+
+def ideal_blocks(experiments, robot, wrench_at):
+    """Deflections without noise of every measuring point.
+
+    Parameters
+    ----------
+    experiments : iterable of dict
+        Blocks of the experiments table.
+    robot : Robot
+    wrench_at : {"end_effector", "measuring_point"}
+        Reading R6.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the deflections table: one point in one block of data sets.
+    """
+    for block in experiments:
+        loaded, sets = to_experiments(block), data_sets(block)
+        for point in robot.chain.points:
+            yield deflection_columns(point.name, sets, true_deflections(robot, loaded, point, wrench_at))

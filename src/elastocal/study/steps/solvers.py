@@ -1,0 +1,47 @@
+"""Equation 11 against Gauss-Newton on the exact kinematics: what "used as initial condition" changes."""
+
+from elastocal.study.identification import estimate_compliance
+from elastocal.study.steps.columns import data_sets
+from elastocal.study.steps.identify import Situation
+from elastocal.study.strategies import without_forgotten_stages
+
+
+def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
+    """Estimates of both solvers at one length, for each strategy.
+
+    Parameters
+    ----------
+    blocks : iterable of (dict, dict of str to dict)
+        As in `identify.identified_blocks`, with the points of all strategies.
+    chain : Chain
+    strategies : sequence of Strategy
+    rows : int
+    wrench_at : str
+    length : int
+        Configurations used.
+    start : float
+        Where Gauss-Newton starts, rad/(N m).
+
+    Yields
+    ------
+    dict
+        Columns of one block of the solvers table: one strategy in one block of data sets.
+    """
+    for experiments, deflections in blocks:
+        experiments, deflections = _first(experiments, length), {n: _first(d, length) for n, d in deflections.items()}
+        sets = data_sets(experiments)
+        for strategy in strategies:
+            situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
+            exact = situation.solved_exactly(start, [length])[0]
+            lasting = without_forgotten_stages(strategy, chain.coordinates)
+            linear = estimate_compliance(lasting, situation.readings, chain.coordinates)[0][length - 1]
+            columns = {"strategy": strategy.name, "data_set": sets}
+            for j in range(chain.coordinates):
+                columns[f"equation_11_c{j + 1}"], columns[f"gauss_newton_c{j + 1}"] = linear[j], exact[j]
+            yield columns
+
+
+def _first(block, length):
+    """Rows of the first configurations of each data set."""
+    kept = block["configuration"] < length
+    return {name: values[kept] for name, values in block.items()}

@@ -1,0 +1,47 @@
+"""Step 4a: the bootstrap weights of one robot, drawn once for all strategies and noise levels."""
+
+import numpy as np
+
+from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
+from elastocal.study.steps import SETS_PER_BLOCK
+
+DATA_SETS, TESTS = "data sets", "test configurations"
+
+
+def weight_blocks(key, seed, data_sets, tests, replicates):
+    """How often each data set and each test configuration counts in each bootstrap replicate, in blocks.
+
+    Parameters
+    ----------
+    key : str
+        Name of the robot's file.
+    seed : int
+    data_sets, tests : int
+        How many there are.
+    replicates : int
+
+    Yields
+    ------
+    dict
+        Columns of one block of the weights table: data sets in the blocks of the experiments, then all test configurations.
+    """
+    for first in range(0, data_sets, SETS_PER_BLOCK):
+        sets = range(first, min(first + SETS_PER_BLOCK, data_sets))
+        yield _columns(DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates))
+    yield _columns(TESTS, range(tests), bootstrap_test_weights(seed, key, tests, replicates))
+
+
+def to_weights(columns):
+    """Weights (1 + replicates, members) of a block of the weights table; replicate 0 counts each member once."""
+    counts = columns["count"].reshape(-1, columns["replicate"].max())
+    return np.vstack([np.ones(len(counts)), counts.T])
+
+
+def _columns(members, numbers, weights):
+    counts = weights[1:].T
+    return {
+        "members": members,
+        "number": np.repeat(numbers, counts.shape[1]),
+        "replicate": np.tile(np.arange(1, counts.shape[1] + 1), len(counts)),
+        "count": counts.ravel(),
+    }

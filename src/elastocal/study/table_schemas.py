@@ -1,0 +1,157 @@
+"""Every table that the study keeps, column by column: name, type, unit, meaning. Written down here and nowhere else."""
+
+from elastocal.io.storage import Column, TableSchema
+from elastocal.mechanics.components import COMPONENTS, WRENCH
+
+_SET = Column("data_set", "int32", "", "number of the data set, from 0", minimum=0)
+_CONFIGURATION = Column("configuration", "int32", "", "number of the configuration in its data set, from 0", minimum=0)
+_LENGTH = Column("length", "int32", "", "data set length ds: how many configurations, from the first, were used", minimum=1)
+
+
+def experiments(joints):
+    """Configurations and wrenches; one row for each loaded configuration."""
+    angles = [Column(f"q{j}", "float64", "rad", f"angle of joint {j}") for j in range(1, joints + 1)]
+    wrench = [Column(name, "float64", unit, f"{meaning}, at the end-effector") for name, unit, meaning in WRENCH]
+    return TableSchema("experiments", (_SET, _CONFIGURATION, *angles, *wrench))
+
+
+DEFLECTIONS = TableSchema(
+    "deflections",
+    (
+        Column("point", "string", "", "measuring point; a row group holds one"),
+        _SET,
+        _CONFIGURATION,
+        *(Column(name, "float64", unit, f"{meaning}, loaded against unloaded") for name, unit, meaning in COMPONENTS),
+    ),
+)
+
+
+def covariance_columns(joints):
+    """(name, row, column) of the lower triangle of the covariance of the compliances."""
+    return [(f"cov_{i + 1}_{j + 1}", i, j) for i in range(joints) for j in range(i + 1)]
+
+
+def design(joints):
+    """What the experiments can tell a strategy, whatever the noise; one row for each data set and length."""
+    covariances = [
+        Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit reading variance", missing=True)
+        for name, i, j in covariance_columns(joints)
+    ]
+    condition = Column("condition", "float32", "", "condition number of the identification Jacobian, worst stage", missing=True)
+    return TableSchema("design", (_SET, _LENGTH, *covariances, condition))
+
+
+def identified(joints):
+    """What a strategy identified; one row for each data set and length."""
+    compliances = [
+        Column(f"c{j}", "float64", "rad/(N m)", f"identified compliance of joint {j}", missing=True)
+        for j in range(1, joints + 1)
+    ]
+    return TableSchema("identified", (_SET, _LENGTH, *compliances))
+
+
+def metrics(joints):
+    """Equations 12-15, averaged over the data sets; one row for each length."""
+    columns = [_LENGTH]
+    for j in range(1, joints + 1):
+        columns += _with_error(f"compliance_{j}", "rad/(N m)", f"inverse of the averaged stiffness of joint {j} (equation 12)")
+    for j in range(1, joints + 1):
+        columns += _with_error(
+            f"delta_k_{j}", "percent", f"relative error of the averaged stiffness of joint {j} (equation 13)"
+        )
+    columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
+    columns += _with_error("k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (reading R10)")
+    columns += _with_error(
+        "deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)"
+    )
+    columns += _with_error("initial_deviation", "m", "mean deflection of the end-effector on the test configurations")
+    columns += [
+        Column("nonpositive_share", "float64", "", "share of data sets with a compliance that is not positive"),
+        Column(
+            "relative_spread", "float64", "", "largest standard deviation over mean of an identified compliance", missing=True
+        ),
+        Column("trustworthy", "bool", "", "whether the mean of 1/c exists in practice: none <= 0 and relative spread <= 0.25"),
+    ]
+    return TableSchema("metrics", tuple(columns))
+
+
+def accuracy(joints):
+    """What one data set gives, as the mean over data sets; one row for each evaluated length."""
+    columns = [_LENGTH]
+    for name, meaning in (
+        ("mean", "mean over test configurations of the end-effector position error"),
+        ("rms", "root mean square over test configurations and data sets"),
+        ("p95", "95th percentile over test configurations"),
+        ("max", "largest over test configurations"),
+    ):
+        columns += _with_error(name, "m", meaning, over="data sets, for these test configurations")
+    for j in range(1, joints + 1):
+        columns += _with_error(
+            f"relative_error_{j}", "percent", f"root mean square relative error of the compliance of joint {j}"
+        )
+    return TableSchema("accuracy", tuple(columns))
+
+
+_REPLICATE = Column("replicate", "int32", "", "number of the bootstrap replicate, from 1", minimum=1)
+
+WEIGHTS = TableSchema(
+    "weights",
+    (
+        Column("members", "string", "", "what counts: data sets or test configurations; a row group holds one"),
+        Column("number", "int32", "", "number of the data set or test configuration, from 0", minimum=0),
+        _REPLICATE,
+        Column("count", "int32", "", "how often it counts in the replicate", minimum=0),
+    ),
+)
+
+REPLICATES = TableSchema(
+    "replicates",
+    (
+        _REPLICATE,
+        _LENGTH,
+        Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("deviation", "float64", "m", "as in the metrics", missing=True),
+        Column("initial_deviation", "float64", "m", "as in the metrics"),
+    ),
+)
+
+INITIAL = TableSchema(
+    "initial",
+    (
+        _SET,
+        Column("configurations", "int32", "", "configurations in the data set", minimum=1),
+        Column("mean", "float64", "m", "mean over the data set of the end-effector's displacement under load", minimum=0),
+        Column("mean_square", "float64", "m^2", "mean square of the same", minimum=0),
+        Column("maximum", "float64", "m", "largest of the same", minimum=0),
+    ),
+)
+
+
+def solvers(joints):
+    """Estimates of both solvers at one length; one row for each strategy and data set, a row group holds one strategy."""
+    pairs = [
+        Column(f"{solver}_c{j}", "float64", "rad/(N m)", f"compliance of joint {j} by {solver.replace('_', ' ')}")
+        for j in range(1, joints + 1)
+        for solver in ("equation_11", "gauss_newton")
+    ]
+    return TableSchema("solvers", (Column("strategy", "string", "", "name of the strategy"), _SET, *pairs))
+
+
+BOUNDS = TableSchema(
+    "bounds",
+    (
+        Column("points", "string", "", "measuring points read, joined by +; a row group holds one set"),
+        _LENGTH,
+        Column(
+            "rms_per_noise", "float64", "m/m", "Cramér-Rao bound of the RMS end-effector error per unit noise", missing=True
+        ),
+    ),
+)
+
+
+def _with_error(name, unit, meaning, over="data sets and test configurations"):
+    return [
+        Column(name, "float64", unit, meaning, missing=True),
+        Column(f"{name}_std_error", "float64", unit, f"Monte Carlo standard error of {name} over {over}", missing=True),
+    ]

@@ -1,0 +1,382 @@
+"""The paper's tables and those beside them, as data frames, from the metrics of all strategies.
+
+Long frames come in with the columns robot, noise_um and strategy in front of those of `table_schemas`. Every quantity that was
+measured by simulation has a column of its Monte Carlo standard error, ``<quantity>_std_error``.
+"""
+
+import numpy as np
+import pandas as pd
+
+from elastocal.study.evaluation import reached_length
+
+MICRO, MILLI = 1e6, 1e3
+
+
+def table1(robots):
+    """Joint compliances that the study takes as true.
+
+    Parameters
+    ----------
+    robots : dict of str to Robot
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, c1.. in µrad/(N m).
+    """
+    rows = [{"robot": name} | _numbered("c", MICRO * robot.compliance) for name, robot in robots.items()]
+    return pd.DataFrame(rows)
+
+
+def table2(initial, weights):
+    """End-effector deviation before calibration, over all configurations of all data sets.
+
+    Parameters
+    ----------
+    initial : dict of str to DataFrame
+        The initial table of each robot.
+    weights : dict of str to ndarray (1 + replicates, sets)
+        Bootstrap weights of each robot's data sets.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, mean_mm, std_mm, max_mm with standard errors, and the spread of the same figures between single data sets,
+        ``mean_mm_one_set`` (average) and ``mean_mm_one_set_std``.
+    """
+    rows = []
+    for robot, frame in initial.items():
+        count = weights[robot] @ frame.configurations
+        mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
+        std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
+        largest = np.where(weights[robot] > 0, frame.maximum.to_numpy(), 0.0).max(axis=1)
+        single = {"mean_mm": frame["mean"], "std_mm": np.sqrt(frame.mean_square - frame["mean"] ** 2), "max_mm": frame.maximum}
+        row = {"robot": robot}
+        for name, values in (("mean_mm", mean), ("std_mm", std), ("max_mm", largest)):
+            row |= _value_and_error(name, MILLI * values)
+        for name, values in single.items():
+            row |= {f"{name}_one_set": MILLI * values.mean(), f"{name}_one_set_std": MILLI * values.std(ddof=1)}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def table3(metrics, robots, strategy, noise_um, length):
+    """Compliances from the averaged stiffness (equation 12) by one strategy.
+
+    Parameters
+    ----------
+    metrics : DataFrame
+        Long.
+    robots : sequence of str
+    strategy : str
+    noise_um : float
+    length : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, c1.. in µrad/(N m), with standard errors.
+    """
+    rows = []
+    for robot in robots:
+        cell = _by_length(metrics, robot, noise_um, strategy).loc[length]
+        row = {"robot": robot}
+        # A robot with fewer joints than another one of the same frame has empty columns for those that it lacks.
+        for j in range(1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1):
+            row |= {f"c{j}": MICRO * cell[f"compliance_{j}"], f"c{j}_std_error": MICRO * cell[f"compliance_{j}_std_error"]}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_limit_percent, deviation_limit_um):
+    """Comparison of the strategies at one noise level.
+
+    Parameters
+    ----------
+    metrics, replicates : DataFrame
+        Long.
+    robots, strategies : sequence of str
+    noise_um : float
+    length : int
+        Data set length of the first and third figure.
+    k_sigma_limit_percent, deviation_limit_um : float
+        Limits whose data set lengths are the second and fourth figure.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A length that no data set reaches is infinite.
+    """
+    limit = f"{k_sigma_limit_percent:g}_percent"
+    rows = []
+    for strategy in strategies:
+        for robot in robots:
+            cell = _by_length(metrics, robot, noise_um, strategy)
+            drawn = _cell(replicates, robot, noise_um, strategy)
+            at = cell.loc[length]
+            row = {"strategy": strategy, "robot": robot}
+            for suffix in ("", "_first_stage"):
+                name = f"k_sigma{suffix}"
+                row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
+                row |= {f"k_sigma_{length}_percent{suffix}_std_error": at[f"{name}_std_error"]}
+                reached, error = reached_length(cell[name].to_numpy(), _curves(drawn, name), k_sigma_limit_percent)
+                row |= {f"n_k_sigma_{limit}{suffix}": reached, f"n_k_sigma_{limit}{suffix}_std_error": error}
+            row |= {f"dev_{length}_um": MICRO * at.deviation, f"dev_{length}_um_std_error": MICRO * at.deviation_std_error}
+            reached, error = reached_length(cell.deviation.to_numpy(), _curves(drawn, "deviation"), deviation_limit_um / MICRO)
+            row |= {f"n_dev_{deviation_limit_um:g}_um": reached, f"n_dev_{deviation_limit_um:g}_um_std_error": error}
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def extended_table(metrics, replicates, robots, strategies, noise_um, length):
+    """What the reduced model leaves of the deviation of robots with elastic links.
+
+    Parameters
+    ----------
+    metrics, replicates : DataFrame
+        Long.
+    robots, strategies : sequence of str
+    noise_um : float
+    length : int
+
+    Returns
+    -------
+    pandas.DataFrame
+        strategy, initial_mean_mm, residual_mean_um, share_compensated_percent with standard errors; robot where several.
+    """
+    rows = []
+    for robot in robots:
+        for strategy in strategies:
+            at = _by_length(metrics, robot, noise_um, strategy).loc[length]
+            share, error = share_compensated(metrics, replicates, robot, strategy, noise_um, length)
+            rows.append(
+                {
+                    "strategy": strategy,
+                    "initial_mean_mm": MILLI * at.initial_deviation,
+                    "initial_mean_mm_std_error": MILLI * at.initial_deviation_std_error,
+                    "residual_mean_um": MICRO * at.deviation,
+                    "residual_mean_um_std_error": MICRO * at.deviation_std_error,
+                    "share_compensated_percent": share,
+                    "share_compensated_percent_std_error": error,
+                    "robot": robot,
+                }
+            )
+    quantities = ("initial_mean_mm", "residual_mean_um", "share_compensated_percent")
+    names = ["strategy", *(name + suffix for name in quantities for suffix in ("", "_std_error")), "robot"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def share_compensated(metrics, replicates, robot, strategy, noise_um, length):
+    """Share of the initial deviation that calibration removes, in percent, with its standard error; NaN where not studied.
+
+    Parameters
+    ----------
+    metrics, replicates : DataFrame
+        Long.
+    robot, strategy : str
+    noise_um : float
+    length : int
+
+    Returns
+    -------
+    share, std_error : float
+    """
+    cell = _by_length(metrics, robot, noise_um, strategy)
+    if cell.empty:
+        return np.nan, np.nan
+    at, drawn = cell.loc[length], _cell(replicates, robot, noise_um, strategy).query("length == @length")
+    shares = 100 * (1 - drawn.deviation / drawn.initial_deviation)
+    return float(100 * (1 - at.deviation / at.initial_deviation)), float(shares.std(ddof=1))
+
+
+def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length):
+    """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied.
+
+    Parameters
+    ----------
+    metrics, replicates : DataFrame
+        Long.
+    robot, strategy, over : str
+    noise_um : float
+    length : int
+
+    Returns
+    -------
+    ratio, std_error : float
+    """
+    values, drawn = [], []
+    for name in (strategy, over):
+        cell = _by_length(metrics, robot, noise_um, name)
+        if cell.empty:
+            return np.nan, np.nan
+        values.append(cell.deviation.loc[length])
+        drawn.append(_cell(replicates, robot, noise_um, name).query("length == @length").deviation.to_numpy())
+    return float(values[0] / values[1]), float(np.std(drawn[0] / drawn[1], ddof=1))
+
+
+def per_dataset_table(accuracy, bounds, points):
+    """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same readings.
+
+    Parameters
+    ----------
+    accuracy : DataFrame
+        Long.
+    bounds : dict of str to DataFrame
+        The bounds table of each robot.
+    points : dict of str to tuple of str
+        Measuring points that each strategy, by its name, reads.
+
+    Returns
+    -------
+    pandas.DataFrame
+        strategy, robot, noise_um, ds, mean_um, rms_um, p95_um, max_um, crlb_rms_um, efficiency, their errors and the relative
+        error of each compliance. The efficiency is (crlb_rms / rms)^2: at most one for an unbiased estimator, empty without
+        noise.
+    """
+    frame = accuracy.rename(columns={"length": "ds"}).copy()
+    limits = pd.concat([bound.assign(robot=robot) for robot, bound in bounds.items()]).rename(columns={"length": "ds"})
+    frame["points"] = frame.strategy.map({strategy: "+".join(sorted(names)) for strategy, names in points.items()})
+    frame = frame.merge(limits, on=["robot", "points", "ds"], how="left", validate="many_to_one")
+    result = frame[["strategy", "robot", "noise_um", "ds"]].copy()
+    for name in ("mean", "rms", "p95", "max"):
+        result[f"{name}_um"] = MICRO * frame[name]
+    result["crlb_rms_um"] = frame.rms_per_noise * frame.noise_um
+    result["efficiency"] = (result.crlb_rms_um / result.rms_um).where(result.noise_um > 0) ** 2
+    for name in ("mean", "rms", "p95", "max"):
+        result[f"{name}_um_std_error"] = MICRO * frame[f"{name}_std_error"]
+    result["efficiency_std_error"] = 2 * result.efficiency * result.rms_um_std_error / result.rms_um
+    relative = [column for column in frame if column.startswith("relative_error_")]
+    return result.join(frame[relative].add_suffix("_percent").rename(columns=_error_last))
+
+
+def solver_summary(frames):
+    """Which strategies are the same estimator, under either solver.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The solvers table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, strategy, closest_strategy (under Gauss-Newton), the largest relative difference to it under each solver, and
+        that between the solvers, which is the second-order error of equation 11.
+    """
+    rows = []
+    for robot, frame in frames.items():
+        estimates = {
+            solver: {
+                strategy: group.sort_values("data_set").filter(like=solver).to_numpy()
+                for strategy, group in frame.groupby("strategy", sort=False, observed=True)
+            }
+            for solver in ("equation_11", "gauss_newton")
+        }
+        linear, exact = estimates["equation_11"], estimates["gauss_newton"]
+        for strategy in exact:
+            distance = {other: _largest_difference(exact[strategy], exact[other]) for other in exact if other != strategy}
+            closest = min(distance, key=distance.get, default=strategy)
+            rows.append(
+                {
+                    "robot": robot,
+                    "strategy": strategy,
+                    "closest_strategy": closest,
+                    "equation_11_difference": _largest_difference(linear[strategy], linear[closest]),
+                    "gauss_newton_difference": _largest_difference(exact[strategy], exact[closest]),
+                    "between_solvers": _largest_difference(linear[strategy], exact[strategy]),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def with_errors_merged(frame, digits=3):
+    """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
+
+    Parameters
+    ----------
+    frame : DataFrame
+    digits : int
+        Significant digits of a value without error.
+
+    Returns
+    -------
+    pandas.DataFrame of str
+    """
+    shown = {}
+    for column in frame:
+        if column.endswith("_std_error"):
+            continue
+        errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
+        shown[column] = [worded(value, error, digits) for value, error in zip(frame[column], errors, strict=True)]
+    return pd.DataFrame(shown)
+
+
+def headed_rows(frame):
+    """The table for people as rows of words, its header first, with names of columns that break at blanks.
+
+    Parameters
+    ----------
+    frame : DataFrame
+
+    Returns
+    -------
+    list of list of str
+    """
+    shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
+    return [[name.replace("_", " ") for name in shown.columns], *shown.to_numpy().tolist()]
+
+
+def worded(value, error, digits=3):
+    """A value for people, with two digits of its standard error.
+
+    Parameters
+    ----------
+    value : float or str
+    error : float
+        Not a number or zero where there is none.
+    digits : int
+        Significant digits of a value without error.
+
+    Returns
+    -------
+    str
+    """
+    if isinstance(value, str):
+        return value
+    if np.isinf(value):
+        return "not reached"
+    if np.isnan(value):
+        return ""
+    if not np.isfinite(error) or error <= 0:
+        return f"{value:.{digits}g}" if abs(value) < 10**digits else f"{value:.0f}"
+    decimals = max(0, 1 - int(np.floor(np.log10(error))))
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def _largest_difference(values, others):
+    return float(np.abs(values / others - 1.0).max())
+
+
+def _cell(frame, robot, noise_um, strategy):
+    return frame[(frame.robot == robot) & (frame.noise_um == noise_um) & (frame.strategy == strategy)]
+
+
+def _by_length(metrics, robot, noise_um, strategy):
+    return _cell(metrics, robot, noise_um, strategy).set_index("length")
+
+
+def _curves(drawn, name):
+    """Replicates of one quantity as (replicates, lengths)."""
+    return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
+
+
+def _numbered(prefix, values):
+    return {f"{prefix}{j}": float(value) for j, value in enumerate(values, 1)}
+
+
+def _value_and_error(name, replicated):
+    return {name: float(replicated[0]), f"{name}_std_error": float(np.std(replicated[1:], ddof=1))}
+
+
+def _error_last(column):
+    return column.replace("_std_error_percent", "_percent_std_error")

@@ -1,0 +1,36 @@
+"""One figure of the paper fixes the one free size of the extended robot's tubes (reading R11)."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from elastocal.mechanics.links import with_tube
+from elastocal.study.simulation import true_deflections
+
+
+def diameter_for_mean_deflection(robot, experiments, target_m, between_m=(0.1, 0.8)):
+    """Outer diameter of the tubes, at the wall that they have, for which the mean end-effector deflection comes out.
+
+    Parameters
+    ----------
+    robot : Robot
+        With links, all of one tube.
+    experiments : Experiments
+    target_m : float
+        Mean over the experiments of the norm of the displacement, m.
+    between_m : tuple of float
+        Diameters to search.
+
+    Returns
+    -------
+    float
+        m.
+    """
+
+    def excess(diameter):
+        candidate = with_tube(robot, replace(robot.links[0].tube, outer_diameter_m=diameter))
+        deflections = true_deflections(candidate, experiments, robot.chain.end_effector, "end_effector")
+        return np.linalg.norm(deflections[..., :3], axis=-1).mean() - target_m
+
+    return brentq(excess, *between_m, xtol=1e-6)

@@ -1,0 +1,102 @@
+"""Which poses lie outside the range of those that a model was fitted to: there its errors are extrapolated."""
+
+import numpy as np
+
+from elastocal.campaigns.joint_space import beyond_range
+from elastocal.fitting.least_squares import observations_at_once
+from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.observations import part_at, parts_of, state_clusters
+
+
+def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=None):
+    """States at which a model has to extrapolate.
+
+    Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
+    predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
+    second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
+    Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1), as all are exchangeable.
+
+    Parameters
+    ----------
+    fitted_states, states : States
+    fitted_variance : ndarray (P,), optional
+        As the two of `predictive_variances`; only the angles are judged without.
+    variance : ndarray (S,), optional
+
+    Returns
+    -------
+    ndarray of bool (S,)
+    """
+    # Loads and repeats of a pose share its angles.
+    _, first = np.unique(state_clusters(fitted_states), return_index=True)
+    outside = beyond_range(fitted_states.joint_angles[first], states.joint_angles)
+    return outside if variance is None else outside | (variance > fitted_variance.max(initial=0.0))
+
+
+def predictive_variances(fitted, observations, model, estimate, unseen):
+    """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
+
+    The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
+    readings do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look sure.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+        Which it was fitted to.
+    model : Model
+    estimate : Estimate
+        Of the fit, for the other observations. Frames and targets count only where they are those of the fit.
+    unseen : Observations
+
+    Returns
+    -------
+    own : ndarray (P,)
+        m², of the least sure reading of each pose.
+    other : ndarray (S,)
+        m², of the least sure reading of each state.
+    """
+    listed = fitted.parameters
+    shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
+    kept = np.array([shared or not owner.startswith(("frame ", "target ")) for owner, _ in listed], bool)
+    plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])
+    gram = np.eye(len(plausible))
+    for _, _, white in fitted.sensitivities(observations):
+        rows = (white * plausible).reshape(-1, len(plausible))
+        gram += rows.T @ rows
+    root = np.linalg.inv(np.linalg.cholesky(gram))
+    own, cluster = np.empty(len(observations)), observations.cluster
+    for seen, plain, white in fitted.sensitivities(observations):
+        wanted = plain[:, :3] * (plausible * kept)
+        own[seen] = _variances_left_out(wanted, white * plausible, root, cluster[seen] - cluster[seen.start])
+    other = np.empty(len(unseen))
+    for states, seen in parts_of(unseen, observations_at_once(unseen.rows, len(plausible))):
+        some = part_at(unseen, states, seen)
+        there = linearize(model, estimate, some, circumstances(model, estimate, some.states)).sensitivities[:, :3]
+        # Effects come last in the order of the parameters, whatever frames and targets stand before them.
+        there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
+        other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
+    return _largest(own, cluster), _largest(other, unseen.state)
+
+
+def _variances_left_out(wanted, whitened, root, cluster):
+    """Variance (M,) of each position with the readings of its own pose left out of the fit, by Woodbury's identity."""
+    projected, own = wanted @ root.T, whitened @ root.T
+    variance = (projected**2).sum(axis=(1, 2))
+    order, size = np.argsort(cluster, kind="stable"), np.bincount(cluster)
+    start = np.concatenate([[0], np.cumsum(size)[:-1]])
+    for count in np.unique(size):
+        members = order[start[size == count][:, None] + np.arange(count)]
+        rows = own[members].reshape(len(members), -1, own.shape[-1])
+        asked = projected[members].reshape(len(members), -1, own.shape[-1])
+        left = np.eye(rows.shape[1]) - rows @ rows.transpose(0, 2, 1)
+        across = asked @ rows.transpose(0, 2, 1)
+        gained = (across * np.linalg.solve(left, across.transpose(0, 2, 1)).transpose(0, 2, 1)).sum(axis=-1)
+        variance[members] += gained.reshape(len(members), count, -1).sum(axis=-1)
+    return variance
+
+
+def _largest(values, group):
+    found = np.zeros(group.max() + 1)
+    np.maximum.at(found, group, values)
+    return found

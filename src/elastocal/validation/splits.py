@@ -1,0 +1,157 @@
+"""Cross-validation over blocks of joint space and over sessions: how far a model carries, from the training poses alone.
+
+Poses drawn at random have neighbours among those fitted, so their errors say how well a model interpolates; whole blocks of
+joint space left out say how well it extrapolates (Roberts et al. 2017, cross-validation for structured data). The effects stay
+those that were chosen with all training poses: what is refitted is their size, so the errors carry the selection's optimism.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.campaigns.campaign import FEWEST_TRAINING_POSES
+from elastocal.campaigns.joint_space import blocks
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.observations import select_states, state_clusters
+from elastocal.fitting.registration import registered
+from elastocal.validation.held_out import Errors, intervals, placed_estimate, position_errors, summary
+
+# A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
+JOINT_SPACE_BLOCKS = 4
+
+
+@dataclass(frozen=True)
+class Split:
+    """A partition of the states of observations.
+
+    Attributes
+    ----------
+    name : str
+    labels : tuple
+        Name of each part.
+    part : ndarray of int (S,)
+        Index into `labels`, of every state.
+    """
+
+    name: str
+    labels: tuple
+    part: np.ndarray
+
+
+def splits_of(states):
+    """The partitions that some states allow: blocks of joint space and, where there are several, sessions.
+
+    Parameters
+    ----------
+    states : States
+
+    Returns
+    -------
+    list of Split
+        Without those that leave too few poses to fit.
+    """
+    pose = state_clusters(states)
+    poses = pose.max() + 1
+    angles = np.zeros((poses, states.joint_angles.shape[1]))
+    np.add.at(angles, pose, states.joint_angles)
+    angles /= np.bincount(pose)[:, None]
+    sessions, session = np.unique(states.session, return_inverse=True)
+    found = [Split("session", tuple(sessions.tolist()), session.ravel())] if len(sessions) > 1 else []
+    if poses >= JOINT_SPACE_BLOCKS:
+        labels = tuple(range(1, JOINT_SPACE_BLOCKS + 1))
+        found.insert(0, Split("joint space", labels, blocks(angles, JOINT_SPACE_BLOCKS)[pose]))
+    return [split for split in found if _fewest_left(split, pose) >= FEWEST_TRAINING_POSES]
+
+
+def cross_validated(fitted, observations, part):
+    """Position errors of observations, each predicted by a refit without the part that it belongs to.
+
+    A refit starts from the nominal robot, so that a parameter that only the part left out can tell does not keep its value, and
+    keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see
+    `held_out.placed_estimate`.
+
+    Parameters
+    ----------
+    fitted : Fit
+    observations : Observations
+        Which it was fitted to.
+    part : ndarray of int (S,)
+        Of each state.
+
+    Returns
+    -------
+    Errors
+    """
+    model, distance = fitted.model, np.empty(len(observations))
+    for number in np.unique(part):
+        within = part == number
+        rest, tested = select_states(observations, ~within), select_states(observations, within)
+        start = replace(registered(model, rest), shapes=fitted.estimate.shapes)
+        refit = fit(model, rest, fitted.noise, start)
+        errors = position_errors(model, placed_estimate(refit, tested), tested)
+        distance[within[observations.state]] = errors.distance
+    return Errors(distance, observations.cluster)
+
+
+def split_rows(declared, final, observations, replicates, stream):
+    """Cross-validated errors of the declared and the final model over every split that the training poses allow.
+
+    Parameters
+    ----------
+    declared, final : Fit
+    observations : Observations
+        Training poses, which both were fitted to.
+    replicates : int
+        Of the bootstrap over poses.
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    list of dict
+        Rows of splits.csv: each part of each split, and "all" parts together. Intervals take poses as independent, which refits
+        that share most of their poses make only nearly true (Bengio and Grandvalet 2004).
+    """
+    rows = []
+    for split in splits_of(observations.states):
+        before = cross_validated(declared, observations, split.part)
+        after = before if final is declared else cross_validated(final, observations, split.part)
+        rows.append(error_row(split.name, "all", before, after, replicates, stream))
+        of_each = split.part[observations.state]
+        for number, label in enumerate(split.labels):
+            pair = [_part(errors, of_each == number) for errors in (before, after)]
+            rows.append(error_row(split.name, label, *pair, replicates, stream))
+    return rows
+
+
+def error_row(split, block, before, after, replicates, stream):
+    """One row of splits.csv.
+
+    Parameters
+    ----------
+    split : str
+    block : str or int
+    before, after : Errors
+    replicates : int
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    dict
+    """
+    limits, reductions = intervals([before, after], replicates, stream)
+    row = {"split": split, "block": block, "poses": before.poses}
+    rms = [summary(errors.distance)["rms_m"] for errors in (before, after)]
+    for stage, value, limit in zip(("before", "after"), rms, limits, strict=True):
+        row |= {f"{stage}_rms_m": value, f"{stage}_rms_m_low": limit["rms_m"][0], f"{stage}_rms_m_high": limit["rms_m"][1]}
+    change = reductions[1]
+    row |= {"reduction": 1.0 - rms[1] / rms[0], "reduction_low": change.low, "reduction_high": change.high}
+    return row | {"reduction_std_error": change.std_error}
+
+
+def _fewest_left(split, pose):
+    poses = pose.max() + 1
+    return poses - max(len(np.unique(pose[split.part == number])) for number in range(len(split.labels)))
+
+
+def _part(errors, mask):
+    return Errors(errors.distance[mask], np.unique(errors.cluster[mask], return_inverse=True)[1])

@@ -1,0 +1,139 @@
+"""The UR10 series as campaigns: made-up readings in the files' own format come back as readings of the chain."""
+
+import numpy as np
+import pytest
+from support import homogeneous, refused
+
+from elastocal.campaigns.campaign import read_campaign, read_robot
+from elastocal.campaigns.importers import ur10_ipa
+from elastocal.mechanics.kinematics import poses
+
+POSES = 9
+# theta, d, a, alpha of the maker.
+DENAVIT_HARTENBERG = [
+    (0.1273, 0.0, 90.0),
+    (0.0, -0.612, 0.0),
+    (0.0, -0.5723, 0.0),
+    (0.163941, 0.0, 90.0),
+    (0.1157, 0.0, -90.0),
+    (0.0922, 0.0, 0.0),
+]
+
+
+class Series:
+    """A file of the source that a test spoils before it imports it."""
+
+    def __init__(self, folder):
+        rng = np.random.default_rng(6)
+        self.path, self.folder = folder / "series.csv", folder / "campaign"
+        self.angles = rng.uniform(-3, 3, (POSES, 6)).round(9)
+        # Poses 2 and 5 are approached again, as near as the controller comes.
+        self.angles = np.vstack([self.angles, self.angles[[2, 5]] + 4e-5])
+        count = len(self.angles)
+        self.position_mm, self.degrees = (
+            rng.uniform(-3000, 3000, (count, 3)).round(5),
+            rng.uniform(-89, 89, (count, 3)).round(6),
+        )
+        self.columns = {"Timestamp": [f"2020071416{39 + i // 6}{10 * (i % 6):02d}" for i in range(count)]}
+        self.columns |= {f"Goal {name}": np.zeros(count) for name in ("x", "y", "z", "roll", "pitch", "yaw")}
+        self.columns |= dict(zip(ur10_ipa.ANGLES, self.angles.T, strict=True))
+        self.columns["measurement_temperature"] = 20 + 0.25 * np.arange(count)
+        self.columns |= dict(zip(ur10_ipa.POSITION, self.position_mm.T, strict=True))
+        self.columns["measurement_std_x"] = np.ones(count)
+        self.columns |= dict(zip(ur10_ipa.ORIENTATION, self.degrees.T, strict=True))
+
+    def write(self):
+        cells = [[name, *(str(cell).replace(".", ",") for cell in column)] for name, column in self.columns.items()]
+        self.path.write_text("".join(";".join(row) + "\r\n" for row in zip(*cells, strict=True)), encoding="utf-8")
+
+    def campaign(self, config_folder):
+        self.write()
+        ur10_ipa.write_campaign(self.path, self.folder, "series")
+        return read_campaign(self.folder, config_folder / "robots")
+
+
+@pytest.fixture
+def series(tmp_path):
+    return Series(tmp_path)
+
+
+def test_series_becomes_a_campaign_of_poses(series, config_folder):
+    campaign = series.campaign(config_folder)
+    readings = campaign.readings
+    assert (campaign.name, campaign.measured, campaign.frame, campaign.noise) == ("series", "pose", "tracker", ur10_ipa.NOISE)
+    assert [(target.point, target.offset_m) for target in campaign.targets] == [("6DoF", None)]
+    np.testing.assert_allclose(readings.joint_angles, series.angles, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(readings.position, 1e-3 * series.position_mm, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(readings.temperature_c, 20 + 0.25 * np.arange(len(readings)))
+    np.testing.assert_array_equal(readings.time_s, 10.0 * np.arange(len(readings)))
+    np.testing.assert_array_equal(readings.wrench, 0)
+
+
+def test_orientation_turns_about_x_then_the_new_y_then_the_new_z(series, config_folder):
+    readings = series.campaign(config_folder).readings
+    for vector, degrees in zip(readings.rotation_vector, series.degrees, strict=True):
+        angle = np.linalg.norm(vector)
+        x, y, z = vector / angle
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        rotation = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+        turns = [homogeneous("R", axis, np.radians(amount))[:3, :3] for axis, amount in enumerate(degrees)]
+        np.testing.assert_allclose(rotation, turns[0] @ turns[1] @ turns[2], rtol=0, atol=1e-12)
+
+
+def test_the_same_joint_angles_again_are_repeats_of_their_pose(series, config_folder):
+    readings = series.campaign(config_folder).readings
+    assert readings.pose.tolist() == [*range(POSES), 2, 5]
+    assert readings.repeat.tolist() == POSES * [0] + [1, 1]
+
+
+def test_stamps_that_a_spreadsheet_cut_down_leave_time_out(series, config_folder):
+    series.columns["Timestamp"] = len(series.angles) * ["2,02011E+13"]
+    assert series.campaign(config_folder).readings.time_s is None
+
+
+def test_series_without_temperature_is_read_as_well(series, config_folder):
+    del series.columns["measurement_temperature"]
+    assert series.campaign(config_folder).readings.temperature_c is None
+
+
+def test_chain_is_the_makers_denavit_hartenberg(config_folder):
+    chain = read_robot(config_folder / "robots" / "ur10.yaml").chain
+    for angles in np.random.default_rng(7).uniform(-np.pi, np.pi, (5, 6)):
+        expected = np.eye(4)
+        for angle, (d, a, alpha) in zip(angles, DENAVIT_HARTENBERG, strict=True):
+            expected = expected @ homogeneous("R", 2, angle) @ homogeneous("T", 2, d)
+            expected = expected @ homogeneous("T", 0, a) @ homogeneous("R", 0, np.radians(alpha))
+        position, rotation = poses(chain, angles[None], chain.end_effector)
+        np.testing.assert_allclose(position[0], expected[:3, 3], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(rotation[0], expected[:3, :3], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["elbow_joint", "measurement_y", "measurement_rz"])
+def test_missing_column_is_refused(series, name):
+    del series.columns[name]
+    series.write()
+    with refused(series.path, "header", f"no column {name!r}"):
+        ur10_ipa.read(series.path)
+
+
+@pytest.mark.parametrize("cell", ["", "1,2,3", "nan", "none"])
+def test_cell_that_is_no_number_is_refused(series, cell):
+    series.columns["measurement_z"] = [cell if row == 3 else 1.5 for row in range(len(series.angles))]
+    series.write()
+    with refused(series.path, "row 4, column measurement_z", repr(cell), "decimal comma"):
+        ur10_ipa.read(series.path)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [("", "", ["no row"]), ("a;b\n1;2\n1\n", "row 2", ["1 cells", "2, one for each"]), ('a;b\n"1;2\n', "", ["separated by ;"])],
+)
+def test_text_that_is_no_series_is_refused(series, text, key, words):
+    series.path.write_text(text, encoding="utf-8")
+    with refused(series.path, key, *words):
+        ur10_ipa.read(series.path)
+
+
+def test_missing_series_is_refused(series):
+    with refused(series.path, "", "readable file"):
+        ur10_ipa.read(series.path)

@@ -1,0 +1,117 @@
+"""Simulated campaigns: without noise they are the elastostatics of the study, with noise they are as planned."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.campaign import read_campaign, write_campaign
+from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+
+POINTS = ("3DoF", "6DoF")
+PLAN = Plan(POINTS, 10, 800.0, (0, 1, -0.5), (0.0, 0.5, 0.1), 3, 2, 0.0, 0.0)
+
+
+def angles_of(table, robot):
+    return np.column_stack([table[f"q{joint + 1}"] for joint in range(robot.joints)])
+
+
+def at(table, point):
+    mask = table["target"] == point
+    return {name: values[mask] for name, values in table.items()}
+
+
+def test_without_noise_it_is_the_elastostatics_of_the_reduced_robot(robot):
+    table = simulated_measurements(robot, PLAN, 1, "exact")
+    for point in POINTS:
+        part = at(table, point)
+        angles, wrench = angles_of(part, robot), np.column_stack([part[name] for name in WRENCH_NAMES])
+        place = robot.chain.point(point)
+        end = poses_and_jacobians(robot.chain, angles, robot.chain.end_effector)[2]
+        turned = generalized_forces(end, wrench) * robot.compliance
+        expected = exact_deflections(robot.chain, angles, turned, place)
+        position, rotation = poses(robot.chain, angles, place)
+        measured = np.column_stack([part[axis] for axis in "xyz"])
+        np.testing.assert_allclose(measured - position, expected[:, :3], atol=1e-12)
+        read = Rotation.from_rotvec(np.column_stack([part[name] for name in ("rx", "ry", "rz")]))
+        turn = (read * Rotation.from_matrix(rotation).inv()).as_rotvec()
+        np.testing.assert_allclose(turn, expected[:, 3:], atol=1e-7)
+        assert (np.linalg.norm(expected[:, :3], axis=1) > 1e-6).sum() == (part["load"] > 0).sum()
+
+
+def test_wrench_is_that_of_a_force_beside_the_last_point(kuka):
+    table = at(simulated_measurements(kuka, PLAN, 2, "wrench"), "6DoF")
+    force = np.column_stack([table[name] for name in WRENCH_NAMES[:3]])
+    moment = np.column_stack([table[name] for name in WRENCH_NAMES[3:]])
+    np.testing.assert_allclose(moment, np.cross(PLAN.offset_m, force), atol=1e-9)
+    share = np.array(PLAN.ladder)[table["load"]]
+    np.testing.assert_allclose(np.linalg.norm(force, axis=1), 800 * np.abs(share))
+    for pose in range(PLAN.poses):
+        one, half = (force[(table["pose"] == pose) & (table["load"] == load)][0] for load in (1, 2))
+        np.testing.assert_allclose(half, -0.5 * one)
+
+
+def test_the_plan_is_kept(kuka):
+    table = at(simulated_measurements(kuka, PLAN, 3, "plan"), "3DoF")
+    visits = list(zip(table["pose"], table["load"], table["repeat"], strict=True))
+    assert len(set(visits)) == len(visits) == 2 * (3 + 3 + 1) + 8 * 3
+    assert {visit for visit in visits if visit[0] == 1} == {(1, 0, r) for r in range(3)} | {(1, 1, r) for r in range(3)} | {
+        (1, 2, 0)
+    }
+    assert {visit for visit in visits if visit[0] == 5} == {(5, 0, 0), (5, 1, 0), (5, 2, 0)}
+    angles = angles_of(table, kuka)
+    low, high = kuka.joint_limits.T
+    assert ((angles >= low) & (angles <= high)).all()
+    for pose in range(PLAN.poses):
+        assert len(np.unique(angles[table["pose"] == pose], axis=0)) == 1
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_noise_is_of_its_size_and_new_at_each_reading(noise, kuka):
+    plan = replace(PLAN, poses=120, noise_m=noise, noise_rad=3 * noise)
+    exact, read = (simulated_measurements(kuka, p, 4, "noise") for p in (PLAN, plan))
+    exact = simulated_measurements(kuka, replace(plan, noise_m=0.0, noise_rad=0.0), 4, "noise")
+    off = np.column_stack([read[axis] - exact[axis] for axis in "xyz"])
+    names = ("rx", "ry", "rz")
+    turned, true = (Rotation.from_rotvec(np.column_stack([table[name] for name in names])) for table in (read, exact))
+    turn = (turned * true.inv()).as_rotvec()
+    assert off.std() == pytest.approx(noise, rel=0.08) and turn.std() == pytest.approx(3 * noise, rel=0.08, abs=1e-9)
+    assert not noise or len(np.unique(off)) == off.size
+
+
+def test_elastic_links_deflect_beyond_the_reduced_robot(kuka, kuka_extended):
+    """The extended robot under load is off the reduced one with the same joints, and both are one unloaded."""
+    elastic, stiff = (simulated_measurements(robot, PLAN, 5, "same") for robot in (kuka_extended, kuka))
+    np.testing.assert_array_equal(angles_of(elastic, kuka), angles_of(stiff, kuka))
+    off = np.linalg.norm(np.column_stack([elastic[axis] - stiff[axis] for axis in "xyz"]), axis=1)
+    loaded = elastic["load"] > 0
+    assert off[~loaded].max() < 1e-12
+    assert np.median(off[loaded]) > 1e-5
+
+
+def test_numbers_depend_on_seed_and_name_alone(kuka):
+    plan = replace(PLAN, noise_m=1e-4, noise_rad=1e-4)
+    one, again = simulated_measurements(kuka, plan, 6, "a"), simulated_measurements(kuka, plan, 6, "a")
+    for name in one:
+        np.testing.assert_array_equal(one[name], again[name])
+    for seed, name in ((7, "a"), (6, "b")):
+        assert (simulated_measurements(kuka, plan, seed, name)["q1"] != one["q1"]).any()
+
+
+def test_it_makes_a_campaign_that_reads(kuka, tmp_path, config_folder):
+    table = simulated_measurements(kuka, PLAN, 8, "reads")
+    document = {
+        "campaign": "reads",
+        "robot": "kuka",
+        "measured": "pose",
+        "frame": "base",
+        "targets": {point: {"point": point, "offset_m": [0, 0, 0]} for point in POINTS},
+    }
+    write_campaign(tmp_path / "reads", document, table, kuka.joints)
+    campaign = read_campaign(tmp_path / "reads", config_folder / "robots")
+    assert len(campaign.readings) == len(table["pose"])
+    np.testing.assert_array_equal(campaign.readings.position[:, 0], table["x"])

@@ -1,0 +1,129 @@
+"""Campaigns that a configuration names, and the user's own, are checked before any job starts; a fault is one line."""
+
+import pytest
+import yaml
+from support import refused
+
+from elastocal.campaigns.sources import campaign_sources, user_campaign
+from elastocal.io.documents import read_document
+
+
+def test_campaigns_of_the_repository_pass(config, config_folder):
+    sources = campaign_sources(config, config_folder)
+    assert list(sources) == [*config["loop"]["campaigns"], *config["loop"]["measured"]]
+    for name, document in sources.items():
+        assert document["source"] == ("simulated" if name in config["loop"]["campaigns"] else "public")
+        assert ("robot_document" in document) == (document["source"] == "simulated")
+    assert (
+        sources["kuka_nothing_missing"]["robot_document"]["name"] == read_document(config_folder / "robots/kuka.yaml")["name"]
+    )
+
+
+def of_one_campaign(config, name="mine"):
+    return config | {"loop": config["loop"] | {"campaigns": [name], "measured": []}}
+
+
+SIMULATED = {
+    "source": "simulated",
+    "robot": "kuka",
+    "declared_robot": "kuka",
+    "points": ["6DoF"],
+    "poses": 8,
+    "force_N": 100,
+    "ladder": [0, 1],
+    "offset_m": [0, 0, 0],
+    "repeats": 1,
+    "repeated_poses": 0,
+    "noise_m": 0,
+    "noise_rad": 0,
+}
+FAULTY_SOURCES = {
+    "wrong key": ({"pose": 9}, "pose", ["unknown key", "'poses'?"]),
+    "missing key": ({"poses": None}, "poses", ["nothing", "joint limits"]),
+    "value out of range": ({"poses": 3}, "poses", ["found 3", "8 or more"]),
+    "unknown robot": ({"robot": "kukka"}, "robots", ["'kukka'", "'kuka'?"]),
+    "unknown declared robot": ({"declared_robot": "fanuk"}, "robots", ["'fanuk'", "'fanuc'?"]),
+    "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
+}
+
+
+@pytest.fixture
+def campaigns_folder(config_folder, tmp_path):
+    """The repository's robots and one campaign."""
+    (tmp_path / "robots").symlink_to(config_folder / "robots")
+    (tmp_path / "campaigns").mkdir()
+    (tmp_path / "campaigns" / "mine.yaml").write_text(yaml.safe_dump(SIMULATED))
+    return tmp_path
+
+
+def test_a_file_among_the_campaigns_is_a_campaign(config, campaigns_folder):
+    (campaigns_folder / "campaigns" / "another.yaml").write_text(yaml.safe_dump(SIMULATED | {"poses": 9}))
+    assert campaign_sources(of_one_campaign(config, "another"), campaigns_folder)["another"]["poses"] == 9
+
+
+@pytest.mark.parametrize(
+    "fault",
+    FAULTY_SOURCES,
+)
+def test_fault_in_a_campaigns_file_is_one_line_that_names_it(fault, config, campaigns_folder):
+    changes, key, words = FAULTY_SOURCES[fault]
+    path = campaigns_folder / "campaigns" / "mine.yaml"
+    path.write_text(yaml.safe_dump({k: v for k, v in (SIMULATED | changes).items() if v is not None}))
+    with refused(path.as_posix(), key, *words):
+        campaign_sources(of_one_campaign(config), campaigns_folder, "study.yaml")
+
+
+@pytest.mark.parametrize("name", ["mina", "../campaigns/mine/no", "zzz"])
+def test_a_campaign_without_a_file_is_refused(name, config, campaigns_folder):
+    with refused("study.yaml", "campaigns", repr(name), "mine"):
+        campaign_sources(of_one_campaign(config, name), campaigns_folder, "study.yaml")
+
+
+def users_folder(tmp_path, **changes):
+    document = {
+        "campaign": "cell7",
+        "robot": "kuka",
+        "measured": "position",
+        "frame": "base",
+        "targets": {"A": {"point": "6DoF", "offset_m": [0, 0, 0]}},
+    }
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    (folder / "campaign.yaml").write_text(yaml.safe_dump(document | changes))
+    return folder.as_posix()
+
+
+def test_a_users_own_campaign_is_known_by_its_name(config, config_folder, tmp_path):
+    folder = users_folder(tmp_path)
+    for given in (folder, folder + "/"):
+        assert user_campaign(config | {"campaign": given}, config_folder / "robots") == {"cell7": folder}
+    assert user_campaign(config, config_folder / "robots") == {}
+    assert user_campaign(config | {"campaign": ""}, config_folder / "robots") == {}
+
+
+OWN_FAULTS = {
+    "name with a slash": ({"campaign": "cell/7"}, "campaign", ["'cell/7'", "letters, digits"]),
+    "name that leads upwards": ({"campaign": "../cell"}, "campaign", ["'../cell'", "letters, digits"]),
+    "name of a simulated campaign": (
+        {"campaign": "kuka_nothing_missing"},
+        "campaign",
+        ["kuka_nothing_missing", "no campaign of"],
+    ),
+    "name of a measured campaign": ({"campaign": "ur10_series_a"}, "campaign", ["ur10_series_a", "no campaign of"]),
+    "no name": ({"campaign": ""}, "campaign", ["''"]),
+    "unknown robot": ({"robot": "kukka"}, "robot", ["'kukka'", "'kuka'?"]),
+    "wrong key": ({"target": {}}, "target", ["unknown key", "'targets'?"]),
+}
+
+
+@pytest.mark.parametrize("fault", OWN_FAULTS)
+def test_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(fault, config, config_folder, tmp_path):
+    changes, key, words = OWN_FAULTS[fault]
+    folder = users_folder(tmp_path, **changes)
+    with refused(f"{folder}/campaign.yaml", key, *words):
+        user_campaign(config | {"campaign": folder}, config_folder / "robots")
+
+
+def test_a_users_folder_that_is_not_there_is_one_line(config, config_folder, tmp_path):
+    with refused(f"{tmp_path.as_posix()}/none/campaign.yaml", ""):
+        user_campaign(config | {"campaign": f"{tmp_path.as_posix()}/none"}, config_folder / "robots")

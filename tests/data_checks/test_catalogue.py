@@ -1,0 +1,77 @@
+"""Faults are looked for each behind those that make it meaningless; what is only wrong with the model is none."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import Plan, made, with_geometric_errors, with_other_compliances
+
+from elastocal.data_checks.catalogue import fault_modules, faults, known_faults
+
+PLANS = {
+    "base": Plan(),
+    "tracker": Plan(tracker=True),
+    "positions": Plan(tracker=True, oriented=False, loads=1, repeats=2),
+    "few poses": Plan(poses=8),
+    "small loads": Plan(force=20.0),
+    "no noise": Plan(noise=0.0),
+}
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("seed", range(2))
+def test_no_fault_is_found_where_the_model_is_right(robot, plan, seed):
+    campaign = made(robot, seed, PLANS[plan])
+    assert faults(campaign, campaign.readings) == ()
+
+
+@pytest.mark.parametrize("plan", PLANS)
+@pytest.mark.parametrize("seed", range(2))
+def test_nothing_decisive_is_found_where_the_model_lacks_something(robot, plan, seed):
+    offsets = np.random.default_rng(seed).normal(0.0, 3e-3, robot.joints)
+    softer = with_other_compliances(robot, seed, 0.5)
+    for true_robot in (softer, with_geometric_errors(robot, seed, 0.006), with_geometric_errors(softer, seed, 0.01)):
+        campaign = made(robot, seed, PLANS[plan], true_robot, offsets, sag=3e-3)
+        assert not [fault for fault in faults(campaign, campaign.readings) if fault.decisive]
+
+
+def test_two_faults_of_the_loads_are_both_named(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    readings = replace(campaign.readings, wrench=-campaign.readings.wrench / 9.80665)
+    assert [fault.name for fault in faults(campaign, readings)] == ["wrong_sign", "wrong_unit"]
+
+
+def test_a_wrong_sign_is_not_called_shuffled_rows_or_outliers(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    readings = replace(campaign.readings, joint_angles=campaign.readings.joint_angles * [1, 1, -1, 1, 1, 1])
+    assert [fault.name for fault in faults(campaign, readings)] == ["wrong_sign"]
+
+
+def test_the_sentences_are_single_lines(fanuc):
+    campaign = made(fanuc, 1, Plan(poses=20))
+    position = campaign.readings.position.copy()
+    position[5] += 0.1
+    (fault,) = faults(campaign, replace(campaign.readings, position=position))
+    assert "\n" not in fault.detail
+    assert not fault.decisive
+
+
+def test_every_fault_of_the_design_is_there_and_of_family_data():
+    assert known_faults() == {
+        "constant_columns",
+        "implausible_readings",
+        "outliers",
+        "shuffled_rows",
+        "swapped_axes",
+        "wrong_frame",
+        "wrong_sign",
+        "wrong_target",
+        "wrong_unit",
+    }
+    assert {module.FAMILY for module in fault_modules().values()} == {"data"}
+
+
+def test_a_module_stands_behind_those_that_it_comes_after():
+    order = list(fault_modules())
+    for name, module in fault_modules().items():
+        assert all(order.index(other) < order.index(name) for other in module.AFTER)

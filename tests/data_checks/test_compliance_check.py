@@ -1,0 +1,34 @@
+"""Compliances that no robot has are named with their standard errors, and no others."""
+
+import numpy as np
+import pytest
+
+from elastocal.data_checks.compliance_check import MOST_OFF_NOMINAL, compliance_warnings
+
+NOMINAL = 1e-6 * np.array([0.5, 1.0, 2.0])
+ERROR = 0.02 * NOMINAL
+
+
+@pytest.mark.parametrize("factor", [1 / (0.99 * MOST_OFF_NOMINAL), 0.5, 1.0, 2.0, 0.99 * MOST_OFF_NOMINAL])
+def test_what_robots_have_is_no_warning(factor):
+    assert compliance_warnings(factor * NOMINAL, ERROR, NOMINAL) == []
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(-1.0, "negative, nominal 1"), (9.8, "9.8 times nominal"), (1000.0, "1e+03 times"), (0.1, "0.1 times")],
+)
+def test_what_no_robot_has_is_named_with_its_standard_error(factor, words):
+    (warning,) = compliance_warnings(NOMINAL * [1.0, factor, 1.0], ERROR, NOMINAL)
+    assert "joint 2" in warning and words in warning and "± 0.02" in warning
+    assert f"{factor:.3g} ±" in warning
+    assert "joint 1" not in warning and "joint 3" not in warning and "by chance" not in warning
+
+
+def test_what_may_be_chance_says_so():
+    (warning,) = compliance_warnings(NOMINAL * [-0.1, 1.0, 1.0], NOMINAL, NOMINAL)
+    assert "joint 1 -0.05 ± 0.5" in warning and "by chance" in warning
+
+
+def test_what_was_not_identified_is_not_judged():
+    assert compliance_warnings(-NOMINAL, 0.0 * NOMINAL, NOMINAL) == []

@@ -1,0 +1,89 @@
+"""Rows are named where other rows' readings or loads belong to them, beyond what chance can do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import POINTS, Plan, made, with_other_compliances
+
+from elastocal.data_checks.shuffled_rows import find
+
+
+@pytest.fixture(scope="module", params=["base", "tracker"])
+def campaign(request, fanuc):
+    return made(fanuc, 1, Plan(tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
+
+
+def with_measured(readings, source):
+    return replace(readings, position=readings.position[source], rotation_vector=readings.rotation_vector[source])
+
+
+def permuted(readings, share, seed=0):
+    rng, source = np.random.default_rng(seed), np.arange(len(readings))
+    some = rng.choice(len(source), max(round(share * len(source)), 2), replace=False)
+    source[some] = rng.permutation(some) if share else some[::-1]
+    return with_measured(readings, source), some[source[some] != some]
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+def test_readings_in_the_rows_of_each_other_are_named_with_these_rows(campaign, share):
+    readings, moved = permuted(campaign.readings, share)
+    (fault,) = find(campaign, readings)
+    assert (fault.name, fault.joints, fault.decisive) == ("shuffled_rows", (), True)
+    assert set(fault.rows) <= set((moved + 1).tolist())
+    assert len(fault.rows) >= 0.9 * len(moved)
+    assert fault.evidence[1] < fault.evidence[0] / 5
+
+
+def test_readings_that_are_all_out_of_place_are_named(campaign):
+    (fault,) = find(campaign, permuted(campaign.readings, 1.0)[0])
+    assert len(fault.rows) > 0.9 * len(campaign.readings)
+
+
+def test_poses_whose_readings_are_swapped_are_named(campaign):
+    of_pose = 4 * len(POINTS)
+    source = np.arange(len(campaign.readings)).reshape(-1, of_pose)
+    source[[3, 9]] = source[[9, 3]]
+    (fault,) = find(campaign, with_measured(campaign.readings, source.ravel()))
+    assert len(fault.rows) == 2 * of_pose
+
+
+@pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
+def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
+    source = np.roll(np.arange(len(campaign.readings)), steps)
+    (fault,) = find(campaign, with_measured(campaign.readings, source))
+    assert words in fault.detail
+    assert fault.parameters[0].value == -steps
+
+
+def test_measured_columns_moved_by_one_pose_are_named(campaign):
+    source = np.roll(np.arange(len(campaign.readings)), 4 * len(POINTS))
+    (fault,) = find(campaign, with_measured(campaign.readings, source))
+    assert "pose further up" in fault.detail
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
+def test_loads_beside_the_deflections_of_others_are_named(campaign, share):
+    readings, rng = campaign.readings, np.random.default_rng(2)
+    loaded = np.array([(pose, load) for pose in range(30) for load in (1, 2, 3)])
+    some = rng.choice(len(loaded), round(share * len(loaded)), replace=False)
+    wrench = readings.wrench.copy()
+    for mine, other in zip(loaded[some], loaded[rng.permutation(some)], strict=True):
+        theirs = readings.wrench[(readings.pose == other[0]) & (readings.load == other[1])][0]
+        wrench[(readings.pose == mine[0]) & (readings.load == mine[1])] = theirs
+    (fault,) = find(campaign, replace(readings, wrench=wrench))
+    assert "load" in fault.detail
+    assert fault.evidence[1] < fault.evidence[0] / 5
+    assert 0.6 * share < fault.parameters[0].value <= share
+
+
+def test_readings_that_belong_nowhere_are_not_shuffled(campaign):
+    rng, position = np.random.default_rng(3), campaign.readings.position.copy()
+    some = rng.choice(len(position), 20, replace=False)
+    position[some] += rng.normal(0.0, 0.3, (20, 3))
+    assert find(campaign, replace(campaign.readings, position=position)) == []
+
+
+def test_another_robot_is_no_permutation(campaign, kuka):
+    """Among many points some point is always near."""
+    assert find(replace(campaign, robot=kuka), campaign.readings) == []

@@ -1,0 +1,127 @@
+"""Registration: frames and targets from nothing but readings."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import OTHER_CHAINS, chain_of
+from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
+
+from elastocal.campaigns.campaign import Target
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.model import circumstances, residuals
+from elastocal.fitting.registration import registered
+
+KNOWN_M, KNOWN_RAD = 1e-6, 1e-6
+TWO = (Target("A", "6DoF", None), Target("B", "3DoF", None))
+
+
+def unloaded(states):
+    states.wrench[:] = 0.0
+    return states
+
+
+def assert_known(found, true, rows=3):
+    for name in ("frame_position", "target_offset"):
+        np.testing.assert_allclose(getattr(found, name), getattr(true, name), rtol=0, atol=KNOWN_M)
+    np.testing.assert_allclose(found.frame_rotation, true.frame_rotation, rtol=0, atol=KNOWN_RAD)
+    if rows == 6:
+        np.testing.assert_allclose(found.target_rotation, true.target_rotation, rtol=0, atol=KNOWN_RAD)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("sessions", [(0,), (2, 5)])
+@pytest.mark.parametrize("targets", [TWO[:1], TWO], ids=["one target", "two targets"])
+def test_frames_and_targets_are_found(fanuc, rows, sessions, targets):
+    model = made_model(fanuc.chain, targets, rows)
+    states = unloaded(made_states(6, 40, seed=1, sessions=len(sessions)))
+    states.session[:] = np.array(sessions)[states.session]
+    true = made_estimate(model, sessions, seed=2)
+    found = registered(model, seen_exactly(model, true, states))
+    assert found.sessions == sessions
+    assert_known(found, true, rows)
+
+
+@pytest.mark.parametrize("name", OTHER_CHAINS)
+def test_frames_and_targets_are_found_on_other_chains(name):
+    chain = chain_of(OTHER_CHAINS[name])
+    model = made_model(chain)
+    states = unloaded(made_states(chain.coordinates, 40, seed=3, span=2.5))
+    true = made_estimate(model, seed=4)
+    found = registered(model, seen_exactly(model, true, states))
+    off = residuals(model, found, seen_exactly(model, true, states), circumstances(model, found, states))
+    assert np.abs(off).max() < KNOWN_M
+
+
+def one_joint_at_a_time(joints, steps):
+    """Sweeps from a home pose, as a circle-point measurement makes them."""
+    states = unloaded(made_states(joints, joints * steps, seed=5))
+    states.joint_angles[:] = np.linspace(0.1, 0.6, joints)
+    for joint in range(joints):
+        states.joint_angles[joint * steps : (joint + 1) * steps, joint] += np.linspace(-0.8, 0.8, steps)
+    return states
+
+
+@pytest.mark.parametrize("sessions", [(0,), (0, 1)])
+def test_frames_and_targets_are_found_from_one_joint_at_a_time(fanuc, sessions):
+    model = made_model(fanuc.chain)
+    states = one_joint_at_a_time(6, 12)
+    states.session[:] = np.arange(len(states)) % len(sessions)
+    true = made_estimate(model, sessions, seed=6)
+    assert_known(registered(model, seen_exactly(model, true, states)), true)
+
+
+def test_known_frame_and_known_target_are_kept(fanuc):
+    targets = (Target("A", "6DoF", (0.1, -0.05, 0.2)), Target("B", "4DoF", None))
+    model = made_model(fanuc.chain, targets, fitted_frames=False)
+    states, true = unloaded(made_states(6, 15, seed=7)), made_estimate(model, seed=8)
+    found = registered(model, seen_exactly(model, true, states))
+    np.testing.assert_array_equal(found.frame_rotation, [np.eye(3)])
+    np.testing.assert_array_equal(found.frame_position, [np.zeros(3)])
+    np.testing.assert_array_equal(found.target_offset[0], (0.1, -0.05, 0.2))
+    assert_known(found, true)
+
+
+def test_frame_is_no_reflection_where_all_points_lie_in_a_plane():
+    chain = chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")
+    model = made_model(chain, (Target("A", "end", (0.0, 0.0, 0.0)),))
+    for seed in range(8):
+        states, true = unloaded(made_states(2, 20, seed=seed)), made_estimate(model, seed=seed + 10)
+        found = registered(model, seen_exactly(model, true, states))
+        np.testing.assert_allclose(np.linalg.det(found.frame_rotation), 1.0)
+        assert_known(found, true)
+
+
+def test_noise_moves_the_frame_by_no_more_than_noise(fanuc):
+    model = made_model(fanuc.chain)
+    states, true = unloaded(made_states(6, 40, seed=11)), made_estimate(model, seed=12)
+    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(13), position_m=1e-4)
+    found = registered(model, seen)
+    off = residuals(model, found, seen, circumstances(model, found, states))
+    assert np.sqrt((off**2).mean()) < 1.1e-4
+
+
+def test_effects_start_at_zero_and_compliances_at_their_nominal_values(fanuc):
+    known = candidates_on(made_model(fanuc.chain).sites)
+    effects = known["joint_offset@2"], known["lost_motion@3"]
+    model = made_model(fanuc.chain, effects=effects, identified=True, compliance=fanuc.compliance)
+    states = unloaded(made_states(6, 20, seed=14))
+    found = registered(model, seen_exactly(model, made_estimate(model, seed=15), states))
+    np.testing.assert_array_equal(found.coefficients[0], fanuc.compliance)
+    assert [values.tolist() for values in found.coefficients[1:]] == [[0.0], [0.0]]
+    assert [values.tolist() for values in found.shapes] == [[], [], [effects[1].shapes[0].start]]
+
+
+def test_a_target_without_a_reading_stays_where_it_was(fanuc):
+    """All of its readings may be held out."""
+    model = made_model(fanuc.chain, TWO, 6)
+    states = unloaded(made_states(6, 40, seed=1))
+    true = made_estimate(model, seed=2)
+    seen = seen_exactly(model, true, states)
+    first = seen.target == 0
+    one = replace(
+        seen, state=seen.state[first], target=seen.target[first], position=seen.position[first], rotation=seen.rotation[first]
+    )
+    found = registered(model, one)
+    np.testing.assert_allclose(found.target_offset[0], true.target_offset[0], rtol=0, atol=KNOWN_M)
+    np.testing.assert_array_equal(found.target_offset[1], 0.0)

@@ -1,0 +1,123 @@
+"""Whitening: against a dense Cholesky factor of the whole covariance, and on simulated noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import made_estimate, made_model, made_states, seen_exactly
+
+from elastocal.campaigns.campaign import Target
+from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import Observations
+from elastocal.fitting.whitening import whitening
+
+TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
+NOISE = Noise("repeats", 60e-6, 40e-6, 1e-6 * np.array([30.0, 40, 50, 60, 70, 0]))
+
+
+@pytest.fixture(params=[3, 6], ids=["positions", "poses"])
+def case(request, fanuc):
+    """Observations of one to three targets a state, averaged over one to four repeats, and their Jacobian."""
+    model = made_model(fanuc.chain, TARGETS, request.param, fitted_frames=False)
+    states = made_states(6, 7, seed=1)
+    states.repeats[:] = [1, 4, 2, 3, 1, 2, 4]
+    whole = seen_exactly(model, made_estimate(model), states)
+    kept = np.array([0, 1, 2, 4, 6, 7, 8, 9, 12, 13, 14, 17, 18, 19, 20])
+    rotation = None if whole.rotation is None else whole.rotation[kept]
+    seen = Observations(states, whole.state[kept], whole.target[kept], whole.position[kept], rotation)
+    estimate = made_estimate(model)
+    jacobian = linearize(model, estimate, seen, circumstances(model, estimate, states)).coordinate_jacobian[..., :6]
+    return seen, jacobian
+
+
+def dense_covariance(seen, jacobian, noise):
+    """Covariance of all rows, written out from what the noise means."""
+    rows = seen.rows
+    joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
+    state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
+    sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
+    one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
+    # What a pose has in common no repeat averages.
+    return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
+
+
+@pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
+    """Poses of one state and of three, which share an error of the joints where there is one."""
+    seen, jacobian = case
+    seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
+    noise = replace(NOISE, pose_rad=pose_rad)
+    covariance = dense_covariance(seen, jacobian, noise)
+    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
+    found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
+    # A factor of a covariance is unique but for the order of its rows: what is whitened has the same products.
+    expected = values.reshape(-1, 5).T @ np.linalg.solve(covariance, values.reshape(-1, 5))
+    np.testing.assert_allclose(found.T @ found, expected, rtol=1e-7, atol=1e-7 * np.abs(expected).max())
+    identity = np.eye(len(covariance)).reshape(len(seen), seen.rows, -1)
+    factor = whitening(seen, jacobian, noise).apply(identity).reshape(covariance.shape)
+    np.testing.assert_allclose(factor @ covariance @ factor.T, np.eye(len(covariance)), atol=1e-7)
+
+
+def test_without_an_error_of_the_pose_rows_are_those_of_the_cholesky_factor_itself(case):
+    seen, jacobian = case
+    factor = np.linalg.cholesky(dense_covariance(seen, jacobian, NOISE))
+    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
+    found = whitening(seen, jacobian, NOISE).apply(values)
+    expected = np.linalg.solve(factor, values.reshape(-1, 5)).reshape(values.shape)
+    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
+
+
+def test_noise_of_readings_is_the_noise_without_what_a_pose_has_in_common(case):
+    seen, jacobian = case
+    values = np.random.default_rng(6).standard_normal((len(seen), seen.rows))
+    noise = replace(NOISE, pose_rad=1e-3)
+    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_readings, NOISE)]
+    np.testing.assert_array_equal(*found)
+    # A factor on the noise of readings leaves what a pose has in common.
+    assert (noise.scaled(2.0).pose_rad, noise.scaled(2.0).position_m) == (1e-3, 2 * NOISE.position_m)
+
+
+def test_rows_of_one_and_of_many_columns_are_whitened_alike(case):
+    seen, jacobian = case
+    values = np.random.default_rng(3).standard_normal((len(seen), seen.rows, 2, 3))
+    by = whitening(seen, jacobian, NOISE)
+    found = by.apply(values)
+    np.testing.assert_allclose(by.apply(values[:, :, 1, 2]), found[:, :, 1, 2], rtol=1e-12)
+
+
+def test_whitened_simulated_noise_is_independent_and_of_unit_variance(case):
+    seen, jacobian = case
+    rng, draws = np.random.default_rng(4), 8000
+    total = np.zeros((len(seen), seen.rows, draws))
+    sensor = np.array([NOISE.position_m] * 3 + [NOISE.orientation_rad] * 3)[: seen.rows]
+    for repeat in range(4):
+        there = repeat < seen.states.repeats[seen.state]
+        joints = NOISE.joint_rad[:, None] * rng.standard_normal((7, 6, draws))
+        noise = jacobian @ joints[seen.state] + sensor[:, None] * rng.standard_normal(total.shape)
+        total += there[:, None, None] * noise
+    mean = total / seen.states.repeats[seen.state][:, None, None]
+    white = whitening(seen, jacobian, NOISE).apply(mean).reshape(-1, draws)
+    covariance = white @ white.T / draws
+    # Each entry has a standard error of 1 / sqrt(draws), on the diagonal sqrt(2) times that.
+    np.testing.assert_allclose(covariance, np.eye(len(white)), rtol=0, atol=6 * np.sqrt(2 / draws))
+
+
+def test_sensor_alone_only_divides(case):
+    seen, jacobian = case
+    values = np.random.default_rng(5).standard_normal((len(seen), seen.rows))
+    found = whitening(seen, jacobian, replace(NOISE, joint_rad=np.zeros(6))).apply(values)
+    deviation = np.array([60e-6] * 3 + [40e-6] * 3)[: seen.rows]
+    expected = values / deviation * np.sqrt(seen.states.repeats[seen.state])[:, None]
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
+    """All of a pose moves together: as many times as it is read, its whitened size is that of one reading."""
+    seen, jacobian = case
+    tiny = replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6), pose_rad=1e-4)
+    moved = jacobian @ np.array([1e-4, 0, 0, 0, 0, 0])
+    squares = (whitening(seen, jacobian, tiny).apply(moved) ** 2).sum(axis=1)
+    # Rows of a pose tell one joint's share of a common error of six, however many repeats stand behind them.
+    by_pose = np.bincount(seen.cluster, squares)
+    assert (by_pose <= 1.0 + 1e-6).all() and by_pose.max() > 0.5

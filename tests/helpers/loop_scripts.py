@@ -1,0 +1,75 @@
+"""The scripts of the loop's rules, run one after the other in this process as Snakemake would run them."""
+
+import runpy
+import sys
+from pathlib import Path
+
+SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
+PARAMS = {"seed": 1, "states": 4}
+ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
+FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
+STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
+# Names of the rules' files by which others know them; what is not listed is a Parquet table.
+SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
+SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf"}
+
+
+class Files:
+    """Files of a folder by the names that rules give them: what one script writes the next finds."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    @property
+    def figures(self):
+        """Those of the report."""
+        return [(self.folder / f"{figure}.pdf").as_posix() for figure in FIGURES]
+
+    def __getattr__(self, name):
+        return (self.folder / f"{name}{SUFFIXES.get(name, '.parquet')}").as_posix()
+
+
+class _Named(dict):
+    __getattr__ = dict.__getitem__
+
+
+class _Job:
+    def __init__(self, **parts):
+        self.__dict__.update(parts)
+
+
+def run_loop(folder, robots, out, steps=STEPS):
+    """Run every step from a campaign's folder to its report; results stand in `out`.
+
+    Parameters
+    ----------
+    folder, robots, out : Path
+
+    Returns
+    -------
+    Path
+        `out`, with ``verdict.json`` and ``report.pdf``.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    for script in steps:
+        job = _Job(
+            input=Files(out),
+            output=Files(out),
+            params=_Named(PARAMS | {"folder": folder.as_posix(), "robots": robots.as_posix()}),
+            wildcards=_Named(campaign=folder.name),
+            log=[(out / f"{script}.log").as_posix()],
+        )
+        if script.startswith("draw_"):
+            figure = script.removeprefix("draw_")
+            job.output = _Named({kind: (out / f"{figure}.{kind}").as_posix() for kind in ("pdf", "png")})
+        run_script(script, job)
+    return out
+
+
+def run_script(script, job):
+    """Run one script of the workflow with a job in the place of Snakemake's."""
+    sys.path.insert(0, SCRIPTS.as_posix())
+    try:
+        runpy.run_path((SCRIPTS / f"{script}.py").as_posix(), {"snakemake": job}, "__main__")
+    finally:
+        sys.path.remove(SCRIPTS.as_posix())

@@ -1,0 +1,135 @@
+"""Campaigns made in memory by the exact kinematics of a robot with springs, for the tests of faults."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.campaign import Campaign, Readings, Target
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+
+POINTS = ("2DoF", "3DoF", "4DoF", "6DoF")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a campaign is measured.
+
+    Attributes
+    ----------
+    poses, loads, repeats : int
+        `loads` without the unloaded one.
+    tracker : bool
+        Whether the base stands somewhere in the tracker's frame and the targets anywhere on their points.
+    oriented : bool
+        Whether orientations are measured.
+    noise : float
+        Standard deviation, m and rad.
+    force : float
+        N.
+    """
+
+    poses: int = 30
+    loads: int = 3
+    repeats: int = 1
+    tracker: bool = False
+    oriented: bool = True
+    noise: float = 6e-5
+    force: float = 1000.0
+
+
+def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, moving=None):
+    """A campaign of a robot, measured as planned.
+
+    Parameters
+    ----------
+    robot : Robot
+        What the campaign takes it for.
+    seed : int
+    plan : Plan
+    true_robot : Robot, optional
+        What it is; `robot` without.
+    true_offset : array_like
+        Added to the joint angles, rad.
+    sag : float
+        Turn of joint 2 for each unit of the cosine of its angle, rad.
+    moving : dict of int to int, optional
+        Joints, from 0, that stand at zero in all but so many poses.
+
+    Returns
+    -------
+    Campaign
+    """
+    rng = np.random.default_rng(seed)
+    true_robot = true_robot or robot
+    low, high = np.maximum(robot.joint_limits[:, 0], -2.5), np.minimum(robot.joint_limits[:, 1], 2.5)
+    angles = rng.uniform(low, high, (plan.poses, robot.joints))
+    for joint, few in (moving or {}).items():
+        angles[few:, joint] = 0.0
+    shape = plan.poses, plan.loads + 1, plan.repeats, len(POINTS)
+    pose, load, repeat, target = (index.ravel() for index in np.indices(shape))
+    force = rng.standard_normal((plan.poses, plan.loads + 1, 3))
+    force *= plan.force / np.linalg.norm(force, axis=-1, keepdims=True)
+    force[:, 0] = 0.0
+    wrenches = np.concatenate([force, np.cross([0.0, 0.5, 0.0], force)], axis=-1)
+    q, wrench = angles[pose], wrenches[pose, load]
+    end = poses_and_jacobians(true_robot.chain, q, true_robot.chain.end_effector)[2]
+    moved = q + true_offset + generalized_forces(end, wrench) * true_robot.compliance
+    moved[:, 1] += sag * np.cos(q[:, 1])
+    offsets = rng.uniform(-0.15, 0.15, (len(POINTS), 3)) if plan.tracker else np.zeros((len(POINTS), 3))
+    position, rotation = np.empty((len(pose), 3)), np.empty((len(pose), 3, 3))
+    for index, name in enumerate(POINTS):
+        point = replace(true_robot.chain.point(name), offset_m=tuple(offsets[index]))
+        mask = target == index
+        position[mask], rotation[mask] = poses(true_robot.chain, moved[mask], point)
+    if plan.tracker:
+        frame = Rotation.random(random_state=seed).as_matrix()
+        position, rotation = position @ frame.T + rng.uniform(-3, 3, 3), frame @ rotation
+    position = position + plan.noise * rng.standard_normal(position.shape)
+    turned = Rotation.from_rotvec(plan.noise * rng.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
+    readings = Readings(
+        session=np.zeros(len(pose), np.int32),
+        pose=pose.astype(np.int32),
+        load=load.astype(np.int32),
+        repeat=repeat.astype(np.int32),
+        target=target.astype(np.int32),
+        joint_angles=q,
+        wrench=wrench,
+        position=position,
+        rotation_vector=turned.as_rotvec() if plan.oriented else None,
+        approach=None,
+        time_s=None,
+        temperature_c=None,
+        row=np.arange(1, len(pose) + 1, dtype=np.int32),
+    )
+    return Campaign(
+        name="made",
+        robot=robot,
+        measured="pose" if plan.oriented else "position",
+        frame="tracker" if plan.tracker else "base",
+        targets=tuple(Target(f"T{name}", name, None if plan.tracker else (0.0, 0.0, 0.0)) for name in POINTS),
+        compliance="identify",
+        declared=(),
+        noise=None,
+        holdout={"fraction": 0.3, "seed": 1},
+        readings=readings,
+    )
+
+
+def with_geometric_errors(robot, seed, size_m):
+    """The same robot with other lengths, m."""
+    rng = np.random.default_rng(seed)
+    transforms = tuple(
+        replace(transform, constant=transform.constant + size_m * rng.choice([-1.0, 1.0]))
+        if transform.kind == "T"
+        else transform
+        for transform in robot.chain.transforms
+    )
+    return replace(robot, chain=replace(robot.chain, transforms=transforms))
+
+
+def with_other_compliances(robot, seed, share):
+    """The same robot with compliances off by up to a share."""
+    factors = 1 + np.random.default_rng(seed).uniform(-share, share, robot.joints)
+    return replace(robot, compliance=robot.compliance * factors)

@@ -1,0 +1,87 @@
+"""Small campaigns of a known robot that lacks what is planted in it, fitted without that."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
+
+from elastocal.campaigns.campaign import Target
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.least_squares import Fit, fit
+from elastocal.fitting.observations import Observations
+
+# At known places, so that nothing but the effects is to be told.
+HAND = (Target("hand", "6DoF", (0.1, 0.05, 0.02)),)
+ELBOW_AND_HAND = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), *HAND)
+
+
+@dataclass(frozen=True)
+class Planted:
+    """A campaign whose truth is known.
+
+    Attributes
+    ----------
+    declared : Fit
+        Of the model that lacks what was planted.
+    observations : Observations
+    candidates : dict of str to Candidate
+    """
+
+    declared: Fit
+    observations: Observations
+    candidates: dict
+
+    @property
+    def all_candidates(self):
+        return list(self.candidates.values())
+
+
+def two_loads_a_pose(joints, poses, seed, force=800.0):
+    """States of `poses` poses, each unloaded and under a load of its own."""
+    states = made_states(joints, 2 * poses, seed, force)
+    wrench = states.wrench * (np.arange(2 * poses) % 2)[:, None]
+    pose = np.arange(2 * poses) // 2
+    return replace(
+        states,
+        pose=pose,
+        load=np.arange(2 * poses) % 2,
+        joint_angles=states.joint_angles[2 * pose],
+        approach=states.approach[2 * pose],
+        wrench=wrench,
+    )
+
+
+def planted(robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model):
+    """A campaign of positions and, unless told otherwise, identified compliances.
+
+    Parameters
+    ----------
+    robot : Robot
+    sizes : dict of str to sequence of float
+        What is planted: parameters by the key of a candidate.
+    seed : int
+    poses : int
+    targets : sequence of Target
+    states : States, optional
+    **model
+        As in `synthetic.made_model`.
+
+    Returns
+    -------
+    Planted
+    """
+    settings = {"fitted_frames": False, "identified": True, "compliance": robot.compliance} | model
+    declared = made_model(robot.chain, targets, **settings)
+    states = two_loads_a_pose(declared.sites.joints, poses, (5, seed)) if states is None else states
+    candidates = candidates_on(declared.sites)
+    start = made_estimate(declared, seed=seed)
+    if declared.identifies_compliance:
+        start = replace(start, coefficients=(robot.compliance, *start.coefficients[1:]))
+    added = [candidates[key] for key in sizes]
+    true = start.with_effects(added)
+    for number, size in enumerate(sizes.values()):
+        true.coefficients[len(start.coefficients) + number][:] = size
+    seen = seen_exactly(declared.with_effects(added), true, states)
+    seen = with_noise(seen, np.random.default_rng((6, seed)))
+    noise = replace(NOISE, joint_rad=np.zeros(declared.sites.joints))
+    return Planted(fit(declared, seen, noise, start), seen, candidates)

@@ -1,0 +1,174 @@
+"""Campaigns made up for tests: states, models, estimates and what a tracker would read of them."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.campaign import Readings, Target
+from elastocal.effects import declared_weight
+from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.effects.protocol import circumstances_of
+from elastocal.fitting.model import Estimate, Model, circumstances, parameters, predict, residuals, stepped
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import Observations, States
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.robot import Compensator
+from elastocal.mechanics.sites import sites_of
+
+NOISE = Noise("declared", 60e-6, 60e-6, np.zeros(6))
+
+
+def made_states(joints, count, seed=0, force=500.0, span=1.2, sessions=1, repeats=1):
+    """States anywhere, each under a load of its own, with everything that an effect may ask for."""
+    rng = np.random.default_rng(seed)
+    wrench = np.concatenate([rng.standard_normal((count, 3)), 0.3 * rng.standard_normal((count, 3))], axis=1)
+    return States(
+        session=np.sort(np.arange(count) % sessions),
+        pose=np.arange(count),
+        load=np.ones(count, int),
+        joint_angles=rng.uniform(-span, span, (count, joints)),
+        wrench=force * wrench,
+        repeats=np.full(count, repeats),
+        approach=rng.choice([-1.0, 1.0], (count, joints)),
+        time_s=np.sort(rng.uniform(0, 4 * 3600, count)),
+        temperature_c=20 + np.sort(rng.uniform(0, 10, count)),
+        row=1 + np.arange(count),
+    )
+
+
+def equipped(holder):
+    """Sites of a robot or a chain with a compensator beside its shoulder and a known gear: no effect is out of place there."""
+    sites = sites_of(holder)
+    if sites.compensator is None and sites.shoulder is not None:
+        sites = replace(sites, compensator=Compensator(sites.shoulder + 1, "spring"))
+    return sites if sites.gear_ratio else replace(sites, gear_ratio=(101.0, *[None] * (sites.joints - 1)))
+
+
+def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
+    """A model of a chain or a robot; its targets are unknown offsets from the last measuring point unless told."""
+    sites = equipped(holder)
+    targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
+    compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)
+    springs = (joint_compliance(sites),) if identified else ()
+    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    return Model(sites, tuple(targets), fitted_frames, rows, compliance, (*springs, *weight, *effects))
+
+
+def made_estimate(model, sessions=(0,), seed=0, size=0.3):
+    """Frames and targets anywhere; every parameter of an effect at up to `size` times its plausible size."""
+    rng = np.random.default_rng(seed)
+    count, fitted = len(sessions), model.fitted_frames
+    frames = Rotation.random(count, rng=rng).as_matrix() if fitted else np.tile(np.eye(3), (count, 1, 1))
+    offsets, turns = [], []
+    for target in model.targets:
+        unknown = target.offset_m is None
+        offsets.append(rng.uniform(-0.1, 0.1, 3) if unknown else target.offset_m)
+        turns.append(Rotation.random(rng=rng).as_matrix() if unknown and model.rows == 6 else np.eye(3))
+    sizes = [np.array([parameter.plausible for parameter in effect.parameters]) for effect in model.effects]
+    return Estimate(
+        tuple(sessions),
+        frames,
+        rng.uniform(-2, 2, (count, 3)) * fitted,
+        np.array(offsets),
+        np.array(turns),
+        tuple(size * plausible * rng.uniform(-1, 1, len(plausible)) for plausible in sizes),
+        tuple(np.array([shape.start for shape in effect.shapes]) for effect in model.effects),
+    )
+
+
+def seen_exactly(model, estimate, states):
+    """Every target in every state, read without noise in the frame of its session."""
+    state = np.repeat(np.arange(len(states)), len(model.targets))
+    target = np.tile(np.arange(len(model.targets)), len(states))
+    blank = Observations(states, state, target, np.zeros((len(state), 3)), None)
+    position, rotation = predict(model, estimate, blank, circumstances(model, estimate, states))
+    session = np.searchsorted(estimate.sessions, states.session[state])
+    turn, shift = estimate.frame_rotation[session], estimate.frame_position[session]
+    position = (turn @ position[..., None])[..., 0] + shift
+    return Observations(states, state, target, position, turn @ rotation if model.rows == 6 else None)
+
+
+def with_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
+    """The same observations, each component of each wrong by itself."""
+    position = observations.position + position_m * rng.standard_normal(observations.position.shape)
+    rotation = observations.rotation
+    if rotation is not None:
+        turn = Rotation.from_rotvec(orientation_rad * rng.standard_normal((len(position), 3)))
+        rotation = turn.as_matrix() @ rotation
+    return replace(observations, position=position, rotation=rotation)
+
+
+def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0):
+    """Repeats of poses in base axes: the joints come to rest anew at each approach, the sensor errs at each reading."""
+    joints, targets = model.sites.joints, len(model.targets)
+    pose = np.repeat(np.arange(poses_count), repeats * targets)
+    repeat = np.tile(np.repeat(np.arange(repeats), targets), poses_count)
+    target = np.tile(np.arange(targets), poses_count * repeats)
+    commanded = rng.uniform(-1.2, 1.2, (poses_count, joints))[pose]
+    rest = (joint_rad * rng.standard_normal((poses_count * repeats, joints))).repeat(targets, axis=0)
+    coordinates = np.zeros((len(pose), model.sites.chain.coordinates))
+    coordinates[:, :joints] = commanded + rest
+    position, rotation = np.empty((len(pose), 3)), np.empty((len(pose), 3, 3))
+    for index, one in enumerate(model.targets):
+        point = replace(model.sites.chain.point(one.point), offset_m=one.offset_m)
+        mask = target == index
+        position[mask], rotation[mask] = poses(model.sites.chain, coordinates[mask], point)
+    turned = Rotation.from_rotvec(sensor_rad * rng.standard_normal((len(pose), 3))) * Rotation.from_matrix(rotation)
+    return Readings(
+        session=np.zeros(len(pose), int),
+        pose=pose,
+        load=np.zeros(len(pose), int),
+        repeat=repeat,
+        target=target,
+        joint_angles=commanded,
+        wrench=np.zeros((len(pose), 6)),
+        position=position + sensor_m * rng.standard_normal(position.shape),
+        rotation_vector=turned.as_rotvec() if model.rows == 6 else None,
+        approach=None,
+        time_s=None,
+        temperature_c=None,
+        row=np.arange(1, len(pose) + 1),
+    )
+
+
+def circumstances_on(holder, states, compliance=None):
+    """Circumstances of some states on a chain or a robot."""
+    sites = equipped(holder)
+    compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
+    return circumstances_of(sites, compliance, states)
+
+
+def candidate_on(holder, key):
+    """One candidate of the catalogue, on a chain or a robot."""
+    return candidates_on(equipped(holder))[key]
+
+
+def displacements(candidate, circumstances, *shapes):
+    """What each parameter of a candidate makes, on every coordinate of the sites: ndarray (D, S, C)."""
+    laws = candidate.displacement(circumstances, *shapes)
+    assert len(laws) == len(candidate.parameters)
+    dense = np.zeros((len(laws), *circumstances.load.shape))
+    for number, law in enumerate(laws):
+        for coordinate, values in law.items():
+            dense[number, :, coordinate] = values
+    return dense
+
+
+def small_steps(model, estimate):
+    """A step of each parameter for which a central difference loses nothing to curvature or rounding."""
+    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
+    listed = parameters(model, estimate)
+    return np.array([(1e-4 if (owner, p.name) in shapes else 1e-3) * p.plausible for owner, p in listed])
+
+
+def slopes(model, estimate, observations, circumstances, steps):
+    """Changes of the prediction per step, by central differences of the residuals: ndarray (M, rows, number of steps)."""
+    columns = []
+    for step in steps:
+        ahead, behind = (
+            residuals(model, stepped(model, estimate, sign * step), observations, circumstances) for sign in (1, -1)
+        )
+        columns.append((behind - ahead) / 2)
+    return np.stack(columns, axis=-1)

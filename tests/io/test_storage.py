@@ -1,0 +1,357 @@
+"""Tables on disk: what is written comes back, and a file that is not as written is refused in one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from support import refused
+
+from elastocal.io.storage import Column, TableSchema, read_blocks, read_provenance, read_table, write_table
+
+SCHEMA = TableSchema(
+    "things",
+    (
+        Column("kind", "string", "", "which thing; a row group holds one"),
+        Column("number", "int32", "", "number of the thing", minimum=0),
+        Column("length", "float64", "m", "how long it is"),
+        Column("share", "float32", "", "share of it", missing=True),
+        Column("good", "bool", "", "whether it is any good"),
+    ),
+)
+OTHER = TableSchema("other things", SCHEMA.columns)
+ORIGIN = {"elastocal_version": "0.1.0", "configuration": {"seed": 1}, "noise_um": 200}
+
+
+def block(kind, first, rows=3, **changes):
+    numbers = np.arange(first, first + rows)
+    return {
+        "kind": kind,
+        "number": numbers,
+        "length": 0.1 * numbers,
+        "share": np.where(numbers % 2, np.nan, numbers / 3),
+        "good": numbers % 3 == 0,
+    } | changes
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A table of three row groups."""
+    path = str(tmp_path / "things.parquet")
+    write_table(path, SCHEMA, [block("a", 0), block("b", 3, 2), block("a", 5)], ORIGIN)
+    return path
+
+
+def rewritten(path, change):
+    """The file with changed contents, its metadata and row groups kept: what an editor other than the pipeline leaves."""
+    with pq.ParquetFile(path) as file:
+        metadata = {k: v for k, v in file.metadata.metadata.items() if k.startswith(b"elastocal")}
+        groups = [change(file.read_row_group(i)) for i in range(file.num_row_groups)]
+    with pq.ParquetWriter(path, groups[0].schema) as writer:
+        for group in groups:
+            writer.write_table(group)
+        writer.add_key_value_metadata(metadata)
+
+
+def replaced(table, name, values):
+    index = table.schema.get_field_index(name)
+    return table.set_column(index, table.schema.field(index), pa.array(values, table.schema.field(index).type))
+
+
+def test_what_is_written_comes_back(path):
+    table = read_table(path, SCHEMA)
+    np.testing.assert_array_equal(table["kind"], list("aaabbaaa"))
+    np.testing.assert_array_equal(table["number"], np.arange(8))
+    np.testing.assert_array_equal(table["length"], 0.1 * np.arange(8))
+    np.testing.assert_array_equal(table["share"], np.where(np.arange(8) % 2, np.nan, np.arange(8) / 3).astype("f4"))
+    np.testing.assert_array_equal(table["good"], np.arange(8) % 3 == 0)
+    assert [table[c.name].dtype for c in SCHEMA.columns[1:]] == ["int32", "float64", "float32", "bool"]
+
+
+def test_blocks_come_back_as_they_were_written(path):
+    assert [b["number"].tolist() for b in read_blocks(path, SCHEMA)] == [[0, 1, 2], [3, 4], [5, 6, 7]]
+
+
+def test_large_blocks_stay_one_row_group(tmp_path):
+    # pyarrow cuts row groups at 2^20 rows unless told otherwise.
+    path, rows = str(tmp_path / "large.parquet"), 2**20 + 5
+    schema = TableSchema("large", (Column("number", "int32", "", "a number"),))
+    write_table(path, schema, [{"number": np.arange(rows)}], {})
+    assert [len(b["number"]) for b in read_blocks(path, schema)] == [rows]
+
+
+def test_only_the_columns_asked_for_are_read(path):
+    assert set(read_table(path, SCHEMA, ["length", "good"])) == {"length", "good"}
+
+
+def test_only_row_groups_with_the_value_asked_for_are_read(path):
+    assert [b["number"].tolist() for b in read_blocks(path, SCHEMA, kind="a")] == [[0, 1, 2], [5, 6, 7]]
+    assert read_table(path, SCHEMA, ["number"], kind="b")["number"].tolist() == [3, 4]
+    assert list(read_blocks(path, SCHEMA, kind="c")) == []
+
+
+def test_a_value_that_no_row_group_has_is_refused(path):
+    with refused(path, "kind", "'c'"):
+        read_table(path, SCHEMA, kind="c")
+
+
+def test_units_and_meanings_stand_in_the_field_metadata(path):
+    fields = pq.read_schema(path)
+    for column in SCHEMA.columns:
+        metadata = fields.field(column.name).metadata
+        assert metadata[b"unit"].decode() == column.unit and metadata[b"meaning"].decode() == column.meaning
+
+
+def test_provenance_comes_back_and_any_parquet_reader_sees_it(path):
+    assert read_provenance(path) == ORIGIN
+    assert json.loads(pq.read_metadata(path).metadata[b"elastocal.provenance"]) == ORIGIN
+    assert json.loads(pq.read_metadata(path).metadata[b"elastocal.table"]) == "things"
+
+
+def test_the_same_table_is_the_same_file(tmp_path, path):
+    again = str(tmp_path / "again.parquet")
+    write_table(again, SCHEMA, [block("a", 0), block("b", 3, 2), block("a", 5)], ORIGIN)
+    assert Path(path).read_bytes() == Path(again).read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"length": [0.1, np.nan, 0.3]}, "column length, row 1", ["nan", "finite"]),
+        ({"length": [0.1, 0.2, np.inf]}, "column length, row 2", ["inf", "finite"]),
+        ({"number": [0, 4, -2]}, "column number, row 2", ["-2", ">= 0"]),
+        ({"length": [0.1, 0.2]}, "rows", ["2, 3", "one length"]),
+        ({"width": [1, 2, 3]}, "columns", ["width", "things"]),
+    ],
+)
+def test_faulty_values_are_not_written(tmp_path, changes, key, words):
+    path = str(tmp_path / "faulty.parquet")
+    with refused(path, key, *words):
+        write_table(path, SCHEMA, [block("a", 0), block("a", 3, **changes)], {})
+    assert not Path(path).exists()
+
+
+def test_a_block_without_a_column_is_not_written(tmp_path):
+    path, missing = str(tmp_path / "faulty.parquet"), block("a", 0)
+    del missing["share"]
+    with refused(path, "columns", "share"):
+        write_table(path, SCHEMA, [missing], {})
+    assert not Path(path).exists()
+
+
+def test_missing_values_are_written_where_the_column_allows_them(tmp_path):
+    path = str(tmp_path / "missing.parquet")
+    write_table(path, SCHEMA, [block("a", 0, share=[np.nan, np.inf, -np.inf])], {})
+    np.testing.assert_array_equal(read_table(path, SCHEMA)["share"], np.array([np.nan, np.inf, -np.inf], "f4"))
+
+
+def broken_after(blocks):
+    yield from blocks
+    raise RuntimeError("the blocks ran dry")
+
+
+def test_nothing_half_written_remains_under_the_final_name(tmp_path):
+    path = tmp_path / "things.parquet"
+    with pytest.raises(RuntimeError, match="ran dry"):
+        write_table(str(path), SCHEMA, broken_after([block("a", 0)]), {})
+    assert not path.exists()
+
+
+def test_an_older_file_survives_a_block_that_fails(path):
+    before = Path(path).read_bytes()
+    with pytest.raises(RuntimeError, match="ran dry"):
+        write_table(path, SCHEMA, broken_after([block("b", 9)]), {})
+    assert Path(path).read_bytes() == before
+
+
+def test_a_finished_file_leaves_no_other_file_behind(path):
+    assert [p.name for p in Path(path).parent.iterdir()] == ["things.parquet"]
+
+
+def test_missing_file_is_refused(tmp_path):
+    path = str(tmp_path / "nothing.parquet")
+    for read in (lambda: read_table(path, SCHEMA), lambda: read_provenance(path)):
+        with refused(path, "", "Parquet"):
+            read()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.9, 0.999])
+def test_truncated_file_is_refused(path, share):
+    whole = Path(path).read_bytes()
+    Path(path).write_bytes(whole[: int(share * len(whole))])
+    with refused(path, "", "Parquet"):
+        read_table(path, SCHEMA)
+
+
+def test_file_that_is_no_table_is_refused(path):
+    Path(path).write_text("number,length\n1,2\n" * 100)
+    with refused(path, "", "Parquet"):
+        read_table(path, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("column", "change"),
+    [
+        ("length", lambda values: [values[0] + 1e-15, *values[1:]]),
+        ("length", lambda values: values[::-1]),
+        ("length", lambda values: [None if v is None else float("nan") for v in values]),
+        ("number", lambda values: [v + 1 for v in values]),
+        ("share", lambda values: [0.0] * len(values)),
+        ("good", lambda values: [not v for v in values]),
+        ("kind", lambda values: ["c"] * len(values)),
+    ],
+)
+def test_edited_values_are_refused(path, column, change):
+    rewritten(path, lambda table: replaced(table, column, change(table.column(column).to_pylist())))
+    with refused(path, f"column {column}, row group 0", "edited", "as the pipeline wrote it"):
+        read_table(path, SCHEMA)
+
+
+def test_a_file_rewritten_without_a_change_is_read(path):
+    rewritten(path, lambda table: table)
+    np.testing.assert_array_equal(read_table(path, SCHEMA)["number"], np.arange(8))
+
+
+def test_rows_taken_away_are_refused(path):
+    rewritten(path, lambda table: table.slice(1))
+    with refused(path, "row group 0", "edited"):
+        read_table(path, SCHEMA)
+
+
+def test_row_groups_taken_away_are_refused(path):
+    with pq.ParquetFile(path) as file:
+        metadata = {k: v for k, v in file.metadata.metadata.items() if k.startswith(b"elastocal")}
+        group = file.read_row_group(0)
+    with pq.ParquetWriter(path, group.schema) as writer:
+        writer.write_table(group)
+        writer.add_key_value_metadata(metadata)
+    with refused(path, "row groups", "found 1", "3"):
+        read_table(path, SCHEMA)
+
+
+def test_flipped_bytes_in_the_data_are_refused(path):
+    whole = bytearray(Path(path).read_bytes())
+    with pq.ParquetFile(path) as file:
+        chunk = file.metadata.row_group(0).column(2)
+        start = chunk.data_page_offset
+        middle = start + chunk.total_compressed_size - 4
+    whole[middle] ^= 0xFF
+    Path(path).write_bytes(whole)
+    with refused(path, "row group 0", "as the pipeline wrote it"):
+        read_table(path, SCHEMA)
+
+
+def test_renamed_column_is_refused(path):
+    names = ["kind", "number", "lenght", "share", "good"]
+    rewritten(path, lambda table: table.rename_columns(names))
+    with refused(path, "column length", "nothing", "double"):
+        read_table(path, SCHEMA)
+
+
+def test_column_of_another_type_is_refused(path):
+    def change(table):
+        return table.set_column(1, "number", table.column("number").cast(pa.int64()))
+
+    rewritten(path, change)
+    with refused(path, "column number", "int64", "int32"):
+        read_table(path, SCHEMA)
+
+
+def test_another_table_is_refused(path):
+    with refused(path, "metadata elastocal.table", "things", "other things"):
+        read_table(path, OTHER)
+
+
+def test_a_parquet_file_of_somebody_else_is_refused(tmp_path):
+    path = str(tmp_path / "else.parquet")
+    pq.write_table(pa.table({"number": [1, 2]}), path)
+    with refused(path, "metadata elastocal.table", "nothing", "things"):
+        read_table(path, SCHEMA)
+
+
+def test_a_file_without_digests_is_refused(path):
+    with pq.ParquetFile(path) as file:
+        group = file.read_row_group(0).replace_schema_metadata(None)
+    with pq.ParquetWriter(path, group.schema) as writer:
+        writer.write_table(group)
+        writer.add_key_value_metadata({"elastocal.table": '"things"'})
+    with refused(path, "elastocal.sha256"):
+        read_table(path, SCHEMA)
+
+
+def test_a_file_without_provenance_is_refused(tmp_path):
+    path = str(tmp_path / "else.parquet")
+    pq.write_table(pa.table({"number": [1, 2]}), path)
+    with refused(path, "elastocal.provenance"):
+        read_provenance(path)
+
+
+TEXTS = TableSchema(
+    "texts",
+    (
+        Column("owner", "text", "", "one of its own for each row"),
+        Column("value", "float64", "m", "any", missing=True),
+        Column("held", "bool", "", "whether it is held"),
+        Column("kind", "string", "", "one for each row group"),
+    ),
+)
+ODD_TEXTS = ["", "µrad/(N·m)", "a, b\nc", "joint_offset@3", "", "x" * 300, "transmission_harmonic@1[orders 3-6]"]
+
+
+def text_block(texts, kind="k"):
+    return {"owner": texts, "value": np.arange(len(texts)) / 3, "held": np.arange(len(texts)) % 2 == 1, "kind": kind}
+
+
+def test_text_columns_come_back_row_by_row(tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    write_table(path, TEXTS, [text_block(ODD_TEXTS), text_block(np.array(["a", "b", "a"], dtype=object), "l")], ORIGIN)
+    back = read_table(path, TEXTS)
+    assert back["owner"].tolist() == [*ODD_TEXTS, "a", "b", "a"] and back["owner"].dtype == object
+    assert back["kind"].tolist() == ["k"] * 7 + ["l"] * 3
+    assert read_table(path, TEXTS, ["owner"], kind="l")["owner"].tolist() == ["a", "b", "a"]
+    assert pq.ParquetFile(path).read().column("owner").to_pylist() == [*ODD_TEXTS, "a", "b", "a"]
+
+
+def test_edited_texts_are_refused(tmp_path):
+    """Also where the same texts stand in another order: a row is what it says of itself."""
+    path = str(tmp_path / "texts.parquet")
+    for texts in (["b", "a"], ["a", "c"], ["a", ""]):
+        write_table(path, TEXTS, [text_block(["a", "b"])], ORIGIN)
+        rewritten(path, lambda table, texts=texts: replaced(table, "owner", texts))
+        with refused(path, "column owner, row group 0", "edited"):
+            read_table(path, TEXTS)
+
+
+@pytest.mark.parametrize("blocks", ["no block", "a block without rows", "only some blocks without rows"])
+def test_tables_without_rows_come_back(blocks, tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    none, some = text_block([]), text_block(["a"])
+    written = {"no block": [], "a block without rows": [none], "only some blocks without rows": [none, some, none]}[blocks]
+    write_table(path, TEXTS, written, ORIGIN)
+    back = read_table(path, TEXTS)
+    rows = 1 if "some" in blocks else 0
+    assert {name: (len(values), values.dtype) for name, values in back.items()} == {
+        "owner": (rows, np.dtype(object)),
+        "value": (rows, np.dtype("float64")),
+        "held": (rows, np.dtype(bool)),
+        "kind": (rows, np.dtype(object)),
+    }
+    assert list(read_table(path, TEXTS, ["value"])) == ["value"]
+    assert read_provenance(path) == ORIGIN
+    assert len(list(read_blocks(path, TEXTS))) == rows
+    with refused(path, "metadata elastocal.table", "texts", "things"):
+        read_table(path, SCHEMA)
+
+
+def test_a_value_that_an_empty_table_cannot_have_is_refused(tmp_path):
+    path = str(tmp_path / "texts.parquet")
+    write_table(path, TEXTS, [], ORIGIN)
+    with refused(path, "kind", "'k'"):
+        read_table(path, TEXTS, kind="k")
+
+
+def test_texts_of_another_length_are_refused(tmp_path):
+    with refused("t.parquet", "rows", "one length"):
+        write_table("t.parquet", TEXTS, [text_block(["a", "b"]) | {"owner": ["a"]}], ORIGIN)

@@ -1,0 +1,19 @@
+"""What a campaign leaves out is written down for the steps that follow."""
+
+import yaml
+from made_folders import made_folder
+
+from elastocal.loop.loading import taken_in
+
+
+def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):
+    folder = made_folder(tmp_path / "campaign", kuka)
+    path = folder / "campaign.yaml"
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    for key in ("declared", "compliance", "holdout"):
+        document.pop(key, None)
+    path.write_text(yaml.safe_dump(document), encoding="utf-8")
+    descriptions, _, held_out = taken_in(folder.as_posix(), config_folder / "robots")
+    said = descriptions["campaign"]
+    assert (said["declared"], said["compliance"], said["holdout"]) == ([], "nominal", {"fraction": 0.3, "seed": 1})
+    assert len(held_out)

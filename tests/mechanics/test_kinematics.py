@@ -1,0 +1,383 @@
+"""Equations 1-4: poses and Jacobians against pinocchio, finite differences and the paper's own matrix products."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+from support import (
+    ODD_CHAINS,
+    OTHER_CHAINS,
+    PARALLELOGRAM,
+    TRACK,
+    PinocchioPoint,
+    chain_of,
+    homogeneous,
+    random_angles,
+)
+
+from elastocal.mechanics import kinematics
+from elastocal.mechanics.kinematics import (
+    jacobians,
+    motion,
+    pose_differences,
+    poses,
+    poses_and_jacobians,
+    poses_and_jacobians_of_points,
+    poses_of_points,
+    rotation_vectors,
+)
+from elastocal.mechanics.links import extended_chain
+from elastocal.mechanics.robot import with_target_offset
+
+# Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
+ROUNDING = 2e-14
+
+
+def assert_agrees_with_pinocchio(chain, point, angles):
+    position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+    np.testing.assert_array_equal(jacobians(chain, angles, point), jacobian)
+    model = PinocchioPoint(chain, point)
+    for index, configuration in enumerate(angles):
+        expected = model.pose_and_jacobian(configuration)
+        for found, value in zip((position, rotation, jacobian), expected, strict=True):
+            np.testing.assert_allclose(found[index], value, rtol=0, atol=ROUNDING)
+
+
+def test_pose_and_jacobian_agree_with_pinocchio_on_both_robots(robot):
+    angles = random_angles(np.random.default_rng(1), robot.chain, 20)
+    for point in robot.chain.points:
+        assert_agrees_with_pinocchio(robot.chain, point, angles)
+
+
+@pytest.mark.parametrize("name", OTHER_CHAINS)
+def test_pose_and_jacobian_agree_with_pinocchio_on_other_chains(name):
+    chain = chain_of(OTHER_CHAINS[name])
+    for point in chain.points:
+        assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(2), chain, 20))
+
+
+def test_target_offset_agrees_with_pinocchio(kuka):
+    chain = with_target_offset(kuka.chain, (0.1, -0.2, 0.3))
+    for point in chain.points:
+        assert_agrees_with_pinocchio(chain, point, random_angles(np.random.default_rng(3), chain, 10))
+
+
+@pytest.mark.parametrize("kind", ["R", "T"])
+def test_turning_and_sliding_coordinates_agree_with_pinocchio_and_keep_the_angles(kind):
+    chain = chain_of(OTHER_CHAINS["fixed rotations"])
+    moving = [t if t.coordinate is None else replace(t, kind=kind) for t in chain.transforms]
+    chain = replace(chain, transforms=tuple(moving))
+    # Component first in memory, so that the package may work on the angles themselves and not on a copy.
+    angles = np.asfortranarray(random_angles(np.random.default_rng(14), chain, 5))
+    before = angles.copy()
+    for point in chain.points:
+        assert_agrees_with_pinocchio(chain, point, angles)
+    np.testing.assert_array_equal(angles, before)
+
+
+@st.composite
+def chain_texts(draw):
+    """Chains of one to eight joints with translations, fixed rotations and points anywhere."""
+    words, points, joints = [], 0, draw(st.integers(1, 8))
+    for joint in range(1, joints + 1):
+        for kind in draw(st.lists(st.sampled_from("TRP"), max_size=4)):
+            sign, axis = draw(st.sampled_from(["", "-"])), draw(st.sampled_from("xyz"))
+            if kind == "P":
+                points += 1
+                words.append(f"[point{points}]")
+            elif kind == "T":
+                words.append(f"T{axis}({sign}{draw(st.integers(0, 2000)) / 1000:.3f})")
+            else:
+                words.append(f"R{axis}({sign}{draw(st.integers(0, 360))}deg)")
+        words.append(f"R{draw(st.sampled_from('xyz'))}({draw(st.sampled_from(['', '-']))}q{joint})")
+    return " ".join([*words, f"Tx({draw(st.integers(0, 500)) / 1000:.3f})", "[end]"])
+
+
+@given(chain_texts(), st.integers(0, 2**32 - 1))
+def test_random_chains_agree_with_pinocchio(text, seed):
+    chain = chain_of(text)
+    angles = random_angles(np.random.default_rng(seed), chain, 3)
+    for point in (chain.points[0], chain.end_effector):
+        assert_agrees_with_pinocchio(chain, point, angles)
+
+
+def paper_poses(lengths, q):
+    """Equations 1-4 with T_base and T_tool the identity, as they are printed."""
+    l1, l2, l3, l4, l5, l6 = lengths
+    x, y, z = range(3)
+    t_2 = (
+        homogeneous("T", z, l1) @ homogeneous("R", z, q[0]) @ homogeneous("T", x, l2) @ homogeneous("R", y, q[1])
+    ) @ homogeneous("T", x, l3)
+    t_3 = t_2 @ homogeneous("R", y, q[2]) @ homogeneous("T", z, l4) @ homogeneous("T", x, l5)
+    t_4 = t_3 @ homogeneous("R", x, q[3])
+    t_full = t_4 @ homogeneous("R", y, q[4]) @ homogeneous("R", x, q[5]) @ homogeneous("T", x, l6)
+    return {"2DoF": t_2, "3DoF": t_3, "4DoF": t_4, "6DoF": t_full}
+
+
+LENGTHS = {"kuka": (0.675, 0.350, 1.150, -0.041, 1.200, 0.240), "fanuc": (0.670, 0.312, 1.075, 0.225, 1.280, 0.215)}
+
+
+@pytest.mark.parametrize("key", LENGTHS)
+def test_poses_are_the_matrix_products_of_equations_1_to_4(key, request):
+    chain = request.getfixturevalue(key).chain
+    angles = random_angles(np.random.default_rng(4), chain, 20)
+    expected = [paper_poses(LENGTHS[key], q) for q in angles]
+    for point in chain.points:
+        position, rotation = poses(chain, angles, point)
+        np.testing.assert_allclose(position, [e[point.name][:3, 3] for e in expected], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(rotation, [e[point.name][:3, :3] for e in expected], rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize(
+    "angle",
+    [np.pi, np.nextafter(np.pi, 4), np.nextafter(np.pi, 0), np.pi - 1e-9, np.pi + 1e-7, 2 * np.pi, 3 * np.pi, 0.0, 12.3],
+)
+def test_poses_hold_at_and_around_half_a_turn(kuka, angle):
+    for sign in (1.0, -1.0):
+        for joint in range(6):
+            q = np.full(6, 0.3)
+            q[joint] = sign * angle
+            expected = paper_poses(LENGTHS["kuka"], q)["6DoF"]
+            position, rotation, jacobian = poses_and_jacobians(kuka.chain, q, kuka.chain.end_effector)
+            np.testing.assert_allclose(position, expected[:3, 3], rtol=0, atol=ROUNDING)
+            np.testing.assert_allclose(rotation, expected[:3, :3], rtol=0, atol=ROUNDING)
+            assert np.isfinite(jacobian).all()
+
+
+@pytest.mark.parametrize("name", ["kuka", "fanuc", *OTHER_CHAINS])
+def test_jacobian_agrees_with_central_differences(name, request):
+    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+    angles = random_angles(np.random.default_rng(5), chain, 6)
+    step = 1e-5
+    for point in chain.points:
+        jacobian = poses_and_jacobians(chain, angles, point)[2]
+        for joint in range(chain.coordinates):
+            shift = step * np.eye(chain.coordinates)[joint]
+            ahead, behind = poses(chain, angles + shift, point), poses(chain, angles - shift, point)
+            slope = pose_differences(*ahead, *behind) / (2 * step)
+            # Truncation step^2 / 6 times 3 m, rounding 1e-15 / step.
+            np.testing.assert_allclose(jacobian[..., joint], slope, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("batch", [(), (1,), (5,), (0,), (2, 3), (2, 1, 4), (3, 0, 2)])
+def test_any_leading_axes_are_kept(kuka, batch):
+    angles = random_angles(np.random.default_rng(6), kuka.chain, *batch)
+    point = kuka.chain.point("3DoF")
+    position, rotation, jacobian = poses_and_jacobians(kuka.chain, angles, point)
+    assert position.shape == (*batch, 3) and rotation.shape == (*batch, 3, 3) and jacobian.shape == (*batch, 6, 6)
+    for index in np.ndindex(batch):
+        for found, alone in zip(
+            (position, rotation, jacobian), poses_and_jacobians(kuka.chain, angles[index], point), strict=True
+        ):
+            # The vectorised tangent may round otherwise than the one for a single number.
+            np.testing.assert_allclose(found[index], alone, rtol=0, atol=ROUNDING)
+    for found, expected in zip(poses(kuka.chain, angles, point), (position, rotation), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(jacobians(kuka.chain, angles, point), jacobian)
+
+
+@pytest.mark.parametrize("size", [6, 7, 8, 14, 15])
+def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size):
+    angles = random_angles(np.random.default_rng(7), fanuc.chain, size)
+    whole = poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector)
+    monkeypatch.setattr(kinematics, "BLOCK", 7)
+    for found, expected in zip(poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole, strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
+    for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole[2], rtol=0, atol=ROUNDING)
+
+
+def test_a_batch_larger_than_the_real_block_holds_every_configuration(kuka):
+    size = kinematics.BLOCK + 3
+    angles = random_angles(np.random.default_rng(8), kuka.chain, size)
+    found = poses_and_jacobians(kuka.chain, angles, kuka.chain.end_effector)
+    picked = [0, 1, kinematics.BLOCK - 1, kinematics.BLOCK, size - 1]
+    for array, expected in zip(found, poses_and_jacobians(kuka.chain, angles[picked], kuka.chain.end_effector), strict=True):
+        np.testing.assert_allclose(array[picked], expected, rtol=0, atol=ROUNDING)
+
+
+def test_angles_are_left_as_they_were(kuka):
+    angles = random_angles(np.random.default_rng(9), kuka.chain, 4)
+    before = angles.copy()
+    poses_and_jacobians(with_target_offset(kuka.chain, (0.1, 0.2, 0.3)), angles, kuka.chain.end_effector)
+    np.testing.assert_array_equal(angles, before)
+
+
+def test_lists_of_whole_numbers_are_angles_too(kuka):
+    expected = poses(kuka.chain, np.array([0.0, 1.0, -1.0, 2.0, 0.0, 3.0]), kuka.chain.end_effector)
+    for found, value in zip(poses(kuka.chain, [0, 1, -1, 2, 0, 3], kuka.chain.end_effector), expected, strict=True):
+        np.testing.assert_array_equal(found, value)
+
+
+@given(st.lists(st.floats(-1e3, 1e3), min_size=6, max_size=6))
+def test_rotation_matrices_are_orthonormal_and_right_handed(angles):
+    chain = chain_of(OTHER_CHAINS["ur10"])
+    _, rotation = poses(chain, np.array(angles), chain.end_effector)
+    np.testing.assert_allclose(rotation.T @ rotation, np.eye(3), rtol=0, atol=ROUNDING)
+    assert np.linalg.det(rotation) == pytest.approx(1.0, abs=ROUNDING)
+
+
+def test_columns_of_joints_behind_a_point_are_zero(robot):
+    angles = random_angles(np.random.default_rng(10), robot.chain, 5)
+    for point, moved in zip(robot.chain.points, (2, 3, 4, 6), strict=True):
+        jacobian = poses_and_jacobians(robot.chain, angles, point)[2]
+        assert (jacobian[..., moved:] == 0).all()
+        assert (np.abs(jacobian[..., :moved]).max(axis=(0, 1)) > 0.5).all()
+
+
+def test_a_point_before_every_joint_does_not_move():
+    chain = chain_of("Tx(0.5) [base] Rz(q1) Ty(1) [EE]")
+    position, rotation, jacobian = poses_and_jacobians(chain, np.ones((3, 1)), chain.point("base"))
+    np.testing.assert_array_equal(position, np.tile([0.5, 0.0, 0.0], (3, 1)))
+    np.testing.assert_array_equal(rotation, np.tile(np.eye(3), (3, 1, 1)))
+    assert not jacobian.any()
+
+
+def test_components_lie_contiguous_along_the_batch(kuka):
+    jacobian = poses_and_jacobians(kuka.chain, np.zeros((4, 5, 6)), kuka.chain.end_effector)[2]
+    assert jacobian[..., 0, 2].flags.c_contiguous
+
+
+@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3), st.floats(0, np.pi - 1e-3))
+def test_rotation_vectors_agree_with_scipy(direction, angle):
+    norm = np.linalg.norm(direction)
+    vector = angle * (np.array(direction) / norm if norm > 1e-3 else np.array([0.0, 0.0, 1.0]))
+    rotation = Rotation.from_rotvec(vector)
+    # sin(angle) near pi - 1e-3 keeps 13 of 16 digits.
+    np.testing.assert_allclose(rotation_vectors(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-12)
+
+
+def test_small_rotation_vectors_keep_their_digits():
+    vectors = np.array([[1e-3, -2e-3, 3e-3], [1e-9, 2e-9, -3e-9], [0.0, 0.0, 1e-12], [0.0, 0.0, 0.0]])
+    found = rotation_vectors(Rotation.from_rotvec(vectors).as_matrix())
+    np.testing.assert_allclose(found, vectors, rtol=1e-12, atol=1e-16)
+
+
+def test_rotation_vectors_keep_leading_axes():
+    rotations = Rotation.random(12, rng=np.random.default_rng(11))
+    found = rotation_vectors(rotations.as_matrix().reshape(3, 4, 3, 3))
+    np.testing.assert_allclose(found.reshape(12, 3), rotations.as_rotvec(), rtol=0, atol=1e-12)
+
+
+def test_pose_difference_is_the_displacement_and_the_rotation_in_base_axes():
+    rng = np.random.default_rng(12)
+    start, turn = Rotation.random(20, rng=rng), Rotation.from_rotvec(rng.uniform(-1, 1, (20, 3)))
+    position, move = rng.uniform(-2, 2, (20, 3)), rng.uniform(-1, 1, (20, 3))
+    found = pose_differences(position + move, (turn * start).as_matrix(), position, start.as_matrix())
+    np.testing.assert_allclose(found[..., :3], move, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found[..., 3:], turn.as_rotvec(), rtol=0, atol=1e-13)
+
+
+def test_points_with_an_offset_are_shifted_in_their_own_frame(kuka):
+    angles = random_angles(np.random.default_rng(13), kuka.chain, 5)
+    for point in kuka.chain.points:
+        position, rotation = poses(kuka.chain, angles, point)
+        shifted, same = poses(kuka.chain, angles, replace(point, offset_m=(0.1, 0.2, -0.3)))
+        np.testing.assert_allclose(shifted, position + rotation @ np.array([0.1, 0.2, -0.3]), rtol=0, atol=ROUNDING)
+        np.testing.assert_array_equal(same, rotation)
+
+
+def test_results_of_an_earlier_call_are_overwritten_in_place(kuka):
+    rng, point = np.random.default_rng(5), kuka.chain.end_effector
+    first, second = random_angles(rng, kuka.chain, 12).reshape(3, 4, 6), random_angles(rng, kuka.chain, 12).reshape(3, 4, 6)
+    held = poses_and_jacobians(kuka.chain, first, point)
+    again = poses_and_jacobians(kuka.chain, second, point, out=held)
+    for new, old, expected in zip(again, held, poses_and_jacobians(kuka.chain, second, point), strict=True):
+        assert np.shares_memory(new, old)
+        np.testing.assert_array_equal(new, expected)
+
+
+@pytest.mark.parametrize("batch", [(), (5,), (2, 3)])
+def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
+    points = [*kuka.chain.points[::-1], with_target_offset(kuka, (0.1, -0.2, 0.3)).chain.end_effector, kuka.chain.points[0]]
+    angles = random_angles(np.random.default_rng(3), kuka.chain, *batch)
+    together = poses_and_jacobians_of_points(kuka.chain, angles, points)
+    for number, point in enumerate(points):
+        for found, wanted in zip(together, poses_and_jacobians(kuka.chain, angles, point), strict=True):
+            np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
+    for found, wanted in zip(poses_of_points(kuka.chain, angles, points), together, strict=False):
+        np.testing.assert_array_equal(found, wanted)
+
+
+@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS])
+def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, request):
+    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+    rng = np.random.default_rng(31)
+    angles, wrench = random_angles(rng, chain, 7), rng.standard_normal((7, 6))
+    points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
+    moved = motion(chain, angles, points)
+    for number, point in enumerate(points):
+        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
+        np.testing.assert_allclose(moved.position[number].T, position, rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING)
+        found = moved.jacobian(point.after, moved.position[number])
+        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
+        some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
+        np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
+        moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
+        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
+        np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
+
+
+def test_coordinates_that_nothing_moves_change_no_digit(kuka_extended):
+    chain = extended_chain(kuka_extended)
+    moved = np.zeros((5, chain.coordinates))
+    moved[:, :6] = random_angles(np.random.default_rng(32), kuka_extended.chain, 5)
+    nearly = np.where(moved == 0.0, 1e-300, moved)
+    for still, walked in zip(
+        poses_and_jacobians(chain, moved, chain.end_effector),
+        poses_and_jacobians(chain, nearly, chain.end_effector),
+        strict=True,
+    ):
+        np.testing.assert_allclose(still, walked, rtol=0, atol=1e-15)
+
+
+def test_robot_on_a_track_is_where_trigonometry_puts_it():
+    chain = chain_of(TRACK)
+    q = np.random.default_rng(33).uniform(-2, 2, (6, 4))
+    reach = 0.3 + 0.7 * np.cos(q[:, 2]) + 0.6 * np.cos(q[:, 2] + q[:, 3])
+    height = 0.8 - 0.7 * np.sin(q[:, 2]) - 0.6 * np.sin(q[:, 2] + q[:, 3])
+    expected = np.stack([-q[:, 0] + reach * np.cos(q[:, 1]), reach * np.sin(q[:, 1]), height], axis=1)
+    position, _, jacobian = poses_and_jacobians(chain, q, chain.end_effector)
+    np.testing.assert_allclose(position, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(jacobian[:, :, 0], np.broadcast_to([-1.0, 0, 0, 0, 0, 0], (6, 6)), rtol=0, atol=ROUNDING)
+    assert_agrees_with_pinocchio(chain, chain.end_effector, q)
+
+
+def test_parallelogram_keeps_the_forearm_from_turning_with_the_upper_arm():
+    chain = chain_of(PARALLELOGRAM)
+    q = np.random.default_rng(34).uniform(-1.5, 1.5, (6, 4))
+    q[:, 3] = 0.0
+    # The forearm's angle to the horizontal is q3, whatever q2 is, and the hand stays level.
+    reach = 0.3 + 0.8 * np.sin(q[:, 1]) + 0.9 * np.cos(q[:, 2]) + 0.1
+    height = 0.5 + 0.8 * np.cos(q[:, 1]) - 0.9 * np.sin(q[:, 2]) - 0.1
+    expected = np.stack([reach * np.cos(q[:, 0]), reach * np.sin(q[:, 0]), height], axis=1)
+    position, rotation = poses(chain, q, chain.end_effector)
+    np.testing.assert_allclose(position, expected, rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(rotation[:, 2], np.broadcast_to([0.0, 0.0, 1.0], (6, 3)), rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("name", ODD_CHAINS)
+def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central_differences(name):
+    chain = chain_of(ODD_CHAINS[name])
+    q = np.random.default_rng(35).uniform(-1.5, 1.5, (5, chain.coordinates))
+    points = list(chain.points)
+    many = poses_and_jacobians_of_points(chain, q, points)[2]
+    moved = motion(chain, q, points)
+    for number, point in enumerate(points):
+        jacobian = poses_and_jacobians(chain, q, point)[2]
+        for coordinate in range(chain.coordinates):
+            step = 1e-6 * np.eye(chain.coordinates)[coordinate]
+            slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
+            np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(many[number], jacobian, rtol=0, atol=ROUNDING)
+        found = moved.jacobian(point.after, moved.position[number])
+        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
+        wrench = np.random.default_rng(36).standard_normal((5, 6))
+        moment = wrench[:, 3:] + np.cross(moved.position[number].T, wrench[:, :3])
+        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T).T
+        np.testing.assert_allclose(forces, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)

@@ -1,0 +1,216 @@
+"""Sites: the chain that holds every deviation against the robot's own chain, finite differences, pinocchio and the eye."""
+
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, PinocchioPoint, chain_of, homogeneous, random_angles
+
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.sites import sites_of
+
+NAMES = ["kuka", "fanuc", *OTHER_CHAINS]
+ROUNDING = 2e-14
+
+
+@pytest.fixture(params=NAMES)
+def chain(request):
+    if request.param in OTHER_CHAINS:
+        return chain_of(OTHER_CHAINS[request.param])
+    return request.getfixturevalue(request.param).chain
+
+
+def extended(sites, angles):
+    """Coordinates of the sites with nothing but joint angles."""
+    return np.concatenate([angles, np.zeros((*angles.shape[:-1], sites.chain.coordinates - sites.joints))], axis=-1)
+
+
+def test_sites_at_zero_leave_the_poses_and_jacobians_of_the_robot(chain):
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(0), chain, 2, 3)
+    assert [p.name for p in sites.chain.points] == [p.name for p in chain.points]
+    for ours, point in zip(sites.chain.points, chain.points, strict=True):
+        expected = poses_and_jacobians(chain, angles, point)
+        found = poses_and_jacobians(sites.chain, extended(sites, angles), ours)
+        np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(found[1], expected[1], rtol=0, atol=ROUNDING)
+        np.testing.assert_allclose(found[2][..., : sites.joints], expected[2], rtol=0, atol=ROUNDING)
+
+
+def test_target_offsets_stay_on_their_points(fanuc):
+    chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.1, 0.2, -0.3)) for p in fanuc.chain.points))
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(1), chain, 3)
+    for ours, point in zip(sites.chain.points, chain.points, strict=True):
+        expected, found = poses(chain, angles, point), poses(sites.chain, extended(sites, angles), ours)
+        np.testing.assert_allclose(found[0], expected[0], rtol=0, atol=ROUNDING)
+
+
+def test_every_coordinate_belongs_to_one_site(chain):
+    sites = sites_of(chain)
+    n = chain.coordinates
+    assert (sites.joints, len(sites.tilt), len(sites.link_end), len(sites.joint_axes)) == (n, n, n + 1, n)
+    listed = [*range(n), *sites.base, *np.ravel(sites.tilt), *np.ravel(sites.link_end)]
+    assert sorted(listed) == list(range(sites.chain.coordinates))
+    assert len(sites.base) == 6 and np.shape(sites.tilt) == (n, 3) and np.shape(sites.link_end) == (n + 1, 6)
+
+
+def test_each_column_of_the_jacobian_is_a_central_difference(chain):
+    sites = sites_of(chain)
+    coordinates = 0.2 * np.random.default_rng(2).standard_normal((2, sites.chain.coordinates))
+    step = 1e-5
+    for point in sites.chain.points:
+        jacobian = poses_and_jacobians(sites.chain, coordinates, point)[2]
+        shifted = coordinates[:, None, None] + step * np.stack(
+            [np.eye(sites.chain.coordinates), -np.eye(sites.chain.coordinates)]
+        )
+        position, rotation = poses(sites.chain, shifted, point)
+        slope = pose_differences(position[:, 0], rotation[:, 0], position[:, 1], rotation[:, 1]) / (2 * step)
+        np.testing.assert_allclose(np.swapaxes(jacobian, -1, -2), slope, rtol=0, atol=1e-9)
+
+
+def columns_at(sites, angles, point, coordinates):
+    return poses_and_jacobians(sites.chain, extended(sites, angles), sites.chain.point(point))[2][..., list(coordinates)]
+
+
+def test_base_moves_all_points_rigidly_in_base_axes(chain):
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(3), chain)
+    for point in chain.points:
+        x, y, z = poses(chain, angles, point)[0]
+        expected = np.block([[np.eye(3), np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])], [np.zeros((3, 3)), np.eye(3)]])
+        np.testing.assert_allclose(columns_at(sites, angles, point.name, sites.base), expected, rtol=0, atol=ROUNDING)
+
+
+def test_tilt_about_the_axis_of_a_joint_is_the_joint_itself(chain):
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(4), chain)
+    turning = [t for t in chain.transforms if t.coordinate is not None]
+    for joint, transform in enumerate(turning):
+        assert sites.joint_axes[joint] == transform.axis
+        about = sites.tilt[joint][sites.joint_axes[joint]]
+        for point in chain.points:
+            alone, own = columns_at(sites, angles, point.name, [about, joint]).T
+            np.testing.assert_allclose(transform.sign * alone, own, rtol=0, atol=ROUNDING)
+
+
+def test_tilt_axes_turn_with_the_joint():
+    sites = sites_of(chain_of("Rz(q1) Tx(1) [end]"))
+    rx, ry, _ = sites.tilt[0]
+    across = columns_at(sites, np.array([np.pi / 2]), "end", [rx, ry])
+    # A quarter turn: the x axis behind the joint lies along y, where the link is too.
+    np.testing.assert_allclose(across[:, 0], [0, 0, 0, 0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(across[:, 1], [0, 0, -1, -1, 0, 0], atol=1e-15)
+
+
+@pytest.mark.parametrize(("point", "link"), [("2DoF", 2), ("3DoF", 3), ("4DoF", 4), ("6DoF", 6)])
+def test_point_at_the_end_of_a_link_moves_with_it(fanuc, point, link):
+    sites, angles = sites_of(fanuc.chain), random_angles(np.random.default_rng(5), fanuc.chain)
+    rotation = poses(fanuc.chain, angles, fanuc.chain.point(point))[1]
+    # At its own origin a site shifts and turns a point along the axes that they share, and nothing else.
+    expected = np.kron(np.eye(2), rotation)
+    np.testing.assert_allclose(columns_at(sites, angles, point, sites.link_end[link]), expected, rtol=0, atol=ROUNDING)
+    if link < sites.joints:
+        assert not columns_at(sites, angles, point, [*sites.tilt[link], *sites.link_end[link + 1]]).any()
+
+
+def test_point_inside_a_link_or_at_its_near_end_is_not_moved_by_its_far_end():
+    sites = sites_of(chain_of("Rz(q1) [near] Tx(0.3) [middle] Tx(0.3) [far] Ry(q2) Tx(0.1) [end]"))
+    angles = np.array([0.3, -0.4])
+    for point, moved in {"near": False, "middle": False, "far": True, "end": True}.items():
+        assert columns_at(sites, angles, point, sites.link_end[1]).any() == moved
+        assert columns_at(sites, angles, point, sites.tilt[0]).any()
+
+
+def far_end_by_products(chain, link):
+    """Vector of a link in the frame of its far end, by matrix products."""
+    joints = [index for index, t in enumerate(chain.transforms) if t.coordinate is not None]
+    starts, stops = [0, *(index + 1 for index in joints)], [*joints, len(chain.transforms)]
+    product = np.eye(4)
+    for transform in chain.transforms[starts[link] : stops[link]]:
+        product = product @ homogeneous(transform.kind, transform.axis, transform.constant)
+    return product[:3, :3].T @ product[:3, 3]
+
+
+def test_link_vectors_are_those_of_matrix_products(chain):
+    found = sites_of(chain).link_vectors_m
+    expected = [far_end_by_products(chain, link) for link in range(chain.coordinates + 1)]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-15)
+
+
+def test_link_vectors_of_the_fanuc_are_the_lengths_in_its_file(fanuc):
+    zero = (0, 0, 0)
+    expected = [(0, 0, 0.670), (0.312, 0, 0), (1.075, 0, 0), (1.280, 0, 0.225), zero, zero, (0.215, 0, 0)]
+    np.testing.assert_allclose(sites_of(fanuc.chain).link_vectors_m, expected, rtol=0, atol=1e-15)
+
+
+def test_link_vector_is_seen_from_behind_the_fixed_rotations_of_its_link():
+    sites = sites_of(chain_of("Rz(q1) Tx(0.5) Rz(90deg) Ry(q2) Rx(90deg) Tz(0.2) [end]"))
+    np.testing.assert_allclose(sites.link_vectors_m, [(0, 0, 0), (0, -0.5, 0), (0, 0, 0.2)], atol=1e-16)
+
+
+CARRIED = {
+    "fanuc": [[], [2, 3, 6], [3, 6], [6], [6], []],
+    "three joints": [[], [2, 3], [3]],
+    "seven joints": [[], [2, 4, 6, 7], [4, 6, 7], [4, 6, 7], [6, 7], [6, 7], [7]],
+    # Joints 1 and 2 of the fixed rotations lie level: the first one is the shoulder.
+    "fixed rotations": [[1, 2, 3, 4], [2, 3, 4], [3, 4], [4]],
+}
+
+
+@pytest.mark.parametrize("name", CARRIED)
+def test_carried_links_are_those_whose_weight_can_turn_the_joint(name, request):
+    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+    sites = sites_of(chain)
+    lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
+    expected = [[link for link in links if lengths[link] > 0] for links in CARRIED[name]]
+    assert [sites.carried_links(joint) for joint in range(sites.joints)] == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "shoulder"),
+    [("fanuc", 1), ("kuka", 1), ("ur10", 1), ("three joints", 1), ("seven joints", 1), ("fixed rotations", 0)],
+)
+def test_shoulder_is_the_first_joint_that_carries_weight(name, shoulder, request):
+    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
+    assert sites_of(chain).shoulder == shoulder
+
+
+def test_arm_that_turns_about_the_vertical_only_has_no_shoulder():
+    assert sites_of(chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")).shoulder is None
+
+
+def test_lever_of_weight_is_the_gravity_torque_of_pinocchio(chain):
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(6), chain, 4)
+    joints = [index for index, t in enumerate(chain.transforms) if t.coordinate is not None]
+    ends = [*joints, len(chain.transforms)]
+    for link in range(1, sites.joints + 1):
+        one = PinocchioPoint(chain, replace(chain.points[0], after=ends[link], offset_m=(0, 0, 0)))
+        frame = one.model.frames[one.frame]
+        one.model.appendBodyToJoint(
+            frame.parentJoint, pin.Inertia(1.0, frame.placement.translation, np.zeros((3, 3))), pin.SE3.Identity()
+        )
+        one.model.gravity.linear = np.array([0.0, 0.0, -1.0])
+        data = one.model.createData()
+        for joint in range(sites.joints):
+            found = sites.lever_of_weight(angles, joint, link)
+            held = [pin.computeGeneralizedGravity(one.model, data, q[one.order]) for q in angles]
+            expected = [-h[one.order.index(joint)] if joint in one.order else 0.0 for h in held]
+            np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
+
+
+def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():
+    sites = sites_of(chain_of(TRACK))
+    assert sites.prismatic == (True, False, False, False) and sites.joint_signs == (-1.0, 1.0, 1.0, 1.0)
+    np.testing.assert_allclose(sites.link_vectors_m[:3], [(0, 0, 0.3), (0, 0, 0.5), (0.3, 0, 0)], atol=1e-16)
+    sites = sites_of(chain_of(PARALLELOGRAM))
+    assert (sites.joints, len(sites.tilt), len(sites.link_end)) == (4, 4, 5)
+    # A link ends where a passive joint turns.
+    np.testing.assert_allclose(sites.link_vectors_m[2:4], [(0, 0, 0.8), (0.9, 0, 0)], atol=1e-16)
+
+
+@pytest.mark.parametrize("name", ODD_CHAINS)
+def test_sites_leave_odd_robots_as_they_were(name):
+    chain = chain_of(ODD_CHAINS[name])
+    sites, angles = sites_of(chain), random_angles(np.random.default_rng(7), chain, 5)
+    coordinates = np.concatenate([angles, np.zeros((5, sites.chain.coordinates - sites.joints))], axis=1)
+    for point, own in zip(sites.chain.points, chain.points, strict=True):
+        for found, expected in zip(poses(sites.chain, coordinates, point), poses(chain, angles, own), strict=True):
+            np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)

@@ -1,0 +1,123 @@
+"""The study's configuration is checked as a whole, and every fault is one line that names file, key and what is allowed."""
+
+from copy import deepcopy
+
+import pytest
+from support import changed, refused
+
+from elastocal.study.configuration import check_study, rows_read
+
+
+def test_the_repository_passes(config, config_folder):
+    before = deepcopy(config)
+    study = check_study(config, config_folder)
+    assert list(study.robots) == config["robots"] and list(study.strategies) == config["strategies"]
+    assert study.points["3+6DoF-comb"] == ("3DoF", "6DoF")
+    assert config == before
+
+
+def test_rows_read_are_those_of_poses_or_positions():
+    assert (rows_read("pose"), rows_read("position")) == (6, 3)
+
+
+FAULTS = {
+    "typo": (("data_set",), 10, "data_set", ["unknown key", "'data_sets'?"]),
+    "typo inside": (("readings", "wrench"), "end_effector", "readings.wrench", ["unknown key", "'wrench_at'?"]),
+    "unknown strategy": (("strategies", 0), "6DOF", "strategies", ["'6DOF'", "'6DoF'?", "3+6DoF-comb"]),
+    "unknown robot": (("robots", 0), "kukka", "robots", ["'kukka'", "'kuka'?", "fanuc"]),
+    "quite unknown robot": (("robots", 0), "zzz", "robots", ["'zzz'", "fanuc, ", "kuka, "]),
+    "robot twice": (("robots",), ["kuka", "kuka"], "robots", ["each entry once"]),
+    "no robot": (("robots",), [], "robots", ["1 or more entries"]),
+    "negative noise": (("noise_um", 1), -50, "noise_um[1]", ["-50", "0 or more", "µm"]),
+    "noise that is a text": (("noise_um", 1), "50 µm", "noise_um[1]", ["'50 µm'", "number"]),
+    "noise that is no list": (("noise_um",), 50, "noise_um", ["found 50", "array"]),
+    "noise without end": (("noise_um", 1), float("inf"), "noise_um[1]", ["inf"]),
+    "noise that is no number": (("noise_um", 1), float("nan"), "noise_um[1]", ["nan"]),
+    "half a data set": (("data_sets",), 10.5, "data_sets", ["10.5", "integer"]),
+    "data sets as a float": (("data_sets",), 10.0, "data_sets", ["10.0", "integer"]),
+    "too few to resample": (("data_sets",), 9, "data_sets", ["found 9", "10 or more"]),
+    "no configuration": (("configurations",), 0, "configurations", ["found 0", "1 or more"]),
+    "yes": (("data_sets",), True, "data_sets", ["True", "integer"]),
+    "no seed": (("seed",), None, "seed", ["nothing", "random streams"]),
+    "no reading": (("readings", "average"), None, "readings.average", ["nothing", "R7"]),
+    "unknown reading": (("readings", "average"), "mean", "readings.average", ["'mean'", "stiffness | compliance | median"]),
+    "unknown solver": (("identification", "solver"), "newton", "identification.solver", ["equation_11 | gauss_newton"]),
+    "flat offset": (("loading", "offset_m"), [0, 0.5], "loading.offset_m", ["[0, 0.5]", "3 or more entries"]),
+    "no force": (("loading", "force_N"), 0, "loading.force_N", ["found 0", "more than 0"]),
+    "noise that is not simulated": (("tables", "noise_um"), 300, "tables.noise_um", ["300", "one of noise_um", "200"]),
+    "length beyond the data": (("evaluation", "lengths", 3), 101, "evaluation.lengths[3]", ["101", "configurations = 100"]),
+    "length that is not evaluated": (("tables", "length"), 21, "tables.length", ["21", "one of evaluation.lengths", "20"]),
+    "section that is no mapping": (("tables",), 3, "tables", ["found 3", "object"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_fault_is_one_line_that_names_file_key_and_what_is_allowed(config, config_folder, fault):
+    path, value, key, words = FAULTS[fault]
+    with refused("study.yaml", f"{key}:", *words):
+        check_study(changed(config, path, value), config_folder, "study.yaml")
+
+
+def test_data_sets_too_short_for_a_strategy_are_refused(config, config_folder):
+    short = deepcopy(config)
+    short["readings"]["measured"], short["configurations"] = "position", 1
+    short["evaluation"]["lengths"], short["tables"]["length"] = [1], 1
+    with refused("study.yaml", "configurations:", "found 1", "2 or more", "6DoF"):
+        check_study(short, config_folder, "study.yaml")
+    short["configurations"] = 2
+    check_study(short, config_folder, "study.yaml")
+
+
+@pytest.fixture
+def other_folder(tmp_path):
+    """A config folder with one robot and one strategy, both sound."""
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "strategies").mkdir()
+    (tmp_path / "robots" / "arm.yaml").write_text(
+        "name: arm\nchain: Rz(q1) Tx(1) [A] Ry(q2) Tx(1) [B]\n"
+        "joint_limits_deg: [[-180, 180], [-90, 90]]\ncompliance_urad_per_Nm: [1, 2]\n"
+    )
+    (tmp_path / "strategies" / "plain.yaml").write_text("name: plain\nstages: [{points: [B], joints: [1, 2]}]\n")
+    return tmp_path
+
+
+@pytest.fixture
+def other_config(config):
+    other = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
+    if "classical_strategy" in other["tables"]:
+        other["tables"]["classical_strategy"] = "plain"
+    return other
+
+
+def test_robots_with_other_joints_and_points_pass(other_config, other_folder):
+    assert check_study(other_config, other_folder).points == {"plain": ("B",)}
+
+
+FAULTY_FILES = {
+    "bad YAML": ("robots/arm.yaml", "name: [arm\n", "line 2", ["YAML"]),
+    "empty": ("robots/arm.yaml", "", "", ["None", "object"]),
+    "missing key": ("robots/arm.yaml", "name: arm\n", "chain", ["nothing", "chain notation"]),
+    "typo": ("strategies/plain.yaml", "name: plain\nstage: []\n", "stage", ["unknown key", "'stages'?"]),
+    "unknown point": ("strategies/plain.yaml", "name: x\nstages: [{points: [C], joints: [1]}]\n", "stages[1].points", ["A, B"]),
+    "joint left out": ("strategies/plain.yaml", "name: x\nstages: [{points: [B], joints: [1]}]\n", "stages[1]", ["joint 2"]),
+    "list too long": (
+        "robots/arm.yaml",
+        "name: arm\nchain: Rz(q1) [A]\njoint_limits_deg: [[-1, 1]]\ncompliance_urad_per_Nm: [1, 2]\n",
+        "compliance_urad_per_Nm",
+        ["2 entries", "1 joints"],
+    ),
+    "faulty chain": (
+        "robots/arm.yaml",
+        "name: arm\nchain: Rz(q1) Tx(l7) [A]\njoint_limits_deg: [[-1, 1]]\ncompliance_urad_per_Nm: [1]\n",
+        "chain",
+        ["'Tx(l7)'"],
+    ),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTY_FILES)
+def test_fault_in_a_named_file_is_one_line_that_names_that_file(other_config, other_folder, fault):
+    name, text, key, words = FAULTY_FILES[fault]
+    (other_folder / name).write_text(text)
+    with refused((other_folder / name).as_posix(), key, *words):
+        check_study(other_config, other_folder, "study.yaml")

@@ -1,0 +1,238 @@
+"""Averages over data sets, their Monte Carlo errors, and the accuracy of one data set."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from support import random_loads
+
+from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
+from elastocal.study.evaluation import (
+    LARGEST_TRUSTED_SPREAD,
+    accuracy_sums,
+    accuracy_table,
+    average,
+    metrics_table,
+    reached_length,
+    replicates_table,
+)
+from elastocal.study.metrics import make_judge, mean_deviation, position_errors
+from elastocal.study.simulation import true_deflections
+
+SETS, LENGTHS, REPLICATES, TESTS = 60, 3, 25, 30
+METHODS = ("stiffness", "compliance", "median")
+SCORES = ("averaged_model", "each_data_set")
+
+
+@pytest.fixture(scope="module")
+def judge(kuka):
+    loads = random_loads(kuka, 1, TESTS)
+    return make_judge(kuka, loads, true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"))
+
+
+@pytest.fixture(scope="module")
+def estimates(kuka):
+    """Compliances that scatter by 10 % of their values, less at each length."""
+    scatter = np.random.default_rng(1).standard_normal((SETS, LENGTHS, 6)) / np.arange(1, LENGTHS + 1)[:, None]
+    return kuka.compliance * (1 + 0.1 * np.clip(scatter, -3, 3))
+
+
+@pytest.fixture(scope="module")
+def weights():
+    return bootstrap_weights(1, "kuka", range(SETS), REPLICATES)
+
+
+@pytest.fixture(scope="module")
+def counts():
+    """How often each test configuration counts."""
+    return bootstrap_test_weights(1, "kuka", TESTS, REPLICATES)
+
+
+def blocks_of(estimates, weights, *cuts):
+    edges = [0, *cuts, len(estimates)]
+    return [(estimates[a:b], weights[:, a:b]) for a, b in pairwise(edges)]
+
+
+@pytest.mark.parametrize("score", SCORES)
+@pytest.mark.parametrize("method", METHODS)
+def test_averages_are_those_written_out(judge, estimates, weights, counts, method, score):
+    found = average(blocks_of(estimates, weights), judge, method, score, counts)
+    for replicate in (0, 1, REPLICATES):
+        drawn = np.repeat(estimates, weights[replicate].astype(int), axis=0)
+        expected = {
+            "stiffness": lambda drawn: 1 / (1 / drawn).mean(axis=0),
+            "compliance": lambda drawn: drawn.mean(axis=0),
+            "median": lambda drawn: np.median(drawn, axis=0),
+        }[method](drawn)
+        np.testing.assert_allclose(found.compliance[replicate], expected, rtol=1e-12)
+        tests = counts[replicate].astype(int)
+        if score == "averaged_model":
+            deviation = np.repeat(position_errors(judge, expected), tests, axis=1).mean(axis=1)
+        else:
+            deviation = mean_deviation(judge, drawn).mean(axis=0)
+        np.testing.assert_allclose(
+            found.initial_deviation[replicate], np.repeat(judge.initial_errors, tests).mean(), rtol=1e-12
+        )
+        np.testing.assert_allclose(found.deviation[replicate], deviation, rtol=1e-9)
+    relative = estimates / judge.reference
+    np.testing.assert_allclose(found.relative_spread, (relative.std(axis=0) / relative.mean(axis=0)).max(axis=-1), rtol=1e-9)
+    assert (found.nonpositive_share == 0).all()
+
+
+@pytest.mark.parametrize("score", SCORES)
+@pytest.mark.parametrize("method", METHODS)
+def test_averages_do_not_depend_on_blocks(judge, estimates, weights, counts, method, score):
+    whole = average(blocks_of(estimates, weights), judge, method, score, counts)
+    parts = average(iter(blocks_of(estimates, weights, 1, 20, 21)), judge, method, score, counts)
+    # Sums in another order.
+    for name in ("compliance", "deviation", "initial_deviation", "nonpositive_share", "relative_spread"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=1e-10, err_msg=name)
+
+
+def test_mean_stiffness_of_a_spread_compliance_is_biased_as_jensen_says(judge):
+    rng, spread = np.random.default_rng(2), 0.1
+    scatter = np.exp(spread * rng.standard_normal((20_000, 1, 1)) - spread**2 / 2)
+    estimates = judge.reference * scatter
+    found = average([(estimates, np.ones((1, 20_000)))], judge, "stiffness", "averaged_model", np.ones((1, TESTS))).compliance[
+        0, 0
+    ]
+    # Lognormal of mean one: E[1/c] = exp(s^2), with a standard error of s / sqrt(20 000) = 0.0007.
+    np.testing.assert_allclose(found / judge.reference, np.exp(-(spread**2)), atol=5 * 0.0007)
+
+
+def test_share_of_nonpositive_compliances_counts_data_sets_and_takes_trust_away(judge, estimates, weights, counts):
+    spoiled = estimates.copy()
+    spoiled[:3, 1, 4] *= -1
+    spoiled[0, 1, 5] = 0.0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        averages = average(blocks_of(spoiled, weights, 2), judge, "stiffness", "averaged_model", counts)
+        table = metrics_table(averages, judge.reference, (0, 1))
+    np.testing.assert_allclose(averages.nonpositive_share, [0, 3 / SETS, 0])
+    np.testing.assert_array_equal(table["trustworthy"], [True, False, True])
+
+
+def test_a_spread_beyond_the_limit_takes_trust_away(judge, weights, counts):
+    scatter = np.linspace(-1, 1, SETS)[:, None, None] * np.array([[0.5], [0.4], [0.1]])
+    averages = average(blocks_of(judge.reference * (1 + scatter), weights), judge, "stiffness", "averaged_model", counts)
+    np.testing.assert_array_equal(
+        metrics_table(averages, judge.reference, (0,))["trustworthy"], averages.relative_spread <= LARGEST_TRUSTED_SPREAD
+    )
+    assert averages.relative_spread[0] > LARGEST_TRUSTED_SPREAD > averages.relative_spread[2]
+
+
+def test_prefixes_without_estimates_stay_not_a_number_and_are_not_trusted(judge, estimates, weights, counts):
+    short = estimates.copy()
+    short[:, 0] = np.nan
+    table = metrics_table(
+        average(blocks_of(short, weights), judge, "stiffness", "averaged_model", counts), judge.reference, (0,)
+    )
+    for name in ("compliance_1", "delta_k_6", "k_sigma", "deviation"):
+        assert np.isnan(table[name][0]) and np.isfinite(table[name][1:]).all()
+    np.testing.assert_array_equal(table["trustworthy"], [False, True, True])
+
+
+def test_metrics_are_equations_13_and_14_of_the_averages(judge, estimates, weights, counts):
+    averages = average(blocks_of(estimates, weights), judge, "stiffness", "averaged_model", counts)
+    table = metrics_table(averages, judge.reference, (0, 1))
+    stiffness = (1 / estimates).mean(axis=0)
+    delta = 100 * (stiffness * judge.reference - 1)
+    np.testing.assert_array_equal(table["length"], [1, 2, 3])
+    for joint in range(6):
+        np.testing.assert_allclose(table[f"compliance_{joint + 1}"], 1 / stiffness[:, joint], rtol=1e-12)
+        np.testing.assert_allclose(table[f"delta_k_{joint + 1}"], delta[:, joint], rtol=0, atol=1e-10)
+    np.testing.assert_allclose(table["k_sigma"], delta.sum(axis=1), rtol=0, atol=1e-10)
+    np.testing.assert_allclose(table["k_sigma_first_stage"], delta[:, :2].sum(axis=1), rtol=0, atol=1e-10)
+    np.testing.assert_array_equal(table["deviation"], averages.deviation[0])
+
+
+def test_bootstrap_standard_error_of_a_mean_is_that_of_theory(judge):
+    sets, replicates = 400, 1000
+    estimates = judge.reference * (1 + 0.05 * np.random.default_rng(3).standard_normal((sets, 1, 6)))
+    weights = bootstrap_weights(2, "kuka", range(sets), replicates)
+    tests = np.ones((1 + replicates, TESTS))
+    averages = average([(estimates, weights)], judge, "compliance", "averaged_model", tests)
+    table = metrics_table(averages, judge.reference, (0,))
+    for joint in range(6):
+        expected = estimates[:, 0, joint].std(ddof=1) / np.sqrt(sets)
+        # A standard deviation from 1000 replicates is known to 1 / sqrt(2000) = 2.2 %, and sets - 1 / sets weighs little.
+        assert table[f"compliance_{joint + 1}_std_error"][0] == pytest.approx(expected, rel=0.1)
+
+
+def test_replicates_are_every_replicate_at_every_length_without_the_first(judge, estimates, weights, counts):
+    averages = average(blocks_of(estimates, weights), judge, "stiffness", "averaged_model", counts)
+    table = replicates_table(averages, judge.reference, (0, 1))
+    assert len(table["replicate"]) == REPLICATES * LENGTHS
+    np.testing.assert_array_equal(np.unique(table["replicate"]), np.arange(1, REPLICATES + 1))
+    row = (table["replicate"] == 4) & (table["length"] == 2)
+    assert table["deviation"][row] == averages.deviation[4, 1]
+    delta = 100 * (judge.reference / averages.compliance[4, 1] - 1)
+    np.testing.assert_allclose(table["k_sigma"][row], delta.sum(), rtol=1e-9)
+    np.testing.assert_allclose(table["k_sigma_first_stage"][row], delta[:2].sum(), rtol=1e-9)
+
+
+def test_standard_errors_are_the_spread_of_the_replicates(judge, estimates, weights, counts):
+    averages = average(blocks_of(estimates, weights), judge, "stiffness", "averaged_model", counts)
+    metrics, replicates = (make(averages, judge.reference, (0, 1)) for make in (metrics_table, replicates_table))
+    for name in ("k_sigma", "k_sigma_first_stage", "deviation", "initial_deviation"):
+        spread = replicates[name].reshape(REPLICATES, LENGTHS).std(axis=0, ddof=1)
+        np.testing.assert_allclose(metrics[f"{name}_std_error"], spread, rtol=1e-12)
+
+
+def test_accuracy_is_that_of_single_data_sets_averaged(judge, estimates):
+    lengths = [1, 3]
+    table = accuracy_table(accuracy_sums(estimates[:, [0, 2]], judge), lengths)
+    np.testing.assert_array_equal(table["length"], lengths)
+    for row, length in enumerate(lengths):
+        compliance = estimates[:, length - 1]
+        errors = position_errors(judge, compliance)
+        sorted_errors = np.sort(errors, axis=1)
+        single = {"mean": errors.mean(axis=1), "max": errors.max(axis=1), "p95": sorted_errors[:, 29 - 1]}
+        for name, values in single.items():
+            assert table[name][row] == pytest.approx(values.mean(), rel=1e-12)
+            assert table[f"{name}_std_error"][row] == pytest.approx(values.std(ddof=1) / np.sqrt(SETS), rel=1e-9)
+        squares = {"rms": (errors**2).mean(axis=1)}
+        for joint in range(6):
+            squares[f"relative_error_{joint + 1}"] = 1e4 * (compliance[:, joint] / judge.reference[joint] - 1) ** 2
+        for name, values in squares.items():
+            root = np.sqrt(values.mean())
+            assert table[name][row] == pytest.approx(root, rel=1e-9)
+            # The error of a root of a mean is that of the mean over twice the root.
+            expected = values.std(ddof=1) / np.sqrt(SETS) / (2 * root)
+            assert table[f"{name}_std_error"][row] == pytest.approx(expected, rel=1e-9)
+
+
+def test_accuracy_does_not_depend_on_blocks(judge, estimates):
+    whole = accuracy_table(accuracy_sums(estimates, judge), range(1, LENGTHS + 1))
+    parts = [accuracy_sums(part, judge) for part in (estimates[:1], estimates[1:33], estimates[33:])]
+    parts = accuracy_table(sum(parts), range(1, LENGTHS + 1))
+    for name in whole:
+        np.testing.assert_allclose(parts[name], whole[name], rtol=1e-9, err_msg=name)
+
+
+def test_percentile_is_the_smallest_error_that_ninety_five_of_a_hundred_do_not_exceed(judge, kuka):
+    loads = random_loads(kuka, 1, 100)
+    hundred = make_judge(kuka, loads, true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector"))
+    model = 1.1 * kuka.compliance[None, None]
+    errors = np.sort(position_errors(hundred, model[0])[0])
+    assert accuracy_table(accuracy_sums(model, hundred), [1])["p95"][0] == pytest.approx(errors[94], rel=1e-12)
+
+
+def test_exact_estimates_have_no_error_and_no_standard_error(judge):
+    table = accuracy_table(accuracy_sums(np.tile(judge.reference, (5, 1, 1)), judge), [1])
+    for name, values in table.items():
+        if name != "length":
+            # Roots of rounding.
+            np.testing.assert_allclose(values, 0, atol=1e-9, err_msg=name)
+
+
+def test_length_that_reaches_a_limit_comes_with_the_spread_of_the_replicates():
+    values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 0.5], [0.9, 0.9, 0.5]])
+    length, error = reached_length(values, replicates, 1.0)
+    assert length == 2.0 and error == pytest.approx(np.std([2, 3, 1], ddof=1))
+
+
+def test_replicates_that_do_not_reach_the_limit_are_continued_and_not_left_out():
+    values, replicates = np.array([3.0, 0.9, 0.5]), np.array([[3.0, 0.9, 0.5], [3.0, 2.0, 1.5], [9.0, 4.0, -2.0]])
+    length, error = reached_length(values, replicates, 1.0)
+    assert length == 2.0 and error == pytest.approx(np.std([2, 4.5, 6], ddof=1))
+    assert reached_length(values, replicates, 0.1)[0] == np.inf

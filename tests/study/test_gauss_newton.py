@@ -1,0 +1,139 @@
+"""Identification on the exact kinematics: exact where equation 11 is linear, and indifferent to where it starts."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+from support import OTHER_CHAINS, random_loads, robot_of, without_tool
+
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study import gauss_newton
+from elastocal.study.gauss_newton import identify_exactly
+from elastocal.study.identification import Readings, first_solvable_length, identify
+from elastocal.study.simulation import true_deflections
+from elastocal.study.strategies import Stage, Strategy
+
+SETS, CONFIGURATIONS = 3, 4
+SAME_BUT_FOR_THE_START = ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
+
+
+class Data:
+    """Exact deflections, configuration before data set, with or without noise."""
+
+    def __init__(self, robot, noise=0.0, rows=6, force=1000.0, sets=SETS):
+        self.robot, self.chain, rng = robot, robot.chain, np.random.default_rng(1)
+        loads = random_loads(robot, sets, CONFIGURATIONS, seed=2, force=force)
+        self.joint_angles = np.swapaxes(loads.joint_angles, 0, 1)
+        end = without_tool(robot.chain.end_effector)
+        torques = np.swapaxes(joint_torques(robot.chain, loads.joint_angles, loads.wrench, end), 0, 1)
+        self.torques = {point.name: torques for point in robot.chain.points}
+        self.deflections = {}
+        for point in robot.chain.points:
+            deflection = np.swapaxes(true_deflections(robot, loads, point, "end_effector"), 0, 1)[..., :rows]
+            self.deflections[point.name] = deflection + noise * rng.standard_normal(deflection.shape)
+
+    def solved(self, strategy, lengths=(CONFIGURATIONS,), start=None):
+        start = np.full(self.robot.joints, 1e-6) if start is None else start
+        return identify_exactly(strategy, self.chain, self.joint_angles, self.torques, self.deflections, start, lengths)
+
+    def linear(self, strategy):
+        readings = {}
+        for point in self.chain.points:
+            jacobian = poses_and_jacobians(self.chain, self.joint_angles, point)[2]
+            matrix = np.moveaxis(regressor(jacobian, self.torques[point.name]), (-2, -1), (0, 1))
+            deflection = np.moveaxis(self.deflections[point.name], -1, 0)
+            readings[point.name] = Readings(matrix[: len(deflection)], deflection)
+        return identify(strategy, readings, self.robot.joints).compliance[-1]
+
+
+def off(found, robot):
+    return np.abs(found / robot.compliance[:, None] - 1).max()
+
+
+def test_true_compliances_are_recovered_where_equation_11_is_off(robot, strategies):
+    data = Data(robot)
+    for strategy in strategies.values():
+        lengths = range(first_solvable_length(strategy, 6), CONFIGURATIONS + 1)
+        found = data.solved(strategy, lengths)
+        assert found.shape == (len(lengths), 6, SETS)
+        # Differences of poses round at 1e-15 m, a thousand-millionth of a deflection is 1e-12 m; one configuration alone is
+        # ill-conditioned by up to 1e4.
+        assert max(off(one, robot) for one in found[1:]) < 1e-9 and off(found[0], robot) < 1e-8
+        assert off(data.linear(strategy), robot) > 1e-5
+
+
+def test_strategies_that_differ_by_their_start_alone_agree_to_rounding(robot, strategies):
+    data = Data(robot, noise=2e-4)
+    one, *others = (data.solved(strategies[name]) for name in SAME_BUT_FOR_THE_START)
+    for other in others:
+        np.testing.assert_allclose(other, one, rtol=0, atol=1e-10 * np.abs(one).max())
+
+
+@pytest.mark.parametrize("start", [1e-7, 1e-6, 5e-6])
+def test_the_start_does_not_matter(kuka, strategies, start):
+    data = Data(kuka, noise=2e-4)
+    expected = data.solved(strategies["3+6DoF-comb"])
+    found = data.solved(strategies["3+6DoF-comb"], start=np.full(6, start))
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+def test_noisy_estimates_are_those_of_a_general_least_squares_solver(kuka, strategies):
+    data = Data(kuka, noise=2e-4)
+    found = data.solved(strategies["3+6DoF-comb"])[0]
+    for s in range(SETS):
+
+        def residuals(scaled, s=s):
+            left = []
+            for name in ("3DoF", "6DoF"):
+                springs = 1e-6 * scaled * data.torques[name][:, s]
+                predicted = exact_deflections(data.chain, data.joint_angles[:, s], springs, data.chain.point(name))
+                left.append((predicted - data.deflections[name][:, s]).ravel())
+            return 1e3 * np.concatenate(left)
+
+        solved = least_squares(residuals, np.ones(6), jac="3-point", xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+        # The solver differentiates numerically, and its minimum is flat in the square.
+        np.testing.assert_allclose(1e6 * found[:, s], solved, rtol=0, atol=1e-5)
+
+
+def test_positions_of_a_target_off_the_axis_give_every_joint(robot, strategies):
+    data = Data(with_target_offset(robot, (0.1, 0.05, 0.2)), rows=3)
+    for strategy in strategies.values():
+        assert off(data.solved(strategy)[0], robot) < 1e-8
+
+
+def test_a_small_load_leaves_nothing_for_the_exact_kinematics_to_add(kuka, strategies):
+    data = Data(kuka, force=20.0)
+    strategy = strategies["6DoF"]
+    # Springs turn by 2e-5 rad, which is by how much the linear model is off, times condition numbers.
+    np.testing.assert_allclose(data.solved(strategy)[0], data.linear(strategy), rtol=1e-2)
+
+
+@pytest.mark.parametrize("force", [1000.0, 10.0])
+def test_one_ill_conditioned_data_set_does_not_take_the_others_along(kuka, strategies, force):
+    # One configuration each: the worst of 200 is so ill-conditioned that rounding alone keeps its steps above 1e-10.
+    data = Data(kuka, force=force, sets=200)
+    found = data.solved(strategies["6DoF"], (1,))[0]
+    errors = np.abs(found / kuka.compliance[:, None] - 1).max(axis=0)
+    assert (errors < 1e-5).mean() > 0.95
+
+
+def test_other_robots_than_those_with_six_joints_are_solved():
+    for name in ("three joints", "seven joints", "fixed rotations"):
+        robot = robot_of(OTHER_CHAINS[name])
+        joints = tuple(range(robot.joints))
+        strategy = Strategy("all at the end", (Stage((robot.chain.end_effector.name,), joints),))
+        assert off(Data(robot).solved(strategy)[0], robot) < 1e-8
+
+
+def test_later_stages_hold_what_earlier_ones_found(kuka, strategies):
+    data = Data(kuka, noise=2e-4)
+    alone = data.solved(Strategy("first stage", strategies["4-6DoF-after-3DoF"].stages[:1]))
+    staged = data.solved(strategies["4-6DoF-after-3DoF"])
+    np.testing.assert_array_equal(staged[:, :3], alone[:, :3])
+    assert (alone[:, 3:] == 1e-6).all()
+
+
+def test_steps_that_do_not_settle_leave_no_number(kuka, strategies, monkeypatch):
+    monkeypatch.setattr(gauss_newton, "STEPS", 1)
+    assert np.isnan(Data(kuka).solved(strategies["6DoF"])).all()

@@ -1,0 +1,321 @@
+"""Equation 11 for every prefix, against a plain loop of numpy.linalg.lstsq and against explicit matrices."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import random_loads, without_tool
+
+from elastocal.mechanics.elastostatics import joint_torques, regressor
+from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.identification import (
+    Readings,
+    cholesky_triangles,
+    estimate_compliance,
+    first_solvable_length,
+    identify,
+    inverse_triangles,
+    prefix_information,
+    prefix_triangles,
+)
+from elastocal.study.simulation import true_deflections
+from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+
+SETS, CONFIGURATIONS = 3, 5
+NAMES = [
+    "6DoF",
+    "6DoF-after-3DoF",
+    "4-6DoF-after-3DoF",
+    "6DoF-after-3+3DoF",
+    "3+6DoF-comb",
+    "4-6DoF-after-6+3DoF",
+    "3-6DoF-after-2DoF",
+    "5-6DoF-after-4DoF",
+]
+# Not the paper's, but allowed: a later stage that holds nothing need not make the earlier ones superfluous.
+REFINED = Strategy("3DoF after 6DoF", (Stage(("6DoF",), tuple(range(6))), Stage(("3DoF",), (0, 1, 2))))
+RESUMED = Strategy(
+    "2DoF again after 3DoF",
+    (
+        Stage(("2DoF",), (0, 1)),
+        Stage(("3DoF",), (2,), (0, 1)),
+        Stage(("2DoF",), (0, 1)),
+        Stage(("6DoF",), (3, 4, 5), (0, 1, 2)),
+    ),
+)
+SHUFFLED = Strategy("6DoF, joints in any order", (Stage(("6DoF",), (4, 0, 5, 2, 1, 3)),))
+UNUSUAL = {"refined": REFINED, "resumed": RESUMED, "shuffled": SHUFFLED}
+
+
+class Data:
+    """Regressors (sets, configurations, rows, n) and measured deflections (sets, configurations, rows) of each point."""
+
+    def __init__(self, robot, rows=6, noise=2e-4, linear=False, seed=0):
+        rng = np.random.default_rng(seed)
+        loads = random_loads(robot, SETS, CONFIGURATIONS, seed=seed)
+        torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, without_tool(robot.chain.end_effector))
+        self.matrix, self.measured = {}, {}
+        for point in robot.chain.points:
+            jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, point)[2]
+            self.matrix[point.name] = regressor(jacobian, torques)[..., :rows, :]
+            deflection = true_deflections(robot, loads, point, "end_effector")[..., :rows]
+            if linear:
+                deflection = self.matrix[point.name] @ robot.compliance
+            self.measured[point.name] = deflection + noise * rng.standard_normal(deflection.shape)
+
+    def readings(self, sets=slice(None)):
+        return {
+            name: Readings(
+                np.moveaxis(self.matrix[name][sets], (2, 3, 1, 0), (0, 1, 2, 3)),
+                np.moveaxis(self.measured[name][sets], (2, 1, 0), (0, 1, 2)),
+            )
+            for name in self.matrix
+        }
+
+
+@cache
+def data_of(robot_key, rows, load):
+    robot = load(robot_key)
+    return Data(with_target_offset(robot, (0.1, 0.05, 0.2)) if rows == 3 else robot, rows)
+
+
+@pytest.fixture(params=["kuka", "fanuc"])
+def data(request, robots):
+    return data_of(request.param, 6, robots)
+
+
+@pytest.fixture
+def robots(kuka, fanuc):
+    return {"kuka": kuka, "fanuc": fanuc}.__getitem__
+
+
+def plain(strategy, matrix, measured, joints=6):
+    """One data set, one prefix: the stages one after the other by numpy.linalg.lstsq; (configurations, rows, ...) per point."""
+    compliance = np.full(joints, np.nan)
+    for stage in strategy.stages:
+        rows = np.concatenate([matrix[name].reshape(-1, joints) for name in stage.points])
+        right = np.concatenate([measured[name].ravel() for name in stage.points])
+        held, identified = list(stage.held), list(stage.identified)
+        right = right - rows[:, held] @ compliance[held]
+        compliance[identified] = np.linalg.lstsq(rows[:, identified], right, rcond=None)[0]
+    return compliance
+
+
+def first(data, data_set, length):
+    matrix = {name: array[data_set, :length] for name, array in data.matrix.items()}
+    return matrix, {name: array[data_set, :length] for name, array in data.measured.items()}
+
+
+def prefixes(strategy, rows):
+    start = first_solvable_length(strategy, rows)
+    return [(k, s) for k in range(start, CONFIGURATIONS + 1) for s in range(SETS)]
+
+
+@pytest.fixture
+def strategy_called(strategies):
+    return lambda name: UNUSUAL.get(name) or strategies[name]
+
+
+@pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
+def test_estimates_of_every_prefix_are_those_of_a_plain_loop(data, strategy_called, name):
+    strategy = strategy_called(name)
+    found = identify(strategy, data.readings(), 6).compliance
+    for k, s in prefixes(strategy, 6):
+        expected = plain(strategy, *first(data, s, k))
+        np.testing.assert_allclose(found[k - 1, :, s], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", ["6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "4-6DoF-after-6+3DoF"])
+def test_estimates_from_positions_are_those_of_a_plain_loop(strategies, robots, name):
+    strategy, data = strategies[name], data_of("kuka", 3, robots)
+    found = identify(strategy, data.readings(), 6)
+    # One position says two things about three joints that meet in a wrist, so one configuration is not enough.
+    for k, s in [(k, s) for k, s in prefixes(strategy, 3) if k > 1]:
+        expected = plain(strategy, *first(data, s, k))
+        np.testing.assert_allclose(found.compliance[k - 1, :, s], expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+def explicit_covariance(strategy, matrix, measured):
+    """The estimator is linear in the readings: its matrix, column by column, times its own transpose."""
+    columns = []
+    for name in dict.fromkeys(name for stage in strategy.stages for name in stage.points):
+        for index in np.ndindex(measured[name].shape):
+            unit = {other: np.zeros_like(array) for other, array in measured.items()}
+            unit[name][index] = 1.0
+            columns.append(plain(strategy, matrix, unit))
+    gain = np.column_stack(columns)
+    return gain @ gain.T
+
+
+def assert_same_covariance(found, expected):
+    scale = np.sqrt(np.diag(expected))
+    # Correlations, so that the small variances of the stiff joints count as much as the others.
+    np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
+def test_covariance_is_that_of_the_estimator_written_as_one_matrix(robots, strategy_called, name):
+    strategy, data = strategy_called(name), data_of("kuka", 6, robots)
+    found = identify(strategy, data.readings(), 6).covariance
+    assert found.shape == (CONFIGURATIONS, SETS, 6, 6)
+    for k, s in [(1, 0), (2, 1), (CONFIGURATIONS, 2)]:
+        assert_same_covariance(found[k - 1, s], explicit_covariance(strategy, *first(data, s, k)))
+
+
+@pytest.mark.parametrize("name", ["6DoF", "4-6DoF-after-3DoF", "4-6DoF-after-6+3DoF"])
+def test_covariance_from_positions_is_that_of_the_estimator_written_as_one_matrix(robots, strategies, name):
+    strategy, data = strategies[name], data_of("kuka", 3, robots)
+    found = identify(strategy, data.readings(), 6).covariance
+    assert_same_covariance(found[-1, 0], explicit_covariance(strategy, *first(data, 0, CONFIGURATIONS)))
+
+
+def test_covariance_of_a_shared_reading_strategy_is_what_noise_does(kuka, strategies):
+    # Monte Carlo: one configuration set, 4000 draws of unit noise as data sets.
+    strategy, draws, rng = strategies["4-6DoF-after-6+3DoF"], 4000, np.random.default_rng(1)
+    data, readings = data_of("kuka", 6, {"kuka": kuka}.__getitem__), {}
+    for name, matrix in data.matrix.items():
+        one = np.repeat(np.moveaxis(matrix[0], 0, -1)[..., None], draws, axis=-1)
+        readings[name] = Readings(one, rng.standard_normal((6, CONFIGURATIONS, draws)))
+    expected = identify(strategy, data.readings(), 6).covariance[-1, 0]
+    found = np.cov(estimate_compliance(strategy, readings, 6)[0][-1])
+    scale = np.sqrt(np.diag(expected))
+    # A sample covariance of unit variances has a standard deviation of at most sqrt(2 / draws) = 0.022.
+    np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=0.11)
+
+
+@pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
+def test_condition_is_that_of_the_stacked_regressor_of_the_worst_stage(data, strategy_called, name):
+    strategy = strategy_called(name)
+    found = identify(strategy, data.readings(), 6).condition
+    for k, s in prefixes(strategy, 6):
+        matrix, _ = first(data, s, k)
+        stacked = [
+            np.concatenate([matrix[point].reshape(-1, 6) for point in stage.points])[:, list(stage.identified)]
+            for stage in strategy.stages
+        ]
+        expected = max(np.linalg.cond(rows) for rows in stacked)
+        # Eigenvalues of R^T R lose the square of the condition number: up to 1e4 here.
+        assert found[k - 1, s] == pytest.approx(expected, rel=1e-6)
+
+
+def test_strategies_that_differ_by_their_start_alone_agree_exactly(data, strategies):
+    plainly, *others = (
+        identify(strategies[name], data.readings(), 6) for name in ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
+    )
+    for other in others:
+        np.testing.assert_array_equal(other.compliance, plainly.compliance)
+        np.testing.assert_array_equal(other.covariance, plainly.covariance)
+
+
+def test_comb_and_its_staged_twin_are_one_estimator(data, strategies):
+    comb, twin = (identify(strategies[name], data.readings(), 6) for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF"))
+    np.testing.assert_allclose(twin.compliance, comb.compliance, rtol=0, atol=1e-9 * np.abs(comb.compliance).max())
+    np.testing.assert_allclose(twin.covariance, comb.covariance, rtol=0, atol=1e-9 * np.abs(comb.covariance).max())
+
+
+@pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
+def test_noise_free_readings_of_the_linear_model_give_the_exact_compliances(robot, strategy_called, name):
+    data = Data(robot, noise=0.0, linear=True)
+    found = identify(strategy_called(name), data.readings(), 6).compliance
+    # Rounding of 1e-16 times condition numbers up to 1e4, stage after stage.
+    np.testing.assert_allclose(found, np.broadcast_to(robot.compliance[:, None], found.shape), rtol=1e-9)
+
+
+def test_all_readings_together_are_never_worse_than_some_of_them(data, strategies):
+    some, more = (identify(strategies[name], data.readings(), 6).covariance for name in ("6DoF", "3+6DoF-comb"))
+    assert (np.linalg.eigvalsh(some - more).min(axis=-1) > -1e-9 * np.abs(some).max(axis=(-1, -2))).all()
+
+
+def test_a_data_set_does_not_depend_on_the_others(data, strategies):
+    together = identify(strategies["4-6DoF-after-6+3DoF"], data.readings(), 6)
+    for s in range(SETS):
+        alone = identify(strategies["4-6DoF-after-6+3DoF"], data.readings([s]), 6)
+        np.testing.assert_allclose(alone.compliance[..., 0], together.compliance[..., s], rtol=1e-10)
+        np.testing.assert_allclose(alone.condition[:, 0], together.condition[:, s], rtol=1e-8)
+
+
+def test_readings_are_left_as_they_were(data, strategies):
+    readings = data.readings()
+    before = {name: (r.regressor.copy(), r.deflection.copy()) for name, r in readings.items()}
+    identify(strategies["4-6DoF-after-6+3DoF"], readings, 6)
+    for name, (matrix, deflection) in before.items():
+        np.testing.assert_array_equal(readings[name].regressor, matrix)
+        np.testing.assert_array_equal(readings[name].deflection, deflection)
+
+
+@pytest.mark.parametrize(("name", "poses", "positions"), [("6DoF", 1, 2), ("3+6DoF-comb", 1, 1), ("5-6DoF-after-4DoF", 1, 2)])
+def test_first_solvable_length_counts_readings_against_unknowns(strategies, name, poses, positions):
+    assert first_solvable_length(strategies[name], 6) == poses
+    assert first_solvable_length(strategies[name], 3) == positions
+
+
+def test_first_solvable_length_is_that_of_the_hardest_stage():
+    strategy = Strategy("seven", (Stage(("A",), (0, 1)), Stage(("A",), (0, 1, 2, 3, 4, 5, 6))))
+    assert (first_solvable_length(strategy, 6), first_solvable_length(strategy, 3)) == (2, 3)
+
+
+def test_prefixes_that_are_too_short_are_not_a_number(robots, strategies):
+    found = identify(strategies["6DoF"], data_of("kuka", 3, robots).readings(), 6)
+    for array in (found.compliance, found.covariance, found.condition):
+        assert np.isnan(array[0]).all() and np.isfinite(array[1:]).all()
+
+
+def test_condition_tells_a_prefix_that_has_readings_enough_but_not_the_right_ones(robots, strategies):
+    # One position of the end-effector cannot tell three joints that meet in a wrist apart.
+    found = identify(strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).readings(), 6).condition
+    assert np.isnan(found[0]).all() and (found[1:] < 1e5).all()
+
+
+systems = st.tuples(st.integers(1, 5), st.integers(0, 2), st.integers(1, 4), st.integers(1, 7), st.integers(0, 2**32 - 1))
+
+
+@given(systems)
+def test_triangles_carry_the_normal_equations_of_every_prefix(shape):
+    pivots, more, configurations, rows, seed = shape
+    system = np.random.default_rng(seed).standard_normal((rows, pivots + more, configurations, 2))
+    triangles = prefix_triangles(np.moveaxis(system, 2, 0).copy(), configurations, pivots)
+    for k in range(configurations):
+        for s in range(2):
+            stacked = np.moveaxis(system[:, :, : k + 1, s], 2, 0).reshape(-1, pivots + more)
+            triangle = triangles[k, :, :pivots, s]
+            if len(stacked) >= pivots:
+                np.testing.assert_allclose(np.tril(triangle, -1), 0, atol=0)
+                expected = stacked[:, :pivots].T @ stacked
+                np.testing.assert_allclose(
+                    triangle.T @ triangles[k, ..., s], expected, rtol=0, atol=1e-12 * rows * configurations
+                )
+
+
+def test_inverse_triangles_invert():
+    triangles = np.triu(np.random.default_rng(2).uniform(1, 2, (4, 3, 5, 5)))
+    found = inverse_triangles(np.moveaxis(triangles, 1, -1))
+    np.testing.assert_allclose(np.moveaxis(found, -1, 1), np.linalg.inv(triangles), rtol=0, atol=1e-11)
+
+
+def test_cholesky_triangles_are_those_of_lapack_and_not_a_number_where_there_are_none():
+    half = np.random.default_rng(4).standard_normal((4, 3, 7, 5))
+    matrices = np.swapaxes(half, -1, -2) @ half
+    found = np.moveaxis(cholesky_triangles(np.moveaxis(matrices, 1, -1)), -1, 1)
+    np.testing.assert_allclose(found, np.swapaxes(np.linalg.cholesky(matrices), -1, -2), rtol=0, atol=1e-12)
+    singular = half[..., :4, :].swapaxes(-1, -2) @ half[..., :4, :]
+    assert np.isnan(cholesky_triangles(np.moveaxis(singular, 1, -1))[:, 4, 4]).all()
+
+
+def test_prefix_information_is_the_sum_over_the_first_configurations():
+    matrix = np.random.default_rng(3).standard_normal((6, 4, 5, 2))
+    found = prefix_information(matrix)
+    for k in range(5):
+        for s in range(2):
+            expected = sum(matrix[:, :, i, s].T @ matrix[:, :, i, s] for i in range(k + 1))
+            np.testing.assert_allclose(found[k, ..., s], expected, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["6DoF-after-3DoF", "6DoF-after-3+3DoF"])
+def test_stages_before_one_that_identifies_every_joint_leave_no_trace(name, kuka, strategies):
+    readings = Data(kuka).readings()
+    lasting = without_forgotten_stages(strategies[name], kuka.joints)
+    whole, short = (estimate_compliance(s, readings, kuka.joints)[0] for s in (strategies[name], lasting))
+    np.testing.assert_array_equal(short, whole)

@@ -1,0 +1,188 @@
+"""Equations 12-15: closed forms, and the score sheet against exact kinematics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import random_loads, without_tool
+
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, regressor
+from elastocal.mechanics.kinematics import poses_and_jacobians
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study import metrics
+from elastocal.study.evaluation import accuracy_sums
+from elastocal.study.metrics import (
+    error_moment,
+    first_length_below,
+    k_sigma,
+    length_to_reach,
+    make_judge,
+    mean_deviation,
+    position_errors,
+    relative_stiffness_error,
+)
+from elastocal.study.simulation import true_deflections
+
+RELATIVE_ERRORS = np.array([[0.01, -0.02, 0.03, -0.04, 0.05, -0.06], [-0.2, 0.1, 0.3, 0.1, -0.3, 0.2], [0.0] * 6])
+
+
+def judge_of(robot, loads=None):
+    loads = random_loads(robot, 1, 40) if loads is None else loads
+    return make_judge(robot, loads, true_deflections(robot, loads, robot.chain.end_effector, "end_effector"))
+
+
+def exact_errors(robot, loads, compliance):
+    """Position error of one model: pose by pose, without any linearisation."""
+    end = robot.chain.end_effector
+    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, without_tool(end))
+    predicted = exact_deflections(robot.chain, loads.joint_angles, compliance * torques, end)
+    truth = true_deflections(robot, loads, end, "end_effector")
+    return np.linalg.norm((predicted - truth)[..., :3], axis=-1).ravel()
+
+
+def test_position_errors_are_those_of_the_exact_kinematics(robot):
+    loads, models = random_loads(robot, 1, 40), robot.compliance * (1 + RELATIVE_ERRORS)
+    found = position_errors(judge_of(robot, loads), models)
+    assert found.shape == (3, 40)
+    for model, errors in zip(models[:2], found, strict=False):
+        expected = exact_errors(robot, loads, model)
+        assert errors.mean() == pytest.approx(expected.mean(), rel=1e-3)
+        # Second order: an error of up to a third of the compliance turns by up to a milliradian more.
+        np.testing.assert_allclose(errors, expected, rtol=0, atol=3e-3 * expected.max())
+    # Root of rounding: squares of 1e-3 m lose sixteen digits.
+    np.testing.assert_allclose(found[2], 0, atol=1e-10)
+
+
+def test_true_joint_compliances_leave_what_the_links_bend(kuka_extended):
+    loads = random_loads(kuka_extended, 1, 40)
+    found = position_errors(judge_of(kuka_extended, loads), kuka_extended.compliance[None])[0]
+    np.testing.assert_allclose(found, exact_errors(kuka_extended, loads, kuka_extended.compliance), rtol=1e-6)
+    assert found.mean() > 1e-4
+
+
+def test_true_compliances_have_no_error_at_a_target_off_the_flange(kuka):
+    # The target is shifted, the load stays at the end-effector (readings R5 and R6).
+    found = position_errors(judge_of(with_target_offset(kuka, (0.1, 0.2, 0.3))), kuka.compliance[None])
+    np.testing.assert_allclose(found, 0, atol=1e-10)
+
+
+def test_mean_deviation_is_the_mean_position_error(kuka):
+    judge = judge_of(kuka)
+    models = (kuka.compliance * (1 + RELATIVE_ERRORS[[0, 1, 0, 1, 1, 0]])).reshape(2, 3, 6)
+    expected = position_errors(judge, models.reshape(-1, 6)).mean(axis=1).reshape(2, 3)
+    np.testing.assert_allclose(mean_deviation(judge, models), expected, rtol=1e-12)
+
+
+def test_mean_deviation_counts_each_test_configuration_as_often_as_it_weighs(kuka):
+    judge = judge_of(kuka)
+    models = kuka.compliance * (1 + RELATIVE_ERRORS[[[0, 1], [1, 0]]])
+    counts = np.random.default_rng(1).poisson(1.0, (2, 40))
+    found = mean_deviation(judge, models, counts)
+    for group in range(2):
+        expected = np.repeat(position_errors(judge, models[group]), counts[group], axis=1).mean(axis=1)
+        np.testing.assert_allclose(found[group], expected, rtol=1e-12)
+
+
+@pytest.mark.parametrize("models", [1, 4, 5, 6])
+def test_scores_do_not_depend_on_how_many_models_are_scored_at_a_time(kuka, monkeypatch, models):
+    rng, judge = np.random.default_rng(4), judge_of(kuka)
+    compliance = kuka.compliance * rng.uniform(0.8, 1.2, (7, 2, 6))
+    counts = rng.integers(1, 4, (7, len(judge.initial_errors)))
+    whole = mean_deviation(judge, compliance, counts), accuracy_sums(compliance, judge)
+    monkeypatch.setattr(metrics, "MODELS_AT_A_TIME", models)
+    parts = mean_deviation(judge, compliance, counts), accuracy_sums(compliance, judge)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(other, one, rtol=1e-9)
+
+
+def test_initial_errors_are_the_deflections_themselves(kuka):
+    loads = random_loads(kuka, 2, 10)
+    expected = np.linalg.norm(true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector")[..., :3], axis=-1)
+    np.testing.assert_allclose(judge_of(kuka, loads).initial_errors, expected.ravel(), rtol=1e-12)
+
+
+def test_error_moment_is_the_mean_of_the_squared_regressor(robot):
+    loads = random_loads(robot, 1, 40)
+    jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.end_effector)[2]
+    torques = joint_torques(robot.chain, loads.joint_angles, loads.wrench, robot.chain.end_effector)
+    rows = regressor(jacobian, torques)[..., :3, :].reshape(-1, 6)
+    expected = rows.T @ rows / 40
+    np.testing.assert_allclose(error_moment(judge_of(robot, loads)), expected, rtol=0, atol=1e-12 * expected.max())
+
+
+def test_error_moment_gives_the_mean_squared_error(kuka):
+    judge = judge_of(kuka)
+    for error in RELATIVE_ERRORS[:2] * kuka.compliance:
+        squares = position_errors(judge, (kuka.compliance + error)[None]) ** 2
+        assert error @ error_moment(judge) @ error == pytest.approx(squares.mean(), rel=1e-9)
+
+
+def test_relative_stiffness_error_is_equation_13():
+    stiffness, true_stiffness = np.array([1.1e6, 0.5e6]), np.array([1.0e6, 1.0e6])
+    np.testing.assert_allclose(relative_stiffness_error(1 / stiffness, 1 / true_stiffness), [10.0, -50.0], rtol=1e-12)
+
+
+def test_averaged_stiffness_is_biased_as_jensen_says():
+    # c lognormal about 1: E[1/c] = exp(s^2 - m) with E[c] = exp(m + s^2 / 2) = 1, so that k is over by exp(s^2) - 1.
+    spread = 0.2
+    nodes, weights = np.polynomial.hermite_e.hermegauss(40)
+    compliance = np.exp(spread * nodes - spread**2 / 2)
+    mean_stiffness = weights @ (1 / compliance) / weights.sum()
+    found = relative_stiffness_error(np.array([1 / mean_stiffness]), np.ones(1))
+    np.testing.assert_allclose(found, 100 * (np.exp(spread**2) - 1), rtol=1e-10)
+
+
+def test_k_sigma_is_the_signed_sum_over_all_joints_or_some():
+    true_compliance = np.array([1.0, 2.0, 4.0])
+    compliance = true_compliance / [1.01, 0.97, 1.05]
+    assert k_sigma(compliance, true_compliance) == pytest.approx(3.0, rel=1e-10)
+    assert k_sigma(compliance, true_compliance, [0, 1]) == pytest.approx(-2.0, rel=1e-10)
+    np.testing.assert_allclose(k_sigma(np.stack([compliance, true_compliance]), true_compliance), [3.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([5.0, 3.0, 1.0, 0.5], 3),
+        ([0.5, 3.0, 1.0], 1),
+        ([5.0, -0.5, 1.0], 2),
+        ([5.0, -3.0, 2.0], np.inf),
+        ([np.nan, np.nan, 0.1], 3),
+        ([np.nan, np.nan], np.inf),
+        ([np.inf, 1.0], 2),
+    ],
+)
+def test_first_length_below_counts_from_one_and_is_infinite_where_not_reached(values, expected):
+    assert first_length_below(np.array(values), 1.0) == expected
+
+
+def test_first_length_below_keeps_leading_axes():
+    values = np.array([[[5.0, 0.0], [5.0, 5.0]], [[0.0, 0.0], [np.nan, 0.0]]])
+    np.testing.assert_array_equal(first_length_below(values, 1.0), [[2, np.inf], [1, 2]])
+
+
+@given(st.floats(1e-3, 1e3), st.sampled_from([-1.0, 1.0]), st.integers(1, 30))
+def test_length_to_reach_continues_a_bias_that_falls_as_one_over_the_length(bias, sign, lengths):
+    values = sign * bias / np.arange(1, lengths + 1)
+    found, reached = length_to_reach(values, 1.0), first_length_below(values, 1.0)
+    if np.isfinite(reached):
+        assert found == reached
+    else:
+        assert found == pytest.approx(bias, rel=1e-12) and found >= lengths
+
+
+def test_length_to_reach_is_the_first_length_below_where_there_is_one():
+    values = np.array([[5.0, 0.5, 3.0], [5.0, 4.0, -2.0]])
+    np.testing.assert_array_equal(length_to_reach(values, 1.0), [2.0, 6.0])
+
+
+def test_judge_scores_about_the_compliances_of_the_robot(kuka):
+    loads = random_loads(kuka, 1, 10)
+    truth = true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector")
+    other = replace(kuka, compliance=1.1 * kuka.compliance)
+    # Judged about another reference, the truth is still the truth: only the second order differs.
+    about_truth = position_errors(make_judge(kuka, loads, truth), 1.05 * kuka.compliance[None])
+    about_other = position_errors(make_judge(other, loads, truth), 1.05 * kuka.compliance[None])
+    np.testing.assert_allclose(about_other, about_truth, rtol=0, atol=3e-3 * about_truth.max())

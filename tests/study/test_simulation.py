@@ -1,0 +1,150 @@
+"""Data sets as the paper makes them: random loads with the right distribution, exact deflections, noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+from support import random_loads
+
+from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
+
+PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
+
+
+def drawn(robot, loading=PAPER, seed=1, key="kuka", purpose="identification", data_sets=range(4), configurations=5):
+    return random_experiments(robot.chain, robot.joint_limits, seed, key, loading, purpose, data_sets, configurations)
+
+
+def test_experiments_have_the_axes_set_configuration_component(kuka):
+    loads = drawn(kuka)
+    assert loads.joint_angles.shape == (4, 5, 6) and loads.wrench.shape == (4, 5, 6)
+
+
+def test_first_configurations_do_not_depend_on_how_many_there_are(kuka):
+    few, many = drawn(kuka, configurations=3), drawn(kuka, configurations=50)
+    np.testing.assert_array_equal(few.joint_angles, many.joint_angles[:, :3])
+    np.testing.assert_array_equal(few.wrench, many.wrench[:, :3])
+
+
+def test_a_data_set_does_not_depend_on_the_others(kuka):
+    some, all_of_them = drawn(kuka, data_sets=[3, 1]), drawn(kuka)
+    np.testing.assert_array_equal(some.joint_angles, all_of_them.joint_angles[[3, 1]])
+    np.testing.assert_array_equal(some.wrench, all_of_them.wrench[[3, 1]])
+
+
+@pytest.mark.parametrize("change", [{"seed": 2}, {"key": "fanuc"}, {"purpose": "test"}, {"data_sets": range(4, 8)}])
+def test_another_seed_robot_purpose_or_set_gives_other_experiments(kuka, change):
+    loads, others = drawn(kuka), drawn(kuka, **change)
+    assert not np.isin(loads.joint_angles, others.joint_angles).any()
+    assert not np.isin(loads.wrench[..., :3], others.wrench[..., :3]).any()
+
+
+def test_forces_have_the_given_norm(kuka):
+    force = drawn(kuka, configurations=200).wrench[..., :3]
+    np.testing.assert_allclose(np.linalg.norm(force, axis=-1), 1000.0, rtol=1e-14)
+
+
+def test_forces_are_uniform_on_the_sphere(kuka):
+    direction = drawn(kuka, data_sets=range(20), configurations=1000).wrench[..., :3].reshape(-1, 3) / 1000
+    five_sigma = 5 / np.sqrt(len(direction))
+    # Each component of a direction uniform on the sphere is uniform in [-1, 1] (Archimedes).
+    for component in direction.T:
+        assert kstest(component, "uniform", (-1, 2)).pvalue > 1e-4
+    np.testing.assert_allclose(direction.mean(axis=0), 0, atol=five_sigma * np.sqrt(1 / 3))
+    np.testing.assert_allclose(direction.T @ direction / len(direction), np.eye(3) / 3, atol=five_sigma * 0.3)
+    np.testing.assert_allclose((direction**4).mean(axis=0), 1 / 5, atol=five_sigma * np.sqrt(1 / 9 - 1 / 25))
+
+
+def test_joint_angles_are_uniform_over_the_full_turn(kuka):
+    angles = drawn(kuka, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
+    for joint in angles.T:
+        assert kstest(joint, "uniform", (-np.pi, 2 * np.pi)).pvalue > 1e-4
+
+
+def test_joint_angles_are_uniform_within_the_limits(fanuc):
+    loading = replace(PAPER, joint_range="limits")
+    angles = drawn(fanuc, loading, data_sets=range(10), configurations=500).joint_angles.reshape(-1, 6)
+    for joint, (low, high) in zip(angles.T, fanuc.joint_limits, strict=True):
+        assert kstest(joint, "uniform", (low, high - low)).pvalue > 1e-4
+        assert low <= joint.min() and joint.max() <= high
+
+
+def test_offset_in_the_base_frame_gives_the_moment_of_that_lever(kuka):
+    wrench = drawn(kuka).wrench
+    lever = np.array([0.0, 0.5, 0.0])
+    np.testing.assert_allclose(wrench[..., 3:], np.cross(lever, wrench[..., :3]), rtol=0, atol=1e-10)
+    assert (wrench[..., 4] == 0).all()
+
+
+def test_offset_in_the_tool_frame_turns_with_the_tool(kuka):
+    base, tool = drawn(kuka), drawn(kuka, replace(PAPER, offset_frame="tool"))
+    np.testing.assert_array_equal(tool.joint_angles, base.joint_angles)
+    np.testing.assert_array_equal(tool.wrench[..., :3], base.wrench[..., :3])
+    rotation = poses(kuka.chain, tool.joint_angles, kuka.chain.end_effector)[1]
+    lever = rotation[..., 1] * 0.5
+    np.testing.assert_allclose(tool.wrench[..., 3:], np.cross(lever, tool.wrench[..., :3]), rtol=0, atol=1e-10)
+
+
+def test_deflection_is_the_pose_at_q_and_theta_against_the_pose_at_q(robot):
+    loads = random_loads(robot, 2, 3)
+    jacobian = poses_and_jacobians(robot.chain, loads.joint_angles, robot.chain.end_effector)[2]
+    springs = np.einsum("...ij,...i->...j", jacobian, loads.wrench) * robot.compliance
+    for point in robot.chain.points:
+        loaded = poses(robot.chain, loads.joint_angles + springs, point)
+        expected = pose_differences(*loaded, *poses(robot.chain, loads.joint_angles, point))
+        found = true_deflections(robot, loads, point, "end_effector")
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14)
+
+
+def test_untransported_wrench_acts_at_the_measuring_point(kuka):
+    loads = random_loads(kuka, 2, 3)
+    point = kuka.chain.point("3DoF")
+    jacobian = poses_and_jacobians(kuka.chain, loads.joint_angles, point)[2]
+    springs = np.einsum("...ij,...i->...j", jacobian, loads.wrench) * kuka.compliance
+    expected = pose_differences(
+        *poses(kuka.chain, loads.joint_angles + springs, point), *poses(kuka.chain, loads.joint_angles, point)
+    )
+    np.testing.assert_allclose(true_deflections(kuka, loads, point, "measuring_point"), expected, rtol=0, atol=1e-14)
+    assert np.abs(true_deflections(kuka, loads, point, "end_effector") - expected).max() > 1e-5
+
+
+def test_at_the_end_effector_both_readings_of_the_load_are_one(kuka):
+    loads = random_loads(kuka, 2, 3)
+    one, other = (true_deflections(kuka, loads, kuka.chain.end_effector, at) for at in ("end_effector", "measuring_point"))
+    np.testing.assert_array_equal(one, other)
+
+
+def test_target_offset_moves_the_target_and_not_the_load(kuka):
+    loads = random_loads(kuka, 2, 3)
+    moved = with_target_offset(kuka, (0.1, 0.2, 0.3))
+    plain = true_deflections(kuka, loads, kuka.chain.end_effector, "end_effector")
+    target = true_deflections(moved, loads, moved.chain.end_effector, "end_effector")
+    # The tool is rigid: the same turn, and a displacement that follows from it.
+    np.testing.assert_allclose(target[..., 3:], plain[..., 3:], rtol=0, atol=1e-15)
+    lever = poses(kuka.chain, loads.joint_angles, kuka.chain.end_effector)[1] @ np.array([0.1, 0.2, 0.3])
+    shift = plain[..., :3] + np.cross(plain[..., 3:], lever)
+    # Second order in a turn of some milliradians.
+    np.testing.assert_allclose(target[..., :3], shift, rtol=0, atol=1e-5)
+    assert np.abs(target - plain).max() > 1e-4
+
+
+def test_noise_is_standard_normal_and_independent_between_components():
+    noise = measurement_noise(1, "kuka", "6DoF", range(20), 500).reshape(-1, 6)
+    for component in noise.T:
+        assert kstest(component, "norm").pvalue > 1e-4
+    np.testing.assert_allclose(np.corrcoef(noise.T), np.eye(6), atol=5 / np.sqrt(len(noise)))
+
+
+def test_noise_of_the_first_configurations_does_not_depend_on_how_many_there_are():
+    few, many = (measurement_noise(1, "kuka", "3DoF", range(3), count) for count in (4, 40))
+    np.testing.assert_array_equal(few, many[:, :4])
+    np.testing.assert_array_equal(measurement_noise(1, "kuka", "3DoF", [2], 4)[0], few[2])
+
+
+def test_each_point_robot_and_seed_has_noise_of_its_own():
+    noise = measurement_noise(1, "kuka", "3DoF", range(3), 4)
+    for other in [(1, "kuka", "6DoF"), (1, "fanuc", "3DoF"), (2, "kuka", "3DoF")]:
+        assert not np.isin(noise, measurement_noise(*other, range(3), 4)).any()

@@ -1,0 +1,97 @@
+"""Strategies as data: what the eight files say, and that what a chain cannot carry out is refused in one line."""
+
+import pytest
+from support import chain_of, refused
+
+from elastocal.study.strategies import check_strategy, strategy_from_document, without_forgotten_stages
+
+FIRST_STAGE_JOINTS = {
+    "6DoF": (0, 1, 2, 3, 4, 5),
+    "6DoF-after-3DoF": (0, 1, 2, 3, 4, 5),
+    "4-6DoF-after-3DoF": (0, 1, 2),
+    "6DoF-after-3+3DoF": (0, 1, 2, 3, 4, 5),
+    "3+6DoF-comb": (0, 1, 2, 3, 4, 5),
+    "4-6DoF-after-6+3DoF": (0, 1, 2),
+    "3-6DoF-after-2DoF": (0, 1),
+    "5-6DoF-after-4DoF": (0, 1, 2, 3),
+}
+POINTS = {
+    "6DoF": {"6DoF"},
+    "6DoF-after-3DoF": {"3DoF", "6DoF"},
+    "4-6DoF-after-3DoF": {"3DoF", "6DoF"},
+    "6DoF-after-3+3DoF": {"3DoF", "6DoF"},
+    "3+6DoF-comb": {"3DoF", "6DoF"},
+    "4-6DoF-after-6+3DoF": {"3DoF", "6DoF"},
+    "3-6DoF-after-2DoF": {"2DoF", "6DoF"},
+    "5-6DoF-after-4DoF": {"4DoF", "6DoF"},
+}
+
+
+def test_the_repository_has_the_eight_strategies_of_the_paper(strategies):
+    assert set(strategies) == set(FIRST_STAGE_JOINTS)
+    for file, strategy in strategies.items():
+        assert strategy.name.replace(" ", "-") == file
+
+
+@pytest.mark.parametrize("name", FIRST_STAGE_JOINTS)
+def test_first_stage_joints_are_those_that_the_last_stage_takes_over(strategies, name):
+    assert strategies[name].first_stage_joints == FIRST_STAGE_JOINTS[name]
+
+
+@pytest.mark.parametrize("name", POINTS)
+def test_points_are_those_that_the_paper_measures_each_once(strategies, name):
+    points = strategies[name].points
+    assert set(points) == POINTS[name] and len(points) == len(set(points))
+
+
+def test_a_stage_that_identifies_every_joint_forgets_those_before_it(strategies):
+    left = {name: without_forgotten_stages(strategy, 6).stages for name, strategy in strategies.items()}
+    assert left.pop("6DoF-after-3DoF") == left.pop("6DoF-after-3+3DoF") == strategies["6DoF"].stages
+    assert left == {name: strategies[name].stages for name in left}
+
+
+def test_both_robots_can_carry_out_every_strategy(strategies, robot):
+    for name, strategy in strategies.items():
+        check_strategy(strategy, robot.chain, name)
+
+
+def test_joints_count_from_one_in_the_file_and_from_zero_inside():
+    strategy = strategy_from_document({"name": "x", "stages": [{"points": ["A"], "joints": [2, 3], "held": [1]}]})
+    (stage,) = strategy.stages
+    assert (stage.points, stage.identified, stage.held) == (("A",), (1, 2), (0,))
+
+
+STAGED = [{"points": ["A"], "joints": [1, 2]}, {"points": ["B"], "joints": [3], "held": [1, 2]}]
+
+
+def stages(*changes):
+    """STAGED with the given keys of its first, second ... stage replaced."""
+    return [stage | change for stage, change in zip(STAGED, changes, strict=True)]
+
+
+FAULTS = {
+    "unknown point": (stages({"points": ["C"]}, {}), "stages[1].points", ["'C'", "A, B"]),
+    "unknown point later": (stages({}, {"points": ["A", "end"]}), "stages[2].points", ["'end'", "A, B"]),
+    "joint that the robot has not": (stages({}, {"joints": [3, 4]}), "stages[2].joints", ["joint 4", "move B: 1, 2, 3"]),
+    "joint behind the point": (stages({"joints": [1, 2, 3]}, {}), "stages[1].joints", ["joint 3", "move A: 1, 2"]),
+    "joint in neither list": (stages({"joints": [1]}, {}), "stages[1]", ["joint 2", "in joints or held"]),
+    "nothing held": (stages({}, {"held": []}), "stages[2]", ["joint 1, 2", "1, 2, 3 in joints or held"]),
+    "held before it is known": (stages({"joints": [1], "held": [2]}, {}), "stages[1].held", ["joint 2", "none"]),
+    "held that is no joint": (stages({}, {"held": [1, 2, 7]}), "stages[2].held", ["joint 7", "earlier stages: 1, 2"]),
+    "held and identified": (stages({}, {"joints": [2, 3]}), "stages[2].held", ["joint 2", "earlier stages"]),
+    "joint that no stage identifies": (STAGED[:1], "stages", ["joint 3", "every joint"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faulty_strategy_is_refused_in_one_line(fault):
+    chain = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
+    documents, key, words = FAULTS[fault]
+    strategy = strategy_from_document({"name": fault, "stages": documents})
+    with refused("strategies/x.yaml", f"{key}:", *words):
+        check_strategy(strategy, chain, "strategies/x.yaml")
+
+
+def test_a_strategy_without_fault_is_accepted():
+    chain = chain_of("Rz(q1) Tx(1) Ry(q2) Tx(1) [A] Ry(q3) Tx(1) [B]")
+    check_strategy(strategy_from_document({"name": "staged", "stages": STAGED}), chain, "x")

@@ -1,0 +1,182 @@
+"""Tables and the comparison with the paper, against hand calculations."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from elastocal.io.data_frames import write_csv, write_latex, write_markdown
+from elastocal.study.comparison import OurResults, comparison_table
+from elastocal.study.tables import (
+    deviation_ratio,
+    per_dataset_table,
+    share_compensated,
+    solver_summary,
+    table2,
+    table4,
+    with_errors_merged,
+    worded,
+)
+
+LENGTHS = np.arange(1, 101)
+
+
+def metrics_of(strategy, bias=100.0, robot="arm"):
+    """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
+    frame = pd.DataFrame({"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS})
+    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
+        frame[name], frame[f"{name}_std_error"] = scale * bias / LENGTHS, scale
+    frame["initial_deviation"], frame["initial_deviation_std_error"] = 1e-3, 1e-5
+    return frame
+
+
+def replicates_of(strategy, bias=100.0, robot="arm", spread=(-0.1, 0.0, 0.1)):
+    parts = []
+    for number, relative in enumerate(spread, 1):
+        frame = metrics_of(strategy, bias * (1 + relative), robot)
+        parts.append(frame.assign(replicate=number))
+    return pd.concat(parts, ignore_index=True)
+
+
+def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_length_meets_the_limits():
+    table = table4(metrics_of("A", 40.0), replicates_of("A", 40.0), ["arm"], ["A"], 200.0, 20, 1.0, 2.0).iloc[0]
+    assert table.k_sigma_20_percent == pytest.approx(2.0) and table.k_sigma_20_percent_first_stage == pytest.approx(1.0)
+    assert (table.n_k_sigma_1_percent, table.n_k_sigma_1_percent_first_stage, table.n_dev_2_um) == (40, 20, 20)
+    assert table.n_k_sigma_1_percent_std_error == pytest.approx(4.0)
+    assert table.dev_20_um == pytest.approx(2.0)
+
+
+def test_a_length_that_is_not_reached_is_infinite_and_keeps_the_error_of_the_law_it_follows():
+    table = table4(metrics_of("A", 200.0), replicates_of("A", 200.0), ["arm"], ["A"], 200.0, 20, 1.0, 1.0).iloc[0]
+    assert np.isinf(table.n_k_sigma_1_percent) and table.n_k_sigma_1_percent_std_error == pytest.approx(20.0)
+    assert with_errors_merged(table.to_frame().T.infer_objects()).n_k_sigma_1_percent.iloc[0] == "not reached"
+
+
+def test_table2_is_the_statistics_of_all_configurations_together():
+    rng = np.random.default_rng(1)
+    data = rng.gamma(2.0, 1e-3, (50, 40))
+    initial = pd.DataFrame(
+        {
+            "data_set": range(50),
+            "configurations": 40,
+            "mean": data.mean(axis=1),
+            "mean_square": (data**2).mean(axis=1),
+            "maximum": data.max(axis=1),
+        }
+    )
+    weights = np.vstack([np.ones(50), rng.poisson(1.0, (400, 50))])
+    row = table2({"arm": initial}, {"arm": weights}).iloc[0]
+    assert row.mean_mm == pytest.approx(1e3 * data.mean()) and row.std_mm == pytest.approx(1e3 * data.std())
+    assert row.max_mm == pytest.approx(1e3 * data.max())
+    assert row.mean_mm_std_error == pytest.approx(1e3 * data.mean(axis=1).std() / np.sqrt(50), rel=0.2)
+    assert row.mean_mm_one_set_std == pytest.approx(1e3 * data.mean(axis=1).std(ddof=1))
+
+
+def test_share_and_ratio_come_with_the_spread_of_paired_replicates():
+    metrics = pd.concat([metrics_of("A", 20.0), metrics_of("B", 10.0)])
+    replicates = pd.concat([replicates_of("A", 20.0), replicates_of("B", 10.0)])
+    assert share_compensated(metrics, replicates, "arm", "A", 200.0, 20) == pytest.approx((99.9, 0.01))
+    # Replicates move both strategies together, so their ratio stands still.
+    assert deviation_ratio(metrics, replicates, "arm", "A", "B", 200.0, 20) == pytest.approx((2.0, 0.0), abs=1e-12)
+    assert all(np.isnan(share_compensated(metrics, replicates, "other", "A", 200.0, 20)))
+
+
+def test_efficiency_is_the_squared_ratio_of_bound_and_error_and_is_empty_without_noise():
+    accuracy = pd.DataFrame({"robot": "arm", "strategy": "A", "noise_um": [0.0, 100.0], "length": 20})
+    for name in ("mean", "rms", "p95", "max"):
+        accuracy[name], accuracy[f"{name}_std_error"] = 80e-6, 4e-6
+    accuracy["relative_error_1"], accuracy["relative_error_1_std_error"] = 3.0, 0.1
+    bounds = {"arm": pd.DataFrame({"points": ["2DoF+6DoF", "6DoF"], "length": 20, "rms_per_noise": [0.4, 9.0]})}
+    table = per_dataset_table(accuracy, bounds, {"A": ("6DoF", "2DoF")})
+    assert table.crlb_rms_um.tolist() == pytest.approx([0.0, 40.0])
+    assert np.isnan(table.efficiency[0]) and table.efficiency[1] == pytest.approx(0.25)
+    assert table.efficiency_std_error[1] == pytest.approx(2 * 0.25 * 4 / 80)
+    assert {"ds", "relative_error_1_percent", "relative_error_1_percent_std_error"} <= set(table)
+
+
+def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
+    def block(strategy, factor):
+        columns = {"strategy": strategy, "data_set": [0, 1]}
+        for solver, shift in (("equation_11", 1.001), ("gauss_newton", 1.0)):
+            columns[f"{solver}_c1"] = np.array([1.0, 2.0]) * factor * shift
+        return pd.DataFrame(columns)
+
+    frame = pd.concat([block("A", 1.0), block("B", 1.5), block("C", 1.0)], ignore_index=True)
+    table = solver_summary({"arm": frame}).set_index("strategy")
+    assert table.closest_strategy[["A", "C"]].tolist() == ["C", "A"]
+    assert table.gauss_newton_difference["A"] == 0 and table.gauss_newton_difference["B"] == pytest.approx(0.5)
+    assert table.between_solvers.to_numpy() == pytest.approx(0.001)
+
+
+@pytest.mark.parametrize(
+    "value, error, text",
+    [
+        (4.5371, 0.539, "4.54 ± 0.54"),
+        (314.12, 13.9, "314 ± 14"),
+        (0.36660, 0.00093, "0.36660 ± 0.00093"),
+        (2.79, np.nan, "2.79"),
+        (np.inf, np.nan, "not reached"),
+        (np.nan, np.nan, ""),
+        ("kuka", np.nan, "kuka"),
+    ],
+)
+def test_values_are_worded_with_two_digits_of_their_error(value, error, text):
+    assert worded(value, error) == text
+
+
+def ours(metrics, replicates):
+    columns = {"robot": ["arm"], "mean_mm": [1.0], "mean_mm_std_error": [0.1]}
+    staged = table4(metrics, replicates, ["arm"], ["A"], 200.0, 20, 1.0, 2.0)
+    empty = pd.DataFrame({"strategy": [], "residual_mean_um": [], "share_compensated_percent": []})
+    tables = {
+        "table1": pd.DataFrame({"robot": ["arm"], "c1": [0.54]}),
+        "table2": pd.DataFrame(columns),
+        "table3": pd.DataFrame({"robot": ["arm"], "c1": [0.53], "c1_std_error": [0.01]}),
+        "table4": staged,
+        "extended": empty,
+    }
+    return OurResults(tables, metrics, replicates, 200.0, 20)
+
+
+def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference():
+    reference = pd.DataFrame(
+        [
+            ("1", "arm", "", "c1", "um_per_N", 0.54),
+            ("2", "arm", "", "deviation_mean", "mm", 0.8),
+            ("3", "arm", "6DoF", "c1", "um_per_N", 0.54),
+            ("4", "arm", "A", "k_sigma_20", "percent", 1.5),
+            ("4", "arm", "A", "dev_20", "um", 1.0),
+            ("4", "other", "A", "dev_20", "um", 1.0),
+            ("text", "arm", "", "residual_deviation_upper_bound", "um", 366.0),
+        ],
+        columns=["table", "robot", "strategy", "quantity", "unit", "value"],
+    )
+    table = comparison_table(reference, ours(metrics_of("A", 40.0), replicates_of("A", 40.0)))
+    assert (
+        table[["table", "robot", "strategy", "quantity", "unit", "paper"]].to_numpy().tolist() == reference.to_numpy().tolist()
+    )
+    assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
+    assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
+    assert table.reading[3] == "R7, R10: joints of the first stage"
+    assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
+
+
+def test_tables_for_people_escape_what_latex_would_take_for_commands(tmp_path):
+    frame = pd.DataFrame({"k_sigma_percent": ["1.0 ± 0.1"], "µm": ["5 %"]})
+    write_latex(tmp_path / "t.tex", frame)
+    write_markdown(tmp_path / "t.md", frame)
+    write_csv(tmp_path / "t.csv", pd.DataFrame({"x": [0.1, np.inf]}))
+    text = (tmp_path / "t.tex").read_text(encoding="utf-8")
+    assert r"k\_sigma\_percent" in text and r"$\pm$" in text and r"5 \%" in text and r"\textmu{}m" in text
+    assert "| 1.0 ± 0.1" in (tmp_path / "t.md").read_text(encoding="utf-8")
+    assert (tmp_path / "t.csv").read_text(encoding="utf-8") == "x\n0.1\ninf\n"
+    assert not list(tmp_path.glob("*.partial"))
+
+
+def test_facts_of_the_report_are_json_without_nan(tmp_path):
+    from elastocal.report.pages import write_report
+
+    with pytest.raises(ValueError, match="JSON"):
+        write_report(tmp_path / "study.pdf", {"x": float("nan")}, {}, [])
+    assert json.dumps([], allow_nan=False) == "[]" and not list(tmp_path.iterdir())

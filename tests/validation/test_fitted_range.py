@@ -1,0 +1,82 @@
+"""Poses outside the range of the fitted ones: by leaving each out indeed, and by draws of poses that are alike."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from planted import planted
+
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.observations import select_states
+from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
+
+FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
+
+
+def fitted_part(robot, seed, fitted, unseen):
+    """A fit of four effects to some poses, and observations of these and of others."""
+    campaign = planted(robot, {}, seed=seed, poses=fitted + unseen)
+    known = campaign.observations.states.pose < fitted
+    own, other = (select_states(campaign.observations, mask) for mask in (known, ~known))
+    added = [campaign.candidates[key] for key in FOUND]
+    declared = campaign.declared
+    return fit(declared.model.with_effects(added), own, declared.noise, declared.estimate.with_effects(added)), own, other
+
+
+def test_variances_are_those_without_the_readings_of_the_pose(fanuc):
+    fitted, own, other = fitted_part(fanuc, 1, 9, 4)
+    found, there = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
+    line = linearize(fitted.model, fitted.estimate, own, fitted.circumstances)
+    white, prior = fitted.whitened(line.sensitivities), [p.plausible**-2.0 for _, p in fitted.parameters]
+    for pose in range(9):
+        rest, here = white[own.cluster != pose], line.sensitivities[own.cluster == pose, :3]
+        covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", rest, rest) + np.diag(prior))
+        assert found[pose] == pytest.approx(np.einsum("mrp,pq,mrq->m", here, covariance, here).max(), rel=1e-6)
+    covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", white, white) + np.diag(prior))
+    around = circumstances(fitted.model, fitted.estimate, other.states)
+    away = linearize(fitted.model, fitted.estimate, other, around).sensitivities[:, :3]
+    variance = np.einsum("mrp,pq,mrq->m", away, covariance, away)
+    np.testing.assert_allclose(there, [variance[other.state == state].max() for state in range(8)], rtol=1e-6)
+
+
+def test_poses_drawn_alike_are_seldom_outside_and_larger_loads_always(fanuc):
+    """Of 180 poses beside 14, 5 % by their angles and 1 in 15 by the variance: 20 expected, 37 four standard errors away."""
+    alike = loaded = count = 0
+    for seed in range(20):
+        fitted, own, other = fitted_part(fanuc, seed, 14, 9)
+        own_variance, variance = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
+        outside = outside_fitted_range(own.states, other.states, own_variance, variance)
+        alike += np.bincount(other.states.pose - 14, outside).astype(bool).sum()
+        heavier = replace(other, states=replace(other.states, wrench=10 * other.states.wrench))
+        _, variance = predictive_variances(fitted, own, fitted.model, fitted.estimate, heavier)
+        outside = outside_fitted_range(own.states, other.states, own_variance, variance)
+        loaded += outside[other.states.load == 1].sum()
+        count += 9
+    assert 4 <= alike <= 37
+    # No range of angles tells a load ten times as large.
+    assert loaded > 0.9 * count
+
+
+def test_angles_alone_are_judged_without_variances(fanuc):
+    _, own, other = fitted_part(fanuc, 2, 20, 5)
+    states = replace(other.states, joint_angles=other.states.joint_angles + np.array([0, 0, 3.0, 0, 0, 0]))
+    assert outside_fitted_range(own.states, states).all()
+    assert not outside_fitted_range(own.states, own.states).any()
+
+
+def test_frames_of_other_sessions_do_not_count(fanuc):
+    """Whatever the frame of another session is called, only the effects say how sure the model is there."""
+    campaign = planted(fanuc, {}, seed=3, poses=20, fitted_frames=True)
+    observations = campaign.observations
+    states = replace(observations.states, session=np.where(observations.states.pose < 15, 0, 4))
+    observations = replace(observations, states=states)
+    known = states.session == 0
+    own, other = (select_states(observations, mask) for mask in (known, ~known))
+    fitted = fit(campaign.declared.model, own, campaign.declared.noise)
+    elsewhere = replace(fitted.estimate, sessions=(4,))
+    own_variance, variance = predictive_variances(fitted, own, fitted.model, elsewhere, other)
+    assert own_variance.shape == (15,) and variance.shape == (10,)
+    assert (variance > 0).any() and np.isfinite(variance).all()
+    # Unloaded, the compliances say nothing, and the frame, which would, is not counted.
+    assert (variance[other.states.load == 0] == 0).all()
