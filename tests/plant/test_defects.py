@@ -206,6 +206,15 @@ def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_speci
     assert yardstick.signal(bad).retained == pytest.approx(left @ left, rel=1e-3)
 
 
+def test_a_defect_that_these_poses_do_not_show_adds_no_direction_to_the_angle(yardstick, fanuc_specimen):
+    """A gear that stiffens at a torque that no load reaches leaves nothing to compare with."""
+    wave, runout = (
+        with_defects(fanuc_specimen, [Defect(k, (2,), 1e-4, 1)]) for k in ("transmission_harmonic", "bearing_runout")
+    )
+    assert yardstick.angle_deg(wave, [fanuc_specimen]) == 90.0
+    assert yardstick.angle_deg(wave, [fanuc_specimen, runout]) == yardstick.angle_deg(wave, [runout]) < 90.0
+
+
 @pytest.mark.parametrize("joint", [1, 4])
 def test_a_runout_moves_what_turns_with_the_joint_to_and_fro_once_and_twice_a_turn(weightless, schedule, joint):
     """And by its lean: at the joint itself by its shifts alone, across each other, once a turn the one and twice the other."""

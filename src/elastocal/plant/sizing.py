@@ -111,13 +111,17 @@ class Yardstick:
         ----------
         robot : PhysicalRobot
         others : iterable of PhysicalRobot
-            Each left with something.
+            One that is left with nothing adds no direction: a gear that stiffens at a torque that no load of these reaches.
 
         Returns
         -------
         float
+            90 where all others are left with nothing.
         """
         mine, theirs = self.left(robot), np.array([self.left(other) for other in others])
+        theirs = theirs[theirs.any(axis=1)]
+        if not len(theirs):
+            return 90.0
         _, size, directions = np.linalg.svd(theirs / np.linalg.norm(theirs, axis=1, keepdims=True), full_matrices=False)
         share = np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine)
         return float(np.degrees(np.arccos(min(share, 1.0))))
