@@ -1,4 +1,4 @@
-"""The plant shares no code with the analysis, at run time too; what it may import in its source is a contract of `make lint`."""
+"""The plant shares no code with the analysis, at run time too; what its sources may import is a contract of `make lint`."""
 
 import pkgutil
 import subprocess
