@@ -18,6 +18,11 @@ include: "workflow/rules/blind_follow_up.smk"
 include: "workflow/rules/blind_report.smk"
 
 
+onsuccess:
+    for line in outcome(file for job in workflow.dag.jobs for file in job.output):
+        logger.info(line)
+
+
 rule study:
     input:
         rules.compile_report.output.report,

@@ -13,6 +13,7 @@ ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 
 from import_closure import closure
+from outcome import outcome
 
 # What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
 # laid out, took a fifth of a rerun with nothing to do.

@@ -1,6 +1,7 @@
 """What every script does around its one call: a log, and one line where the input is at fault."""
 
 import sys
+import traceback
 
 from elastocal.errors import InputError
 
@@ -13,4 +14,7 @@ def run(step, snakemake):
         except InputError as error:
             print(error, file=log)
             sys.exit(str(error))
+        except Exception:
+            traceback.print_exc(file=log)
+            raise
         print("done", file=log)

@@ -1,0 +1,67 @@
+"""What `snakemake` says while it works: one line a job, and last of all why a job failed. The profile chooses it.
+
+Snakemake finds the module by its name. Dry runs and `--verbose` say all that Snakemake says by itself, as does its log file.
+"""
+
+import sys
+from pathlib import Path
+
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+
+# Beginnings of lines that are no news.
+_NO_NEWS = (
+    "Select jobs to execute",
+    "Execute ",
+    "Assuming unrestricted shared filesystem",
+    "Using shell",
+    "Provided cores",
+    "Rules claiming more threads",
+)
+_FAILED = "At least one job did not complete successfully."
+
+
+class LogHandler(LogHandlerBase):
+    """One line for each job that starts; of a job that failed, the last line of its log after all else."""
+
+    def __post_init__(self):
+        self._started, self._total, self._failed = 0, 0, []
+
+    writes_to_stream = True
+    writes_to_file = False
+    has_filter = False
+    has_formatter = False
+    needs_rulegraph = False
+
+    def emit(self, record):
+        """Write a record."""
+        for line in self._lines(record):
+            print(line, file=sys.stdout if self.common_settings.stdout else sys.stderr, flush=True)
+
+    def _lines(self, record):
+        event = getattr(record, "event", None)
+        if self.common_settings.dryrun or self.common_settings.verbose:
+            return [self.format(record)]
+        if event == LogEvent.RUN_INFO:
+            self._total = record.stats.get("total", 0)
+            return [f"{self._total} jobs"]
+        if event == LogEvent.JOB_INFO:
+            self._started += 1
+            return [f"{self._started} of {self._total}: {' '.join([record.rule_name, *map(str, record.wildcards.values())])}"]
+        if event == LogEvent.JOB_ERROR:
+            self._failed.append((record.rule_name, list(record.log)))
+            return [f"failed: {record.rule_name}"]
+        if event == LogEvent.ERROR and self._failed and _FAILED in record.getMessage():
+            return [_reason(rule, logs) for rule, logs in self._failed]
+        if event == LogEvent.ERROR and "CalledProcessError" in record.getMessage():
+            # What the job itself has said stands above, and why it failed below.
+            return []
+        if event in (LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.PROGRESS, LogEvent.WORKFLOW_STARTED):
+            return []
+        return [] if str(record.msg).startswith(_NO_NEWS) else [self.format(record)]
+
+
+def _reason(rule, logs):
+    """Last line of the logs of a job that failed."""
+    lines = [line for log in logs if Path(log).is_file() for line in Path(log).read_text(encoding="utf-8").splitlines()]
+    return next((line for line in reversed(lines) if line.strip()), f"{rule} failed, with nothing in its log {', '.join(logs)}")

@@ -1,0 +1,32 @@
+"""What a finished run tells: where each report is that it made and, of a campaign, the verdict."""
+
+import json
+import re
+from pathlib import Path
+
+_CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
+_REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the blind proof"}
+
+
+def outcome(made):
+    """Lines about the reports among the files that a run has made.
+
+    Parameters
+    ----------
+    made : iterable of str
+
+    Returns
+    -------
+    list of str
+    """
+    # Only a run that has made a report needs what makes its sentences.
+    from elastocal.report.first_page import sentences
+
+    lines = []
+    for path in sorted(map(str, made)):
+        if path in _REPORTS:
+            lines.append(f"{_REPORTS[path]}: {path}")
+        if match := _CAMPAIGN.fullmatch(path):
+            verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
+            lines += [f"{match[1]}: {sentences(verdict)[0]}", f"    {path}"]
+    return lines
