@@ -1,4 +1,4 @@
-"""While it works Snakemake says one line a job; at the end where the reports are and what the verdict is, or why a job failed."""
+"""While it works Snakemake says one line a job; at the end, reports and verdicts, or last of all why a job failed."""
 
 import json
 
