@@ -9,9 +9,11 @@ from dataclasses import replace
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
 
-from elastocal.campaigns.campaign import read_campaign, split, write_campaign
+from elastocal.campaigns.holdout import split
 from elastocal.campaigns.public_data import FOLDER_VARIABLE
+from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import candidates_on

@@ -12,7 +12,8 @@ pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 from elastocal.blind.carrying_out import carry_out, random_experiment
 from elastocal.blind.cases import Case, design_of, make_case
 from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
-from elastocal.campaigns.campaign import read_campaign, split
+from elastocal.campaigns.holdout import split
+from elastocal.campaigns.reading import read_campaign
 from elastocal.plant.arm import arm_from_file
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"

@@ -28,7 +28,7 @@ from elastocal.blind.cases import (
     specimen_of,
     write_manifest,
 )
-from elastocal.campaigns.campaign import read_campaign
+from elastocal.campaigns.reading import read_campaign
 from elastocal.plant.arm import LinkMass, arm_from_file
 from elastocal.plant.campaigns import schedule_of
 from elastocal.plant.defects import KINDS, with_defects

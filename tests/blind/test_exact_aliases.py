@@ -10,7 +10,7 @@ pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
-from elastocal.campaigns.reading_columns import reading_columns
+from elastocal.campaigns.columns import reading_columns
 from elastocal.fitting.case import case_from, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import circumstances, effect_columns, linearize

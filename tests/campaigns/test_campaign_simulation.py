@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import read_campaign, write_campaign
+from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from elastocal.campaigns.campaign import read_robot
+from elastocal.campaigns.reading import read_robot
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from elastocal.campaigns.campaign import write_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.writing import write_campaign
 
 PLAN = Plan(("3DoF", "6DoF"), 14, 800.0, (0, 1), (0.0, 0.5, 0.0), 2, 4, 6e-5, 6e-5)
 

@@ -8,8 +8,9 @@ from made_folders import made_folder, made_table
 from support import chain_of
 from synthetic import NOISE, made_estimate, made_model
 
-from elastocal.campaigns.campaign import Target, read_campaign
-from elastocal.campaigns.reading_columns import reading_columns, readings_from
+from elastocal.campaigns.campaign import Target
+from elastocal.campaigns.columns import reading_columns, readings_from
+from elastocal.campaigns.reading import read_campaign
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import case_from, noise_facts, noise_from
 from elastocal.fitting.least_squares import Fit, fit

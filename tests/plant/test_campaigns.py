@@ -10,7 +10,8 @@ import yaml
 from analysed_robots import ROBOTS
 
 from elastocal.blind.folders import write_blind_campaign, write_truth
-from elastocal.campaigns.campaign import read_campaign, split
+from elastocal.campaigns.holdout import split
+from elastocal.campaigns.reading import read_campaign
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import Design, continued, measured_table, schedule_of
 from elastocal.plant.defects import Defect, drawn_defect, truth_of, with_defects

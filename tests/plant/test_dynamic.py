@@ -6,7 +6,7 @@ import numpy as np
 from analysed_robots import ROBOTS
 
 from elastocal.blind.folders import write_dynamic_campaign
-from elastocal.campaigns.campaign import read_campaign
+from elastocal.campaigns.reading import read_campaign
 from elastocal.plant.defects import Defect, with_defects
 from elastocal.plant.dynamic import _unloaded, dynamic_table, moving_angles
 from elastocal.plant.physical_robot import seen_poses

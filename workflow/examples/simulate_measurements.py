@@ -7,8 +7,8 @@ the base frame; ROBOT_FILE is the robot that is measured, which may have more th
 import argparse
 from pathlib import Path
 
-from elastocal.campaigns.campaign import CSV, read_descriptions, read_robot
-from elastocal.campaigns.measurements import write_measurements
+from elastocal.campaigns.measurements import CSV, write_measurements
+from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.io.atomic_writes import appearing_whole
 

@@ -4,7 +4,7 @@ import gc
 import sys
 from pathlib import Path
 
-from elastocal.campaigns.campaign import campaign_files
+from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, user_campaign
 from elastocal.study.configuration import check_study, rows_read
 from elastocal.errors import InputError

@@ -1,15 +1,18 @@
 """Figures 2 and 3: the robot's kinematic scheme, and its springs."""
 
-from elastocal.figures import schemes
+from elastocal.figures.kinematic_scheme import kinematic_scheme
+from elastocal.figures.spring_scheme import spring_scheme
 from elastocal.figures.style import save
 from elastocal.mechanics.robot import robot_from_document
 
 from job import run
 
+SCHEMES = {"kinematic_scheme": kinematic_scheme, "spring_scheme": spring_scheme}
+
 
 def draw_scheme(job):
     robot = robot_from_document(job.params.robot)
-    save(getattr(schemes, job.params.scheme)(robot), job.output.pdf, job.output.png)
+    save(SCHEMES[job.params.scheme](robot), job.output.pdf, job.output.png)
 
 
 run(draw_scheme, snakemake)

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from elastocal.campaigns.campaign import folds_of
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa
 from elastocal.campaigns.public_data import fetch
+from elastocal.campaigns.reading import folds_of
 
 from job import run
 

@@ -1,6 +1,6 @@
 """A campaign's folder, checked, as tables: readings to fit and readings to test."""
 
-from elastocal.campaigns.reading_columns import reading_columns
+from elastocal.campaigns.columns import reading_columns
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table

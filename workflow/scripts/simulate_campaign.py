@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from elastocal.campaigns.campaign import write_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot import robot_from_document
 
 from job import run

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import yaml
 
-from elastocal.campaigns.campaign import write_campaign
+from elastocal.campaigns.writing import write_campaign
 from elastocal.io.atomic_writes import appearing_whole
 from elastocal.plant.campaigns import measured_table
 from elastocal.plant.dynamic import DYNAMIC, dynamic_table

@@ -33,7 +33,7 @@ def oracle(truth, verdict, folder, robots_folder, seed):
     verdict : dict
         Of the same case; its noise is used again.
     folder, robots_folder : str
-        As in `campaign.read_campaign`.
+        As in `reading.read_campaign`.
     seed : int
 
     Returns

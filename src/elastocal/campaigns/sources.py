@@ -2,7 +2,8 @@
 
 import re
 
-from elastocal.campaigns.campaign import DOCUMENT, read_descriptions
+from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.reading import read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
 

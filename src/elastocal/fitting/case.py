@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass, fields
 import numpy as np
 
 from elastocal.campaigns.campaign import Campaign, described_campaign
-from elastocal.campaigns.reading_columns import readings_from
+from elastocal.campaigns.columns import readings_from
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting.model import Model, declared_model
 from elastocal.fitting.noise import Noise

@@ -1,6 +1,8 @@
 """Step 1: a campaign's folder to descriptions and readings, those to fit apart from those to test."""
 
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, held_out_campaign, read_campaign, read_descriptions, split
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
+from elastocal.campaigns.holdout import split
+from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_descriptions
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
 
@@ -11,7 +13,7 @@ def taken_in(folder, robots_folder):
     Parameters
     ----------
     folder, robots_folder : str
-        As in `campaign.read_campaign`.
+        As in `reading.read_campaign`.
 
     Returns
     -------

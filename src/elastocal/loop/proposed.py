@@ -14,7 +14,7 @@ def proposed(folder, robots_folder, poses, ladder, seed):
     Parameters
     ----------
     folder, robots_folder : str
-        As in `campaign.read_campaign`.
+        As in `reading.read_campaign`.
     poses : int
         Read at all targets of the campaign.
     ladder : tuple of float

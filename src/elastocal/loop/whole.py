@@ -1,7 +1,7 @@
 """A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
 same two calls, with tables between them."""
 
-from elastocal.campaigns.reading_columns import reading_columns
+from elastocal.campaigns.columns import reading_columns
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
@@ -15,7 +15,7 @@ def cases_in(folder, robots_folder):
     Parameters
     ----------
     folder, robots_folder : str
-        As in `campaign.read_campaign`.
+        As in `reading.read_campaign`.
 
     Returns
     -------
@@ -34,7 +34,7 @@ def diagnosed(folder, robots_folder, seed, settings=None):
     Parameters
     ----------
     folder, robots_folder : str
-        As in `campaign.read_campaign`.
+        As in `reading.read_campaign`.
     seed : int
     settings : Settings, optional
 

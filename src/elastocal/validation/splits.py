@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from elastocal.campaigns.campaign import FEWEST_TRAINING_POSES
+from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.campaigns.joint_space import blocks
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import select_states, state_clusters

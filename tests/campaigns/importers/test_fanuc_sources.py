@@ -6,8 +6,9 @@ import scipy.io
 from scipy.spatial.transform import Rotation
 from support import refused
 
-from elastocal.campaigns.campaign import held_out_campaign, read_campaign, split
+from elastocal.campaigns.holdout import split
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static
+from elastocal.campaigns.reading import held_out_campaign, read_campaign
 from elastocal.mechanics.kinematics import poses
 
 OFFSETS = np.array([[0.2, 0.0, 0.05], [0.2, 0.06, -0.02], [0.15, -0.04, -0.04]])

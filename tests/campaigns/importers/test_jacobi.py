@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support import homogeneous, refused
 
-from elastocal.campaigns.campaign import held_out_campaign, read_campaign, read_robot
 from elastocal.campaigns.importers import jacobi
+from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_robot
 from elastocal.mechanics.kinematics import poses
 
 POSES = 9

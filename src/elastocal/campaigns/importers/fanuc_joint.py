@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.campaigns.campaign import read_robot
-from elastocal.campaigns.campaign import write_campaign as write_folder
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_static
 from elastocal.campaigns.importers.reflectors import reflector_table
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.reading import read_robot
+from elastocal.campaigns.writing import write_campaign as write_folder
 
 # Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
 ROBOT = "fanuc_measured"

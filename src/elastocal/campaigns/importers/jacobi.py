@@ -6,10 +6,10 @@ position of the reflector, which the nominal chain and a tool along its last axi
 
 import numpy as np
 
-from elastocal.campaigns.campaign import write_campaign as write_folder
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
 TARGET = "SMR"

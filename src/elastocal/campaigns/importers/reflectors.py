@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from elastocal.campaigns.campaign import write_campaign
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.writing import write_campaign
 
 
 def reflector_table(pose, repeat, joint_angles, positions, session=None):

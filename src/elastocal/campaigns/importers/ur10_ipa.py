@@ -5,10 +5,10 @@ from datetime import datetime
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import write_campaign as write_folder
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.writing import write_campaign as write_folder
 
 ROBOT, TARGET = "ur10", "TMac"
 # One reading of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median and

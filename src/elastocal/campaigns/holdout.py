@@ -1,0 +1,153 @@
+"""Which poses of a campaign are fitted and which are held out to test the fit."""
+
+import numpy as np
+
+from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.groups import groups_of
+from elastocal.campaigns.joint_space import blocks
+from elastocal.errors import InputError
+
+HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
+# Below these a fit or a test says nothing.
+FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
+
+
+def split(campaign):
+    """Readings to fit and readings to test, parted by whole poses.
+
+    Parameters
+    ----------
+    campaign : Campaign
+
+    Returns
+    -------
+    training, held_out : Readings
+        In the order of the file, on which the choice of poses does not depend. Where another campaign is the test, all readings
+        are training and `held_out` is empty: see `reading.held_out_campaign`.
+
+    Raises
+    ------
+    InputError
+        Too few poses, or poses that are not there.
+    """
+    held_out = held_out_mask(campaign.holdout, campaign.readings, campaign.name)
+    return campaign.readings.select(~held_out), campaign.readings.select(held_out)
+
+
+def holdout_from(described, folder, source):
+    """How a campaign parts its readings, in one way and with a seed where the poses are drawn.
+
+    Parameters
+    ----------
+    described : dict
+        ``holdout`` of ``campaign.yaml``.
+    folder : Path
+        Folder of the campaign.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        No way or more than one, a seed where nothing is drawn, or another campaign that is not there.
+    """
+    ways = [way for way in HOLDOUTS if way in described]
+    drawn = ways in (["fraction"], ["blocks"])
+    if len(ways) != 1 or ("seed" in described and not drawn):
+        allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"
+        raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
+    if "campaign" in described and not (folder / described["campaign"] / DOCUMENT).is_file():
+        raise InputError(
+            source, "holdout.campaign", repr(described["campaign"]), f"a folder with a {DOCUMENT}, relative to this one"
+        )
+    return {"seed": 1} | described if drawn else dict(described)
+
+
+def held_out_mask(holdout, readings, source):
+    """Which readings are held out.
+
+    Parameters
+    ----------
+    holdout : dict
+        As from `holdout_from`.
+    readings : Readings
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    ndarray of bool (N,)
+
+    Raises
+    ------
+    InputError
+        Too few poses, or poses that are not there.
+    """
+    pairs, index = measured_poses(readings)
+    total = len(pairs)
+    if "campaign" in holdout:
+        if total < FEWEST_TRAINING_POSES:
+            raise InputError(source, "holdout", f"{total} poses to fit", f"{FEWEST_TRAINING_POSES} or more poses")
+        return np.zeros(len(index), bool)
+    chosen = _chosen_poses(holdout, readings, pairs, index, source)
+    held_out = int(chosen.sum())
+    if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
+        found = f"{total - held_out} poses to fit and {held_out} held out"
+        raise InputError(
+            source, "holdout", found, f"at least {FEWEST_TRAINING_POSES} to fit and {FEWEST_HELD_OUT_POSES} held out"
+        )
+    return chosen[index]
+
+
+def measured_poses(readings):
+    """The poses that were measured, each once.
+
+    Parameters
+    ----------
+    readings : Readings
+
+    Returns
+    -------
+    pairs : ndarray of int32 (P, 2)
+        Session and pose, sorted.
+    index : ndarray of int (N,)
+        Of each reading's pair.
+    """
+    pairs = np.column_stack([readings.session, readings.pose])
+    first, index = groups_of(pairs)
+    return pairs[first], index
+
+
+def _chosen_poses(holdout, readings, pairs, index, source):
+    """Mask (P,) of the poses that are held out; `pairs` and `index` as of `measured_poses`."""
+    total, chosen = len(pairs), np.zeros(len(pairs), bool)
+    if "poses" in holdout:
+        for entry in holdout["poses"]:
+            match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
+            if not match.any():
+                raise InputError(
+                    source, "holdout.poses", str(entry), f"poses that were measured, {pairs[:, 1].min()}..{pairs[:, 1].max()}"
+                )
+            chosen |= match
+        return chosen
+    if "session" in holdout:
+        wanted, there = np.atleast_1d(holdout["session"]), np.unique(pairs[:, 0])
+        for session in wanted:
+            if session not in there:
+                raise InputError(
+                    source, "holdout.session", str(session), f"sessions that were measured: {', '.join(map(str, there))}"
+                )
+        return np.isin(pairs[:, 0], wanted)
+    draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
+    if "blocks" in holdout:
+        if holdout["blocks"] > total:
+            raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as poses, {total}")
+        middle = np.zeros((total, readings.joint_angles.shape[1]))
+        np.add.at(middle, index, readings.joint_angles)
+        return blocks(middle / np.bincount(index)[:, None], holdout["blocks"]) == draws.integers(holdout["blocks"])
+    chosen[draws.permutation(total)[: round(holdout["fraction"] * total)]] = True
+    return chosen

@@ -1,0 +1,230 @@
+"""A campaign's folder, read and checked before anything is fitted to it.
+
+A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or ``measurements.parquet``, one row for each reading of
+one target. All that can be told wrong without fitting anything is refused here, in one line; a unit that only a fit can tell
+wrong is left for the diagnosis to trace.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Readings, described_campaign, targets_from
+from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses
+from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_measurements, shown
+from elastocal.campaigns.reading_checks import check_angles, check_readings
+from elastocal.errors import InputError
+from elastocal.io.documents import check_document, read_document
+from elastocal.mechanics.robot import robot_from_document
+
+
+def read_campaign(folder, robots_folder, effects=None):
+    """Read a campaign and check it as a whole.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Holds ``campaign.yaml`` and the measurements.
+    robots_folder : str or Path
+        Holds the robots that a campaign may name.
+    effects : iterable of str, optional
+        Names that ``declared`` may have; not checked without.
+
+    Returns
+    -------
+    Campaign
+
+    Raises
+    ------
+    InputError
+        The first fault found: file, row and column or key, what stands there and what may.
+    """
+    folder = Path(folder)
+    source = (folder / DOCUMENT).as_posix()
+    document, robot_path = read_descriptions(folder, robots_folder)
+    robot = read_robot(robot_path)
+    targets = targets_from(document["targets"], robot.chain, source)
+    holdout = holdout_from(document.get("holdout", DEFAULT_HOLDOUT), folder, source)
+    for index, name in enumerate(document.get("declared", ())):
+        if effects is not None and name not in set(effects):
+            raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
+    table = read_measurements(folder, robot.joints, document["measured"])
+    readings = _readings(table, robot, targets)
+    check_readings(readings, table, robot, targets, source)
+    held_out_mask(holdout, readings, source)
+    return described_campaign(document | {"holdout": holdout}, robot, readings, source)
+
+
+def read_descriptions(folder, robots_folder):
+    """What a campaign says of itself, and where its robot is described.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+
+    Returns
+    -------
+    document : dict
+        Contents of ``campaign.yaml``, which follow their schema.
+    robot_path : Path
+
+    Raises
+    ------
+    InputError
+        A document that its schema refuses, or a robot that is not there.
+    """
+    source = (Path(folder) / DOCUMENT).as_posix()
+    document = read_document(source)
+    check_document(document, "campaign", source)
+    return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
+
+
+def campaign_files(folder, robots_folder):
+    """Files that a campaign is read from, those of the campaign that holds its test included.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    InputError
+        As in `read_descriptions`.
+    """
+    document, robot_path = read_descriptions(folder, robots_folder)
+    files = [Path(folder) / DOCUMENT, *(path for kind in (CSV, PARQUET) if (path := Path(folder) / kind).is_file()), robot_path]
+    other = document.get("holdout", {}).get("campaign")
+    beyond = campaign_files(Path(folder) / other, robots_folder) if other else []
+    return [path.as_posix() for path in files] + beyond
+
+
+def read_robot(path):
+    """Read a robot file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        As in `robot_from_document`, and a document that its schema refuses.
+    """
+    source = Path(path).as_posix()
+    document = read_document(source)
+    check_document(document, "robot", source)
+    return robot_from_document(document, source)
+
+
+def held_out_campaign(campaign, folder, robots_folder, effects=None):
+    """The other campaign that tests this one.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    folder : str or Path
+        Folder of `campaign`.
+    robots_folder : str or Path
+    effects : iterable of str, optional
+        As in `read_campaign`.
+
+    Returns
+    -------
+    Campaign or None
+        With its own targets and frame; all of its readings are for the test. None where this campaign holds out its own.
+
+    Raises
+    ------
+    InputError
+        A fault of the other campaign, or another chain than this one's.
+    """
+    if "campaign" not in campaign.holdout:
+        return None
+    other_folder = Path(folder) / campaign.holdout["campaign"]
+    other = read_campaign(other_folder, robots_folder, effects)
+    source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
+    if other.robot.chain != campaign.robot.chain:
+        raise InputError(
+            source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
+        )
+    poses = len(measured_poses(other.readings)[0])
+    if poses < FEWEST_HELD_OUT_POSES:
+        raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
+    return other
+
+
+def folds_of(folder, robots_folder, number, of):
+    """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `read_campaign`.
+    number : int
+        Fold, from 1.
+    of : int
+        How many folds; poses are dealt out in turn.
+
+    Returns
+    -------
+    dict
+    """
+    pairs = measured_poses(read_campaign(folder, robots_folder).readings)[0]
+    return {"poses": pairs[number - 1 :: of].tolist()}
+
+
+def _robot_path(name, folder, robots_folder, source):
+    known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
+    path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
+    if not path.is_file():
+        allowed = (
+            f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {closest_first(name, known)}"
+        )
+        raise InputError(source, "robot", repr(name), allowed)
+    return path
+
+
+def _readings(table, robot, targets):
+    reported = table.numbers(table.angles)
+    check_angles(reported, table, robot)
+    names = {target.name: index for index, target in enumerate(targets)}
+    labels = table.texts("target")
+    for index, label in enumerate(labels):
+        if label not in names:
+            raise table.cell_fault(
+                index, "target", shown(label), f"a target of {DOCUMENT}: {closest_first(label, list(names))}"
+            )
+    approach = None
+    if table.has(table.approach):
+        senses = table.numbers(table.approach)
+        wrong = ~np.isin(senses, (-1.0, 0.0, 1.0))
+        if wrong.any():
+            index, joint = np.argwhere(wrong)[0]
+            raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
+        # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
+        approach = np.sign(senses @ robot.reported_matrix.T)
+    return Readings(
+        session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
+        pose=table.integers("pose"),
+        load=table.integers("load"),
+        repeat=table.integers("repeat"),
+        target=np.array([names[label] for label in labels], np.int32),
+        joint_angles=robot.model_angles(reported),
+        wrench=table.numbers(table.wrench) if table.has(table.wrench) else np.zeros((len(table.rows), 6)),
+        position=table.numbers("xyz"),
+        rotation_vector=table.numbers(table.orientation) if table.orientation else None,
+        approach=approach,
+        time_s=table.numbers(["time_s"])[:, 0] if table.has(["time_s"]) else None,
+        temperature_c=table.numbers(["temperature_c"])[:, 0] if table.has(["temperature_c"]) else None,
+        row=table.rows,
+    )

@@ -1,0 +1,148 @@
+"""Checks of readings as a whole: what can be told wrong of them without fitting anything."""
+
+from pathlib import Path
+
+import numpy as np
+
+from elastocal.campaigns.groups import groups_of
+from elastocal.campaigns.holdout import measured_poses
+from elastocal.errors import InputError
+
+# Readings of one pose share their joint angles up to what a controller's servo error can differ.
+_SAME_POSE_RAD = 0.02
+# No joint of a serial arm reports more than one and a half turns unless its limits say so.
+_FARTHEST_RAD = 3.0 * np.pi
+# A joint this far beyond its limits is no joint at its limit.
+_BEYOND_LIMITS_RAD = 0.5
+# Positions spread over more reaches than this are not in metres. Millimetres spread so unless all lie within centimetres.
+_FARTHEST_REACHES = 10.0
+# A target sits at most about this far from its measuring point.
+_LONGEST_TOOL_M = 1.0
+
+
+def check_angles(reported, table, robot):
+    """Refuse degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
+
+    Parameters
+    ----------
+    reported : ndarray (N, n)
+        Joint angles as the controller reports them.
+    table : Measurements
+    robot : Robot
+
+    Raises
+    ------
+    InputError
+        The first such angle.
+    """
+    low, high = robot.joint_limits.T
+    farthest = max(_FARTHEST_RAD, np.abs(robot.joint_limits).max())
+
+    def inside(reported, margin=0.0):
+        angles = robot.model_angles(reported)
+        return (angles >= low - margin) & (angles <= high + margin)
+
+    # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
+    beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
+    wrong = (np.abs(reported) > farthest) | (beyond & inside(np.radians(reported)))
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        allowed = (
+            f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
+            " (counted otherwise: reported_joints of the robot file)"
+        )
+        raise table.cell_fault(index, table.angles[joint], f"{reported[index, joint]:g}", allowed)
+
+
+def check_readings(readings, table, robot, targets, source):
+    """Refuse readings that cannot be of one campaign in the units of the format.
+
+    Parameters
+    ----------
+    readings : Readings
+    table : Measurements
+        Where they were read from.
+    robot : Robot
+    targets : tuple of Target
+    source : str
+        Document of the campaign, named in errors of what is not in the table.
+
+    Raises
+    ------
+    InputError
+        The first fault: a reading that is there twice, a load that contradicts its wrench, a pose at two places, millimetres or
+        degrees, a target without a reading.
+    """
+    _check_duplicates(readings, table, targets)
+    _check_loads(readings, table)
+    _check_poses(readings, table)
+    _check_units(readings, table, robot, targets)
+    for index, target in enumerate(targets):
+        if not (readings.target == index).any():
+            raise InputError(
+                source, f"targets.{target.name}", "no reading of it", f"targets that {Path(table.path).name} has readings of"
+            )
+
+
+def _check_duplicates(readings, table, targets):
+    key = np.column_stack([readings.session, readings.pose, readings.load, readings.repeat, readings.target])
+    first, group = groups_of(key)
+    again = first[group] != np.arange(len(readings))
+    if again.any():
+        index = int(np.argmax(again))
+        session, pose, load, repeat, target = key[index]
+        of_session = f"session {session}, " if "session" in table.columns else ""
+        found = f"{of_session}pose {pose}, load {load}, repeat {repeat}, target {targets[target].name} again"
+        earlier = table.rows[first[group[index]]]
+        raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
+
+
+def _check_loads(readings, table):
+    unloaded = readings.load == 0
+    if not table.has(table.wrench) and not unloaded.all():
+        index = int(np.argmin(unloaded))
+        raise table.cell_fault(
+            index, "load", str(readings.load[index]), f"0 where there are no columns {', '.join(table.wrench)}"
+        )
+    wrong = unloaded[:, None] & (readings.wrench != 0)
+    if wrong.any():
+        index, component = np.argwhere(wrong)[0]
+        raise table.cell_fault(
+            index, table.wrench[component], f"{readings.wrench[index, component]:g} with load 0", "0 where load is 0"
+        )
+
+
+def _check_poses(readings, table):
+    pairs, pose_of = measured_poses(readings)
+    first = np.full(len(pairs), len(readings))
+    np.minimum.at(first, pose_of, np.arange(len(readings)))
+    reported = table.numbers(table.angles)
+    away = np.abs(reported - reported[first[pose_of]])
+    wrong = away > _SAME_POSE_RAD
+    if wrong.any():
+        index, joint = np.argwhere(wrong)[0]
+        earlier = table.rows[first[pose_of[index]]]
+        found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
+        raise table.cell_fault(index, table.angles[joint], found, f"readings of one pose within {_SAME_POSE_RAD} rad")
+
+
+def _check_units(readings, table, robot, targets):
+    tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
+    reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
+    for session in np.unique(readings.session):
+        members = np.flatnonzero(readings.session == session)
+        position = readings.position[members]
+        away = np.abs(position - np.median(position, axis=0))
+        if away.max() > _FARTHEST_REACHES * reach:
+            index, axis = np.unravel_index(np.argmax(away), away.shape)
+            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the readings"
+            raise table.cell_fault(
+                members[index], "xyz"[axis], found, f"metres, not millimetres; the robot reaches {reach:.3g} m"
+            )
+    if readings.rotation_vector is not None:
+        angle = np.linalg.norm(readings.rotation_vector, axis=1)
+        if angle.max() > _FARTHEST_RAD:
+            index = int(np.argmax(angle))
+            raise table.cell_fault(
+                index, "rx, ry, rz", f"a turn of {angle[index]:.4g}", "a rotation vector in rad, not degrees"
+            )

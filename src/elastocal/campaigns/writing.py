@@ -1,0 +1,43 @@
+"""A campaign's folder, written so that it is never half a campaign."""
+
+from pathlib import Path
+
+import yaml
+
+from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, write_measurements
+from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.documents import check_document
+
+
+def write_campaign(folder, document, table, joints, kind="parquet"):
+    """Write a campaign's folder; each file appears whole or not at all, ``campaign.yaml`` last.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Made where it is not there.
+    document : dict
+        Contents of ``campaign.yaml``.
+    table : dict of str to sequence
+        Columns of one length, named as in `measurement_columns`.
+    joints : int
+    kind : {"parquet", "csv"}
+
+    Raises
+    ------
+    InputError
+        A document that the schema refuses, or a column that the format does not have.
+    """
+    folder = Path(folder)
+    check_document(document, "campaign", (folder / DOCUMENT).as_posix())
+    path = folder / (PARQUET if kind == "parquet" else CSV)
+    check_column_names(table, joints, path.as_posix())
+    folder.mkdir(parents=True, exist_ok=True)
+    with appearing_whole(path) as partial:
+        write_measurements(partial, table, joints)
+        # From here to its document the folder is no campaign; nor may it hold measurements of both kinds.
+        for name in (DOCUMENT, CSV, PARQUET):
+            (folder / name).unlink(missing_ok=True)
+    with appearing_whole(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
+        yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)

@@ -1,0 +1,139 @@
+"""Poses that are held out: a split never parts a pose, depends on nothing but its seed, and leaves enough on both sides."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_cells import DOCUMENT, POSES, Cell
+from support import refused
+
+from elastocal.campaigns.holdout import split
+
+
+def poses_of(readings):
+    return set(zip(readings.session.tolist(), readings.pose.tolist(), strict=True))
+
+
+def with_sessions(cell):
+    """The same rows again as another session, with targets of its own."""
+    table = {name: 2 * column for name, column in cell.table.items()}
+    count = len(cell.table["pose"])
+    table["session"] = count * [0] + count * [7]
+    table["target"] = cell.table["target"] + [f"{name}2" for name in cell.table["target"]]
+    cell.document["targets"] = cell.document["targets"] | {"A2": DOCUMENT["targets"]["A"], "B2": DOCUMENT["targets"]["B"]}
+    cell.table = table
+
+
+def test_seed_of_a_fraction_is_1_where_none_is_given(cell):
+    cell.document["holdout"] = {"fraction": 0.2}
+    assert cell.read().holdout == {"fraction": 0.2, "seed": 1}
+
+
+def test_split_parts_no_pose_of_any_session(cell):
+    with_sessions(cell)
+    campaign = cell.read()
+    training, held_out = split(campaign)
+    assert poses_of(training).isdisjoint(poses_of(held_out))
+    assert poses_of(training) | poses_of(held_out) == {(session, pose) for session in (0, 7) for pose in range(POSES)}
+    assert len(poses_of(held_out)) == 6
+    assert sorted([*training.row, *held_out.row]) == campaign.readings.row.tolist()
+
+
+@given(st.randoms(use_true_random=False))
+def test_split_is_the_same_whatever_the_order_of_the_rows(tmp_path_factory, random):
+    cell = Cell(tmp_path_factory.mktemp("campaign"))
+    with_sessions(cell)
+    expected = poses_of(split(cell.read())[1])
+    order = list(range(len(cell.table["pose"])))
+    random.shuffle(order)
+    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
+    assert poses_of(split(cell.read())[1]) == expected
+
+
+def test_another_seed_holds_out_other_poses(cell):
+    found = set()
+    for seed in range(5):
+        cell.document["holdout"] = {"fraction": 0.3, "seed": seed}
+        held_out = frozenset(poses_of(split(cell.read())[1]))
+        assert len(held_out) == 3
+        found.add(held_out)
+    assert len(found) > 1
+
+
+def test_a_block_of_neighbours_is_held_out_by_its_seed(cell):
+    found = set()
+    for seed in range(20):
+        cell.document["holdout"] = {"blocks": 3, "seed": seed}
+        training, held_out = split(cell.read())
+        assert poses_of(training).isdisjoint(poses_of(held_out))
+        found.add(frozenset(poses_of(held_out)))
+    # Blocks part the poses: whatever the seed, it is one of three, which together are all.
+    assert len(found) == 3 and sum(map(len, found)) == POSES == len(frozenset.union(*found))
+    cell.document["holdout"] = {"blocks": 3}
+    assert cell.read().holdout == {"blocks": 3, "seed": 1}
+
+
+def test_a_block_does_not_depend_on_the_order_of_the_rows(cell):
+    cell.document["holdout"] = {"blocks": 3, "seed": 2}
+    before = poses_of(split(cell.read())[1])
+    order = np.random.default_rng(1).permutation(len(cell.table["pose"]))
+    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
+    assert poses_of(split(cell.read())[1]) == before
+
+
+@pytest.mark.parametrize("named", [7, [7]])
+def test_sessions_are_held_out_as_a_whole(cell, named):
+    with_sessions(cell)
+    cell.document["holdout"] = {"session": named}
+    training, held_out = split(cell.read())
+    assert {session for session, _ in poses_of(held_out)} == {7}
+    assert {session for session, _ in poses_of(training)} == {0}
+
+
+def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
+    with_sessions(cell)
+    cell.document["holdout"] = {"poses": [4, [7, 2]]}
+    training, held_out = split(cell.read())
+    assert poses_of(held_out) == {(0, 4), (7, 4), (7, 2)}
+    assert poses_of(training).isdisjoint(poses_of(held_out))
+
+
+def test_other_campaign_that_is_not_there_is_refused(cell):
+    cell.document["holdout"] = {"campaign": "../nowhere"}
+    with refused(cell.source, "holdout.campaign", "'../nowhere'", "campaign.yaml"):
+        cell.read()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"holdout": {}}, "holdout", ["found {}"]),
+        ({"holdout": {"fraction": 0.3, "poses": [1, 2]}}, "holdout", ["fraction, poses together", "one of"]),
+        ({"holdout": {"poses": [1, 2], "seed": 1}}, "holdout", ["poses, seed together", "one of"]),
+        ({"holdout": {"seed": 1}}, "holdout", ["seed alone", "{fraction, seed}"]),
+        ({"holdout": {"fraction": 1.0}}, "holdout.fraction", ["1.0", "between 0 and 1"]),
+        ({"holdout": {"fraction": 0.3, "seed": 1.5}}, "holdout.seed", ["1.5", "integer"]),
+        ({"holdout": {"poses": ["1"]}}, "holdout.poses[0]", ["'1'", "integer"]),
+        ({"holdout": {"poses": [[0, 1, 2]]}}, "holdout.poses[0]", ["2 or fewer"]),
+        ({"holdout": {"poses": [3, 12]}}, "holdout.poses", ["found 12", "0..9"]),
+        ({"holdout": {"poses": [3, [1, 4]]}}, "holdout.poses", ["[1, 4]", "0..9"]),
+        ({"holdout": {"poses": [3]}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
+        ({"holdout": {"poses": [1, 2, 3, 4, 5, 6]}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
+        ({"holdout": {"fraction": 0.6}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
+        ({"holdout": {"fraction": 0.3, "blocks": 3}}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
+        ({"holdout": {"session": 0, "seed": 1}}, "holdout", ["session, seed together", "{session}"]),
+        ({"holdout": {"blocks": 1}}, "holdout.blocks", ["found 1", "2 or more"]),
+        ({"holdout": {"blocks": 2.5}}, "holdout.blocks", ["2.5", "integer"]),
+        ({"holdout": {"blocks": 11}}, "holdout.blocks", ["11", "at most as many as poses, 10"]),
+        ({"holdout": {"blocks": 9}}, "holdout", ["1 held out", "2 held out"]),
+        ({"holdout": {"session": 3}}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
+        ({"holdout": {"session": [0, "x"]}}, "holdout.session[1]", ["'x'", "integer"]),
+        ({"holdout": {"session": []}}, "holdout.session", ["session"]),
+        ({"holdout": {"session": 0}}, "holdout", ["0 poses to fit and 10 held out"]),
+        ({"holdout": {"fraction": 0.1}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
+    ],
+)
+def test_faulty_holdout_is_refused_in_one_line(cell, changes, key, words):
+    cell.document |= changes
+    with refused(f"{cell.source}: {key}", key, *words):
+        cell.read()

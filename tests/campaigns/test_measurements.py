@@ -1,0 +1,130 @@
+"""Files of measurements: both kinds hold the same, and every fault of a file, a column or a cell is refused in one line."""
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from made_cells import assert_same
+from support import refused
+
+from elastocal.campaigns.reading import read_campaign
+
+
+def test_parquet_is_csv(cell):
+    from_csv = cell.read()
+    (cell.folder / "measurements.csv").unlink()
+    cell.write("parquet")
+    assert_same(read_campaign(cell.folder, cell.robots).readings, from_csv.readings)
+
+
+def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
+    cell.write()
+    path = cell.folder / "measurements.csv"
+    lines = path.read_text(encoding="utf-8").splitlines()
+    lines.insert(3, "")
+    lines.insert(5, "," * lines[0].count(","))
+    path.write_text("\ufeff" + "\n".join(line.replace(",", ", ") for line in lines), encoding="utf-8")
+    readings = read_campaign(cell.folder, cell.robots).readings
+    assert readings.row.tolist()[:5] == [1, 2, 4, 6, 7]
+    assert len(readings) == len(cell.table["pose"])
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "entry", "words"),
+    [
+        (3, "q2", "0.1.2", ["'0.1.2'", "a number"]),
+        (3, "q2", "", ["nothing", "a number"]),
+        (80, "z", "nan", ["'nan'", "finite"]),
+        (7, "fx", "inf", ["'inf'", "finite"]),
+        (7, "time_s", "-Infinity", ["'-Infinity'", "finite"]),
+        (2, "pose", "1.5", ["'1.5'", "integer"]),
+        (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
+    ],
+)
+def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
+    cell.spoil(row, column, entry)
+    with refused(cell.measurements, f"row {row}, column {column}", *words):
+        cell.read()
+
+
+def test_faulty_cell_of_a_parquet_file_is_refused_alike(cell):
+    cell.spoil(5, "x", None)
+    cell.write("parquet")
+    with refused((cell.folder / "measurements.parquet").as_posix(), "row 5, column x", "found nothing", "finite"):
+        read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize("missing", ["pose", "load", "repeat", "target", "q3", "y", "rz", "mx", "approach1"])
+def test_missing_column_is_refused(cell, missing):
+    cell.without(missing)
+    with refused(cell.measurements, "header", f"no column {missing!r}", f"{missing}: "):
+        cell.read()
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"), [("Load", "'load'?"), ("temperature", "'temperature_c'?"), ("q4", "q3, for 3 joints")]
+)
+def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
+    old = {"Load": "load", "temperature": "temperature_c", "q4": "q3"}[name]
+    cell.table = {name if column == old else column: cells for column, cells in cell.table.items()}
+    with refused(cell.measurements, "header", f"unknown column {name!r}", hint):
+        cell.read()
+
+
+def test_column_that_is_there_twice_is_refused(cell):
+    cell.write()
+    path = cell.folder / "measurements.csv"
+    path.write_text(path.read_text(encoding="utf-8").replace("q2", "q1", 1), encoding="utf-8")
+    with refused(cell.measurements, "header", "column 'q1' twice", "once"):
+        read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_other_separators_are_refused(cell, separator):
+    cell.write(separator=separator)
+    with refused(cell.measurements, "header", "separated by commas"):
+        read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [
+        (b"", "", ["an empty file"]),
+        (b"pose,load\n", "", ["no row of data"]),
+        (b"pose,load\n0,0\n0,0,0\n", "row 2", ["3 cells", "2, one for each column"]),
+        (b'pose,load\n0,"0\n', "", ["comma-separated"]),
+        (b"pose,load\n0,\xff\n", "byte 12", ["not UTF-8"]),
+    ],
+)
+def test_file_that_is_no_table_is_refused(cell, text, key, words):
+    cell.write()
+    (cell.folder / "measurements.csv").write_bytes(text)
+    with refused(cell.measurements, key, *words):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_parquet_that_cannot_be_read_is_refused(cell):
+    cell.write()
+    (cell.folder / "measurements.csv").rename(cell.folder / "measurements.parquet")
+    with refused((cell.folder / "measurements.parquet").as_posix(), "", "no readable Parquet file"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_parquet_whose_text_is_no_utf8_is_refused(cell):
+    cell.write("parquet")
+    names = pa.array([b"\xd8"] * len(cell.table["pose"]), pa.binary())
+    broken = pa.Array.from_buffers(pa.string(), len(names), names.buffers())
+    path = cell.folder / "measurements.parquet"
+    pq.write_table(pa.table(cell.table | {"target": broken}), path)
+    with refused(path.as_posix(), "", "no readable Parquet file"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_one_file_of_measurements_must_be_there(cell):
+    cell.write()
+    cell.write("parquet")
+    with refused(cell.folder.as_posix(), "", "both measurements.csv and", "one of them"):
+        read_campaign(cell.folder, cell.robots)
+    for name in ("measurements.csv", "measurements.parquet"):
+        (cell.folder / name).unlink()
+    with refused(cell.folder.as_posix(), "", "neither measurements.csv nor", "one of them"):
+        read_campaign(cell.folder, cell.robots)

@@ -1,0 +1,180 @@
+"""A campaign's folder: what it means, and that every fault of it is refused in one line."""
+
+import numpy as np
+import pytest
+from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, assert_same
+from support import refused
+
+from elastocal.campaigns.campaign import Target
+from elastocal.campaigns.holdout import split
+from elastocal.campaigns.reading import held_out_campaign, read_campaign
+from elastocal.campaigns.writing import write_campaign
+
+
+def test_campaign_is_read_as_written(cell):
+    cell.document |= {
+        "compliance": "identify",
+        "declared": ["joint_offset"],
+        "noise": {"position_m": 6e-5, "orientation_rad": 7e-5},
+        "holdout": {"fraction": 0.4, "seed": 5},
+    }
+    campaign, table = cell.read(effects=["joint_offset"]), cell.table
+    assert (campaign.name, campaign.robot.name, campaign.measured, campaign.frame) == ("cell7", "three joints", "pose", "base")
+    assert campaign.targets == (Target("A", "elbow", (0.0, 0.0, 0.1)), Target("B", "hand", None))
+    assert (campaign.compliance, campaign.declared) == ("identify", ("joint_offset",))
+    assert campaign.noise == {"position_m": 6e-5, "orientation_rad": 7e-5}
+    assert campaign.holdout == {"fraction": 0.4, "seed": 5}
+    readings = campaign.readings
+    assert len(readings) == POSES * LOADS * REPEATS * 2
+    for name in ("pose", "load", "repeat"):
+        np.testing.assert_array_equal(getattr(readings, name), table[name])
+    assert [campaign.targets[index].name for index in readings.target] == table["target"]
+    np.testing.assert_array_equal(readings.joint_angles, np.column_stack([table[f"q{j}"] for j in (1, 2, 3)]))
+    np.testing.assert_array_equal(readings.wrench, np.column_stack([table[name] for name in WRENCH]))
+    np.testing.assert_array_equal(readings.position, np.column_stack([table[name] for name in "xyz"]))
+    np.testing.assert_array_equal(readings.rotation_vector, np.column_stack([table[f"r{name}"] for name in "xyz"]))
+    np.testing.assert_array_equal(readings.approach, np.column_stack([table[f"approach{j}"] for j in (1, 2, 3)]))
+    np.testing.assert_array_equal(readings.time_s, table["time_s"])
+    np.testing.assert_array_equal(readings.temperature_c, table["temperature_c"])
+    np.testing.assert_array_equal(readings.session, np.zeros(len(readings)))
+    np.testing.assert_array_equal(readings.row, np.arange(1, len(readings) + 1))
+
+
+def test_what_a_campaign_leaves_out_has_a_default(cell):
+    cell.without("approach1", "approach2", "approach3", "time_s", "temperature_c")
+    campaign = cell.read()
+    assert (campaign.compliance, campaign.declared, campaign.noise) == ("nominal", (), None)
+    assert campaign.holdout == {"fraction": 0.3, "seed": 1}
+    assert campaign.readings.approach is campaign.readings.time_s is campaign.readings.temperature_c is None
+
+
+def test_no_wrench_column_at_all_means_no_load(cell):
+    keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
+    cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
+    cell.without(*WRENCH)
+    np.testing.assert_array_equal(cell.read().readings.wrench, np.zeros((len(keep), 6)))
+
+
+def test_orientations_are_left_aside_where_positions_are_measured(cell):
+    cell.document["measured"] = "position"
+    assert cell.read().readings.rotation_vector is None
+
+
+def test_robot_is_found_by_its_name_as_well(cell):
+    cell.document["robot"] = "planar"
+    assert cell.read().robot.name == "three joints"
+
+
+def test_joint_angles_are_those_of_the_model(cell):
+    cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]], "offset_deg": [0, -30, 0]}
+    reported = np.column_stack([cell.table[f"q{j}"] for j in (1, 2, 3)])
+    readings = cell.read().readings
+    expected = np.column_stack([reported[:, 0], -reported[:, 1] - np.pi / 6, reported[:, 1] + reported[:, 2]])
+    np.testing.assert_allclose(readings.joint_angles, expected, rtol=0, atol=1e-15)
+
+
+def test_sense_of_approach_is_that_of_the_models_joints(cell):
+    cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]]}
+    second, third = np.array(cell.table["approach2"]), np.array(cell.table["approach3"])
+    approach = cell.read().readings.approach
+    np.testing.assert_array_equal(approach[:, 1], -second)
+    np.testing.assert_array_equal(approach[:, 2], np.where(second == third, second, 0))
+
+
+def other_campaign(cell, tmp_path, **changes):
+    """Write a campaign beside the cell's, with targets of its own, and hold it out."""
+    table = cell.table | {"target": ["T"] * len(cell.table["pose"]), "repeat": list(range(len(cell.table["pose"])))}
+    document = cell.document | {"campaign": "other", "targets": {"T": DOCUMENT["targets"]["B"]}, "robot": "planar"} | changes
+    write_campaign(tmp_path / "other", document, table, 3)
+    cell.document["holdout"] = {"campaign": "../other"}
+
+
+def test_other_campaign_is_the_test_of_all_readings(cell, tmp_path):
+    other_campaign(cell, tmp_path)
+    campaign = cell.read()
+    training, held_out = split(campaign)
+    assert len(held_out) == 0
+    assert_same(training, campaign.readings)
+    other = held_out_campaign(campaign, cell.folder, cell.robots)
+    assert (other.name, [target.name for target in other.targets]) == ("other", ["T"])
+    assert len(other.readings) == len(campaign.readings)
+
+
+def test_two_campaigns_may_test_each_other(cell, tmp_path):
+    cell.write()
+    other_campaign(cell, tmp_path, holdout={"campaign": "../cell7"})
+    other = held_out_campaign(cell.read(), cell.folder, cell.robots)
+    assert held_out_campaign(other, tmp_path / "other", cell.robots).name == "cell7"
+
+
+def test_campaign_that_holds_out_its_own_poses_has_no_other(cell):
+    assert held_out_campaign(cell.read(), cell.folder, cell.robots) is None
+
+
+def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
+    other_campaign(cell, tmp_path)
+    cell.arm["chain"] = ARM["chain"].replace("0.7", "0.8")
+    campaign = cell.read()
+    with refused(cell.source, "holdout.campaign", "another chain", "the same chain"):
+        held_out_campaign(campaign, cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"robbot": "arm.yaml"}, "robbot", ["unknown key", "'robot'?"]),
+        ({"campaign": "../cell"}, "campaign", ["letters"]),
+        ({"measured": "poses"}, "measured", ["'poses'", "position | pose"]),
+        ({"frame": "world"}, "frame", ["tracker | base"]),
+        ({"compliance": "free"}, "compliance", ["nominal | identify"]),
+        ({"targets": {}}, "targets", ["what is tracked"]),
+        ({"targets": {"A": {"point": "elbow"}}}, "targets.A.offset_m", ["nothing", "unknown: fitted"]),
+        ({"targets": {"A": {"point": "elbow", "offset_m": "unkown"}}}, "targets.A.offset_m", ["'unkown'", "allowed: unknown"]),
+        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0]}}}, "targets.A.offset_m", ["3 or more entries"]),
+        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, "1"]}}}, "targets.A.offset_m[2]", ["'1'", "number"]),
+        ({"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}}, "targets.A.point", ["'elbw'", "'elbow'? (elbow, hand)"]),
+        ({"targets": {1: {"point": "elbow", "offset_m": "unknown"}}}, "targets", ["the name 1", "in quotes"]),
+        ({"targets": DOCUMENT["targets"] | {"C": DOCUMENT["targets"]["A"]}}, "targets.C", ["no reading", "measurements.csv"]),
+        ({"robot": "planer"}, "robot", ["'planer'", "'planar'? (planar)"]),
+        ({"robot": "../arm.yaml"}, "robot", ["'../arm.yaml'", "relative to this folder", "planar"]),
+        ({"declared": ["joint_ofset"]}, "declared[0]", ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"]),
+        ({"declared": ["payload", "payload"]}, "declared", ["each entry once"]),
+        ({"noise": {"position_m": 0}}, "noise.position_m", ["more than 0"]),
+        ({"noise": {"orientation_rad": 1e-4}}, "noise.position_m", ["nothing"]),
+    ],
+)
+def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
+    cell.document |= changes
+    with refused(f"{cell.source}: {key}", key, *words):
+        cell.read(effects=["joint_offset", "payload"])
+
+
+def test_declared_effects_are_not_checked_without_a_list_of_them(cell):
+    cell.document["declared"] = ["anything"]
+    assert cell.read().declared == ("anything",)
+
+
+def test_fault_of_the_robot_file_names_that_file(cell):
+    cell.arm["chain"] = "Tz(0.4) Rz(q1)"
+    with refused((cell.folder / "arm.yaml").as_posix(), "chain", "measuring point"):
+        cell.read()
+
+
+@pytest.mark.parametrize("robot", ["arm.yaml", "planar"])
+def test_missing_folder_is_refused(cell, robot):
+    with refused(cell.source, "", "readable file"):
+        read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "entry", "words"),
+    [
+        (9, "approach2", 0.5, ["0.5", "-1, 0 or 1"]),
+        (6, "target", "a", ["'a'", "'A'? (A, B)"]),
+        (6, "target", "", ["nothing", "A, B"]),
+    ],
+)
+def test_unknown_target_or_sense_is_refused_by_row_and_column(cell, row, column, entry, words):
+    cell.spoil(row, column, entry)
+    with refused(cell.measurements, f"row {row}, column {column}", *words):
+        cell.read()

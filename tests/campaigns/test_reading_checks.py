@@ -1,0 +1,70 @@
+"""Checks of readings: wrong units, contradictions and doubles are refused by row and column, and nothing that is right."""
+
+import numpy as np
+import pytest
+from made_cells import WRENCH, Cell
+from support import refused
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "entry", "words"),
+    [
+        (1, "fz", 3.0, ["3 with load 0", "0 where load is 0"]),
+        (4, "q1", 57.3, ["57.3", "rad, not degrees", "-3.14 to 3.14", "reported_joints"]),
+        (4, "q2", -4.0, ["-4", "rad, not degrees", "-1.75 to 0.79"]),
+        (40, "y", 812.4, ["812.4", "metres, not millimetres", "reaches"]),
+        (12, "rx, ry, rz", None, ["a turn of", "not degrees"]),
+    ],
+)
+def test_implausible_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
+    for name in column.split(", "):
+        cell.spoil(row, name, 45.0 if entry is None else entry)
+    with refused(cell.measurements, f"row {row}, column {column}", *words):
+        cell.read()
+
+
+def test_whole_file_in_degrees_or_millimetres_is_refused(cell, tmp_path):
+    for names, factor, words in ((["q1", "q2", "q3"], 57.3, "degrees"), (["x", "y", "z"], 1e3, "millimetres")):
+        spoilt = Cell(tmp_path / words)
+        tmp_path.joinpath(words).mkdir()
+        for name in names:
+            spoilt.table[name] = [factor * number for number in spoilt.table[name]]
+        with refused(spoilt.measurements, f"column {names[0][0]}" if factor < 100 else "column ", words):
+            spoilt.read()
+
+
+def test_joint_just_beyond_its_limit_is_no_degrees(cell):
+    for row in range(1, 9):
+        cell.spoil(row, "q2", 1.2)
+    assert len(cell.read().readings) == len(cell.table["pose"])
+
+
+def test_wrong_sign_beyond_a_limit_is_no_degrees(cell):
+    for row in range(1, 9):
+        cell.spoil(row, "q2", 1.7)
+    assert len(cell.read().readings) == len(cell.table["pose"])
+
+
+def test_joint_angles_are_judged_in_the_models_convention(cell):
+    cell.arm["reported_joints"] = {"offset_deg": [0, 180, 0]}
+    cell.table["q2"] = [angle - np.pi for angle in cell.table["q2"]]
+    assert len(cell.read().readings) == len(cell.table["pose"])
+
+
+def test_the_same_reading_twice_is_refused(cell):
+    cell.spoil(7, "repeat", 0)
+    found = "pose 0, load 1, repeat 0, target A again"
+    with refused(cell.measurements, "row 7", found, "first in row 5"):
+        cell.read()
+
+
+def test_readings_of_one_pose_at_other_angles_are_refused(cell):
+    cell.spoil(14, "q3", cell.table["q3"][8] + 0.025)
+    with refused(cell.measurements, "row 14, column q3", "0.025 rad from row 9", "within 0.02 rad"):
+        cell.read()
+
+
+def test_load_without_columns_of_the_wrench_is_refused(cell):
+    cell.without(*WRENCH)
+    with refused(cell.measurements, "row 5, column load", "found 1", "no columns fx"):
+        cell.read()

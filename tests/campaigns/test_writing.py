@@ -1,0 +1,56 @@
+"""Campaigns written to a folder: they are those read, and one that cannot be written leaves what was there."""
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from made_cells import assert_same
+from support import refused
+
+from elastocal.campaigns.measurements import measurement_columns
+from elastocal.campaigns.reading import read_campaign
+from elastocal.campaigns.writing import write_campaign
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_written_campaign_is_the_one_read(cell, tmp_path, kind):
+    first = cell.read()
+    document = cell.document | {"robot": "planar"}
+    write_campaign(tmp_path / "again", document, cell.table, 3, kind)
+    second = read_campaign(tmp_path / "again", cell.robots)
+    assert_same(first.readings, second.readings)
+    assert second.targets == first.targets
+    assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["campaign.yaml", f"measurements.{kind}"]
+
+
+def test_campaign_written_as_another_kind_leaves_one_file_of_measurements(cell, tmp_path):
+    cell.write()
+    for kind in ("csv", "parquet"):
+        write_campaign(tmp_path / "again", cell.document | {"robot": "planar"}, cell.table, 3, kind)
+    assert len(read_campaign(tmp_path / "again", cell.robots).readings) == len(cell.table["pose"])
+
+
+def test_parquet_of_a_written_campaign_carries_units_and_meanings(cell, tmp_path):
+    write_campaign(tmp_path / "again", cell.document, cell.table, 3)
+    schema = pq.read_schema(tmp_path / "again" / "measurements.parquet")
+    for name, column in measurement_columns(3).items():
+        if name in cell.table:
+            assert schema.field(name).metadata == {b"unit": column.unit.encode(), b"meaning": column.meaning.encode()}
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_campaign_that_cannot_be_written_leaves_the_one_before_it(cell, tmp_path, kind):
+    folder, document = tmp_path / "again", cell.document | {"robot": "planar"}
+    cell.write()
+    write_campaign(folder, document, cell.table, 3, kind)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with refused((folder / f"measurements.{kind}").as_posix(), "header", "'q4'"):
+        write_campaign(folder, document, cell.table | {"q4": cell.table["q3"]}, 3, kind)
+    with pytest.raises((ValueError, pa.ArrowException), match=r"argument|length"):
+        write_campaign(folder, document, cell.table | {"q3": cell.table["q3"][1:]}, 3, kind)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_document_that_the_schema_refuses_is_not_written(cell, tmp_path):
+    with refused((tmp_path / "again" / "campaign.yaml").as_posix(), "frame", "tracker | base"):
+        write_campaign(tmp_path / "again", cell.document | {"frame": "world"}, cell.table, 3)
+    assert not (tmp_path / "again").exists()

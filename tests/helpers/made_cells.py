@@ -1,0 +1,100 @@
+"""A small campaign's folder that tests spoil before they read it."""
+
+import csv
+from dataclasses import fields
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import yaml
+
+from elastocal.campaigns.campaign import Readings
+from elastocal.campaigns.reading import read_campaign
+
+ARM = {
+    "name": "three joints",
+    "chain": "Tz(0.4) Rz(q1) Tx(0.1) Ry(q2) Tx(0.7) [elbow] Ry(q3) Tx(0.6) [hand]",
+    "joint_limits_deg": [[-180, 180], [-100, 45], [-120, 120]],
+    "compliance_urad_per_Nm": [1, 2, 3],
+}
+DOCUMENT = {
+    "campaign": "cell7",
+    "robot": "arm.yaml",
+    "measured": "pose",
+    "frame": "base",
+    "targets": {"A": {"point": "elbow", "offset_m": [0, 0, 0.1]}, "B": {"point": "hand", "offset_m": "unknown"}},
+}
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+POSES, LOADS, REPEATS = 10, 2, 2
+
+
+def measured():
+    """Columns of a campaign: each pose unloaded and loaded, twice, two targets; numbers that cannot be confused."""
+    rng = np.random.default_rng(3)
+    angles = rng.uniform(-0.9, 0.7, (POSES, 3))
+    rows = []
+    for pose in range(POSES):
+        for load in range(LOADS):
+            wrench = load * (100.0 + np.arange(6) + pose)
+            for repeat in range(REPEATS):
+                for target in ("A", "B"):
+                    servo = rng.uniform(-1e-4, 1e-4, 3)
+                    readings = rng.uniform(-1, 1, 6)
+                    cells = (pose, load, repeat, target, *(angles[pose] + servo), *wrench, *readings, *rng.choice([-1, 1], 3))
+                    rows.append((*cells, 60.0 * len(rows), 20.0 + 0.01 * len(rows)))
+    names = ["pose", "load", "repeat", "target", "q1", "q2", "q3", *WRENCH, *"xyz", "rx", "ry", "rz"]
+    names += ["approach1", "approach2", "approach3", "time_s", "temperature_c"]
+    return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+
+
+class Cell:
+    """A campaign's folder that a test spoils before it reads it."""
+
+    def __init__(self, folder):
+        self.robots = folder / "robots"
+        self.folder = folder / "cell7"
+        self.document, self.arm, self.table = dict(DOCUMENT), dict(ARM), measured()
+
+    def without(self, *names):
+        for name in names:
+            del self.table[name]
+
+    def spoil(self, row, column, cell):
+        """Put something into a cell; rows are counted from 1 as in messages."""
+        self.table[column][row - 1] = cell
+
+    def write(self, kind="csv", separator=","):
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.robots.mkdir(exist_ok=True)
+        (self.robots / "planar.yaml").write_text(yaml.safe_dump(ARM), encoding="utf-8")
+        (self.folder / "arm.yaml").write_text(yaml.safe_dump(self.arm), encoding="utf-8")
+        (self.folder / "campaign.yaml").write_text(yaml.safe_dump(self.document, sort_keys=False), encoding="utf-8")
+        if kind == "parquet":
+            pq.write_table(pa.table(self.table), self.folder / "measurements.parquet")
+            return
+        with open(self.folder / "measurements.csv", "w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, delimiter=separator)
+            writer.writerow(self.table)
+            writer.writerows(zip(*self.table.values(), strict=True))
+
+    def read(self, **arguments):
+        self.write()
+        return read_campaign(self.folder, self.robots, **arguments)
+
+    @property
+    def source(self):
+        return (self.folder / "campaign.yaml").as_posix()
+
+    @property
+    def measurements(self):
+        return (self.folder / "measurements.csv").as_posix()
+
+
+def assert_same(one, other):
+    """The same readings, value for value."""
+    for field in fields(Readings):
+        left, right = getattr(one, field.name), getattr(other, field.name)
+        assert (left is None) == (right is None), field.name
+        if left is not None:
+            assert left.dtype == right.dtype, field.name
+            np.testing.assert_array_equal(left, right, err_msg=field.name)
