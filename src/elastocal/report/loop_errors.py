@@ -1,0 +1,128 @@
+"""Errors of a campaign's models on held-out poses, as tables and sentences of its report: by step, by split, by range."""
+
+from collections import Counter
+
+import numpy as np
+
+from elastocal.diagnosis.words import in_words, listed
+from elastocal.report.wording import MICRO, MILLI, counted, length, minus, percent
+
+METRICS = ("mean", "rms", "p95", "max")
+SPLITS = {"held out": "validation poses (held out)", "joint space": "block of joint space", "session": "session"}
+# More rows than these would fill pages that nobody reads; the table has them all.
+_MOST_BLOCKS = 12
+
+
+def step_rows(steps, floor_m):
+    """Rows of the table before and after; each error as a list of lines: value, interval, multiple of the noise floor."""
+    largest = max(step["heldout_max_m"] for step in steps)
+    factor, unit = (MILLI, "mm") if largest >= 1e-3 else (MICRO, "µm")
+    digits = (lambda value: f"{factor * value:.3f}") if unit == "mm" else (lambda value: f"{factor * value:.0f}")
+    rows = []
+    for step in steps:
+        cells = []
+        for metric in METRICS:
+            low, high = (step[f"heldout_{metric}_m_{end}"] for end in ("low", "high"))
+            multiple = [f"{step[f'heldout_{metric}_over_floor']:.2f} × floor"] if floor_m else []
+            interval = "–" if np.isnan(low) else f"≥ {digits(low)}" if np.isinf(high) else f"[{digits(low)}, {digits(high)}]"
+            cells.append([digits(step[f"heldout_{metric}_m"]), interval, *multiple])
+        name, number = in_words(step["step"]), str(int(step["parameters"]))
+        rows.append(
+            {"name": name, "kind": step["kind"], "parameters": number, "training": digits(step["train_rms_m"]), "cells": cells}
+        )
+    return {"unit": unit, "rows": rows}
+
+
+def split_rows(splits):
+    """Rows of the splits table: what was left out, poses, RMS error before and after, reduction; errors with intervals."""
+    if not splits:
+        return {"unit": "mm", "rows": [], "left_out": 0, "changed": False}
+    factor, unit = _error_unit([row["before_rms_m"] for row in splits] + [row["after_rms_m"] for row in splits])
+    rows, left_out = [], 0
+    changed = any(row["before_rms_m"] != row["after_rms_m"] for row in splits)
+    counts = Counter(row["split"] for row in splits)
+    for row in splits:
+        together = row["block"] == "all"
+        name = SPLITS[row["split"]]
+        if not together and counts[row["split"]] > _MOST_BLOCKS:
+            left_out += 1
+            continue
+        what = name if row["split"] == "held out" else f"every {name} in turn" if together else f"{name} {row['block']}"
+        errors = [
+            [_number(factor * row[f"{stage}_rms_m"], unit), _interval(row, f"{stage}_rms_m", factor, unit)]
+            for stage in ("before", "after")
+        ]
+        fall = [f"{_number(100 * row['reduction'], '%')} %", _interval(row, "reduction", 100, "%")]
+        rows.append(
+            {
+                "name": what,
+                "together": together,
+                "poses": str(int(row["poses"])),
+                "cells": [*errors, fall] if changed else errors[:1],
+            }
+        )
+    return {"unit": unit, "rows": rows, "left_out": left_out, "changed": changed}
+
+
+def as_judged(splits, steps, heldout):
+    """Rows of the splits, that of the held-out poses with the intervals that stand in the table of the steps.
+
+    Parameters
+    ----------
+    splits, steps : list of dict
+        Rows of splits.csv and before_after.csv.
+    heldout : dict
+        Of verdict.json.
+
+    Returns
+    -------
+    list of dict
+    """
+    ends = [step for step in steps if step["kind"] in ("declared", "effect")]
+    judged = {
+        f"{stage}_rms_m_{end}": step[f"heldout_rms_m_{end}"]
+        for stage, step in (("before", ends[0]), ("after", ends[-1]))
+        for end in ("low", "high")
+    }
+    judged |= dict(zip(("reduction_low", "reduction_high"), heldout["reduction_ci95"], strict=True))
+    return [row | judged if row["split"] == "held out" else row for row in splits]
+
+
+def range_sentence(heldout):
+    """How many validation poses lie outside the range of the fitted ones, and what the errors are inside and outside."""
+    by_range, poses = heldout["outside_range"], counted(heldout["poses"], "validation pose")
+    share = (
+        f"With 95 % confidence at least {percent(heldout['share_below_max'])} of all poses drawn like the validation poses "
+        "have smaller errors than the largest found."
+    )
+    count = by_range["poses"]
+    if not count:
+        return f"All {poses} lie within the range of the fitted poses. {share}"
+    ends = [(where, by_range[key]) for where, key in (("within", "inside"), ("outside", "outside")) if by_range[key]]
+    each = []
+    for where, errors in ends:
+        stages = (length(errors[stage]["rms_m"]) for stage in ("before", "after"))
+        each.append(f"{_before_and_after(*stages)} {where}")
+    return (
+        f"{count} of {poses} {'lies' if count == 1 else 'lie'} outside the range of the fitted poses: errors there are "
+        f"extrapolated. The RMS error is {listed(each)} that range. {share}"
+    )
+
+
+def _before_and_after(before, after):
+    return after if before == after else f"{before} before and {after} after"
+
+
+def _error_unit(lengths_m):
+    return (MILLI, "mm") if max(lengths_m) >= 1e-3 else (MICRO, "µm")
+
+
+def _number(value, unit):
+    return f"{value:.3f}" if unit == "mm" else minus(f"{value:.0f}")
+
+
+def _interval(row, name, factor, unit):
+    low, high = (factor * row[f"{name}_{end}"] for end in ("low", "high"))
+    if np.isnan(low) or np.isnan(high):
+        return "–"
+    return f"≥ {_number(low, unit)}" if np.isinf(high) else f"[{_number(low, unit)}, {_number(high, unit)}]"

@@ -1,0 +1,57 @@
+"""The next experiment that a campaign's report proposes: the states to measure, and what is said of them."""
+
+import re
+
+import numpy as np
+
+from elastocal.diagnosis.words import in_words
+from elastocal.report.wording import minus, plain
+
+
+def experiment_facts(rows, said=None):
+    """Table of the states proposed, angles in degrees, and what is said of them.
+
+    Parameters
+    ----------
+    rows : list of dict
+        Of next_experiment.csv.
+    said : dict, optional
+        Of verdict.json: ``sentence``, or the ``reason`` why nothing is proposed.
+
+    Returns
+    -------
+    dict
+    """
+    said = said or {}
+    sentence = said.get("sentence") or (f"No further measurement is proposed: {said['reason']}." if said.get("reason") else "")
+    found = {"sentence": in_words(sentence), "loaded": False, "approach": False, "heads": [], "rows": [], "gains": []}
+    if not rows:
+        return found
+    angles = [name for name in rows[0] if re.fullmatch(r"q\d+", name)]
+    loads = {"fx": "N", "fy": "N", "fz": "N", "mx": "N·m", "my": "N·m", "mz": "N·m"}
+    # Nothing is said of loads where all states are unloaded.
+    loads = loads if any(row[name] for row in rows for name in loads) else {}
+    sides = [name for name in rows[0] if re.fullmatch(r"approach\d+", name)]
+    weighed = any(row.get("reference_weight_kg") for row in rows)
+    heads = ["point", *(f"{name} °" for name in angles), *(f"{name} {unit}" for name, unit in loads.items())]
+    heads += [*(["approach"] if sides else []), *(["weight kg"] if weighed else []), "separation"]
+    several = len({row["effect"] for row in rows}) > 1
+    shown, gains = [], []
+    for row in rows:
+        cells = [row["point"], *(f"{np.degrees(row[name]):.1f}" for name in angles)]
+        cells += [f"{round(row[name])}" for name in loads]
+        cells += ["".join("-0+"[int(np.sign(row[name])) + 1] for name in sides)] if sides else []
+        cells += [plain(row["reference_weight_kg"])] if weighed else []
+        cells.append(plain(row["separation"]))
+        name = in_words(row["effect"])
+        shown.append(([name] if several else []) + [minus(cell) for cell in cells])
+        last = (name, plain(row["separation_without"]), plain(row["separation"]))
+        gains = [gain for gain in gains if gain[0] != last[0]] + [last]
+    heads = (["effect"] if several else []) + heads
+    return found | {
+        "loaded": bool(loads),
+        "approach": bool(sides),
+        "heads": heads,
+        "rows": shown,
+        "gains": [list(gain) for gain in gains],
+    }

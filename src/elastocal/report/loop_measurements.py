@@ -1,0 +1,125 @@
+"""What a campaign measured and how noisy it is, as rows and sentences of its report."""
+
+from collections import Counter
+
+import numpy as np
+
+from elastocal.diagnosis.words import listed
+from elastocal.report.wording import MICRO, counted, grouped, length, percent, plain
+
+NOISE_SOURCES = {
+    "repeats": "The noise is taken from the differences between repeats of the same state.",
+    "declared": "The noise is taken as the campaign declares it; there are too few repeats to check it.",
+    "residual": "The noise is not known: with neither repeats nor a declared noise the residual itself was taken for it.",
+}
+
+
+def measured(table, descriptions):
+    """Rows of what was measured: name, training, held out.
+
+    Parameters
+    ----------
+    table : dict of str to ndarray
+        Columns of the residuals table.
+    descriptions : dict
+        Contents of campaign.json.
+
+    Returns
+    -------
+    list of list of str
+    """
+    held_out = table["held_out"].astype(bool)
+    campaigns = [descriptions["campaign"], (descriptions["held_out"] or descriptions)["campaign"]]
+    parts = [
+        _part({name: values[mask] for name, values in table.items()}, campaign)
+        for mask, campaign in zip((~held_out, held_out), campaigns, strict=True)
+    ]
+    return [[name, *(part[name] for part in parts)] for name in parts[0]]
+
+
+def noise_rows(noise, with_orientation):
+    """Rows of the noise: name, value with unit."""
+    rows = [["sensor, each component of a position", length(noise["position_m"])]]
+    if with_orientation:
+        rows.append(["sensor, each component of an orientation", f"{plain(MICRO * noise['orientation_rad'])} µrad"])
+    if any(noise["joint_rad"]):
+        rows += [
+            [f"repeatability of joint {joint}", f"{plain(MICRO * value)} µrad"]
+            for joint, value in enumerate(noise["joint_rad"], 1)
+        ]
+    rows.append(["error of every joint common to all measurements of a pose", f"{plain(MICRO * noise['pose_rad'])} µrad"])
+    rows.append(["noise that the final model leaves, over the noise above", plain(noise["factor"])])
+    if noise["degrees_of_freedom"]:
+        rows.append(["contrasts between repeats behind it", grouped(noise["degrees_of_freedom"])])
+    return rows
+
+
+def misfit_sentence(misfit):
+    """What the models leave on the fitted poses, against the noise.
+
+    Parameters
+    ----------
+    misfit : dict of str to float, or None
+        Of verdict.json.
+
+    Returns
+    -------
+    str
+        Empty where nothing was fitted.
+    """
+    if not misfit:
+        return ""
+    before, after = plain(misfit["before"]), plain(misfit["after"])
+    if before == after:
+        return f"On the fitted poses the declared model leaves a mean square of {before} times that of the noise."
+    return (
+        f"On the fitted poses the declared model leaves a mean square of {before} times that of the noise, the most probable "
+        f"model {after} times."
+    )
+
+
+def _part(part, campaign):
+    """What was measured in one part of the readings."""
+    if not len(part["pose"]):
+        return dict.fromkeys(("campaign", "measurements"), "none")
+    states = _distinct(part, "session", "pose", "load")
+    repeats = Counter(map(tuple, np.column_stack([part[name] for name in ("session", "pose", "load", "target")])))
+    each = np.array(list(repeats.values()))
+    force = np.linalg.norm([part[name] for name in ("fx", "fy", "fz")], axis=0)
+    loaded = force[force > 0]
+    of_names = list(campaign["targets"].items())
+    used = [of_names[number] for number in np.unique(part["target"])]
+    kind = "position and orientation" if campaign["measured"] == "pose" else "position"
+    frame = "the tracker's; its placement is fitted" if campaign["frame"] == "tracker" else "the base's"
+    loads = "none"
+    if len(loaded):
+        ends = (
+            [plain(loaded.min())]
+            if np.isclose(loaded.min(), loaded.max(), rtol=1e-3)
+            else map(plain, (loaded.min(), loaded.max()))
+        )
+        numbers = counted(len(np.unique(part["load"][force > 0])), "load")
+        loads = f"{numbers} of {' to '.join(ends)} N on {percent(len(loaded) / len(force))} of the measurements"
+    return {
+        "campaign": campaign["campaign"],
+        "measurements": f"{grouped(len(part['pose']))}, each a {kind}",
+        "poses": counted(_distinct(part, "session", "pose"), "pose") + f" in {counted(_distinct(part, 'session'), 'session')}",
+        "states (pose and load)": grouped(states),
+        "loads": loads,
+        "targets": listed(
+            (
+                f"{name} on {target['point']}" + (", place fitted" if target["offset_m"] == "unknown" else "")
+                for name, target in used
+            ),
+            12,
+        ),
+        "repeats of a state": str(each.min())
+        if each.min() == each.max()
+        else f"{each.min()} to {each.max()}, median {np.median(each):g}",
+        "coordinate frame": frame,
+        "time": "recorded" if np.isfinite(part["time_s"]).any() else "not recorded",
+    }
+
+
+def _distinct(part, *names):
+    return len(np.unique(np.column_stack([part[name] for name in names]), axis=0))

@@ -1,0 +1,67 @@
+"""How a campaign was diagnosed: numbers of the method, its settings, and candidates that could not be tested."""
+
+import re
+
+from elastocal.diagnosis.words import listed, physical_name
+from elastocal.report.wording import as_sentence, capital, counted, grouped, members_words, percent, words
+
+
+def method(verdict, descriptions):
+    """Numbers and names that the account of the method states.
+
+    Parameters
+    ----------
+    verdict : dict
+        Contents of verdict.json.
+    descriptions : dict
+        Contents of campaign.json.
+
+    Returns
+    -------
+    dict of str to str or bool
+    """
+    other, settings = descriptions["held_out"], verdict["settings"]
+    declared = descriptions["campaign"]["declared"]
+    return {
+        "tested": grouped(verdict["candidates_tested"]),
+        "listed": grouped(verdict["candidates_tested"] + len(verdict["untestable"])),
+        "draws": grouped(settings["alarm_draws"]["value"]),
+        "level": percent(settings["alarm_level"]["value"]),
+        "prior": percent(settings["mechanism_probability"]["value"]),
+        "named": percent(settings["named_probability"]["value"]),
+        "held_out": counted(verdict["heldout"]["poses"], "pose"),
+        "where": f" of another campaign ({other['campaign']['campaign']})" if other else "",
+        "declared": listed(map(physical_name, declared)) if declared else "",
+        "identified": descriptions["campaign"]["compliance"] == "identify",
+    }
+
+
+def setting_rows(settings):
+    """Rows of the settings: name, value, reason."""
+    rows = []
+    for name, entry in settings.items():
+        values = entry["value"] if isinstance(entry["value"], (list, tuple)) else [entry["value"]]
+        rows.append([words(name), ", ".join(f"{value:g}" for value in values), as_sentence(entry["reason"])])
+    return rows
+
+
+def untestable_rows(untestable):
+    """Candidates that were not tested, one row for each effect and reason.
+
+    Parameters
+    ----------
+    untestable : dict of str to str
+        Reason by candidate.
+
+    Returns
+    -------
+    list of list of str
+    """
+    found = {}
+    for key, reason in untestable.items():
+        # Reasons that differ from joint to joint are one reason.
+        alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)
+        alike = alike.replace("no approach", "no direction of approach")
+        found.setdefault((re.split(r"[@\[]", key)[0], alike), []).append(key)
+    rows = [[capital(physical_name(effect)), members_words(keys, 4) or "–", reason] for (effect, reason), keys in found.items()]
+    return sorted(rows, key=lambda row: (row[2], row[0]))

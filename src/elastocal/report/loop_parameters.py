@@ -1,0 +1,100 @@
+"""Parameters of a campaign's final model as rows of its report: those identified and those that are not."""
+
+from collections import Counter
+
+import numpy as np
+
+from elastocal.diagnosis.words import candidate_words, listed
+from elastocal.report.wording import capital, scaled, words
+
+# A standard error above this share of the prior's says what the prior says.
+_OF_THE_PRIOR = 0.7
+# More than these would fill pages that nobody reads; the tables have them all.
+_MOST_OTHERS = 40
+
+
+def compliance_rows(compliance):
+    """Rows of the compliances: joint, before, after with its standard error."""
+    rows = []
+    for joint, (before, after, error) in enumerate(
+        zip(*(compliance[name] for name in ("before", "after", "std_error")), strict=True), 1
+    ):
+        if not error:
+            rows.append([str(joint), f"{before:.4g}", f"{after:.4g}"])
+            continue
+        decimals = max(0, 1 - int(np.floor(np.log10(error))))
+        rows.append([str(joint), f"{before:.{decimals}f}", f"{after:.{decimals}f} ± {error:.{decimals}f}"])
+    return rows
+
+
+def other_parameters(verdict, parameters):
+    """Estimates of the declared model beside the compliances, and how many there are of them, of frames and of targets.
+
+    Parameters
+    ----------
+    verdict : dict
+        Contents of verdict.json.
+    parameters : dict of str to ndarray
+        Of the final model.
+
+    Returns
+    -------
+    dict
+        ``rows`` of the table, how many more there are (``left_out``), and ``placement`` in words.
+    """
+    mine = {member for effect in verdict["effects"] for member in effect.get("members", [])}
+    rows, counts = [], Counter()
+    columns = (parameters[name] for name in ("owner", "parameter", "value", "std_error", "unit", "held", "prior_std"))
+    for owner, name, value, error, unit, held, prior in zip(*columns, strict=True):
+        if held or owner in mine or owner in ("fit", "joint_compliance") or mostly_prior(error, prior):
+            continue
+        kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
+        counts[kind] += 1
+        if kind == "declared":
+            rows.append([capital(candidate_words(owner)), words(name), *scaled(value, error, unit)])
+    placed = counts["frame"] + counts["target"]
+    return {
+        "rows": rows[:_MOST_OTHERS],
+        "left_out": max(len(rows) - _MOST_OTHERS, 0),
+        "placement": listed(f"{counts[kind]} of {kind}s" for kind in ("frame", "target") if counts[kind]) if placed else "",
+    }
+
+
+def held_rows(held):
+    """Parameters that the measurements do not determine, one row for each owner."""
+    owners = {}
+    for name in held:
+        owner, parameter = name.rsplit(" ", 1)
+        owners.setdefault(owner, []).append(words(parameter))
+    return [[capital(candidate_words(owner)), ", ".join(names)] for owner, names in owners.items()]
+
+
+def left_to_priors(parameters):
+    """Parameters about which the measurements say hardly more than their priors.
+
+    Parameters
+    ----------
+    parameters : dict of str to ndarray
+        Of the final model.
+
+    Returns
+    -------
+    list of str
+        Owner and name, as in ``held`` of verdict.json.
+    """
+    mine = mostly_prior(parameters["std_error"], parameters["prior_std"]) & ~parameters["held"].astype(bool)
+    return [f"{owner} {name}" for owner, name in zip(parameters["owner"][mine], parameters["parameter"][mine], strict=True)]
+
+
+def mostly_prior(std_error, prior_std):
+    """Whether a standard error says hardly more than the prior's.
+
+    Parameters
+    ----------
+    std_error, prior_std : float or ndarray
+
+    Returns
+    -------
+    bool or ndarray of bool
+    """
+    return std_error > _OF_THE_PRIOR * prior_std

@@ -1,0 +1,22 @@
+"""The method stands with every setting, and with every candidate that could not be tested."""
+
+from made_loop_facts import CAMPAIGNS, facts_of
+
+from elastocal.report.loop_method import untestable_rows
+
+
+def test_every_setting_is_listed_with_value_and_reason():
+    rows = facts_of(CAMPAIGNS["named"])["settings"]
+    assert len(rows) == len(CAMPAIGNS["named"]["settings"]) and all(map(all, rows))
+    assert ["alarm level", "0.02"] in [row[:2] for row in rows]
+    assert ["scales", "0.01, 0.03, 0.1, 0.3, 1"] in [row[:2] for row in rows]
+
+
+def test_candidates_that_cannot_be_tested_are_gathered_by_reason():
+    reason = "4{} angles of joint {} where 72 are needed"
+    harmonics = {f"transmission_harmonic@{k}[orders 13-18]": reason.format(k, k) for k in (1, 2)}
+    assert untestable_rows(CAMPAIGNS["named"]["untestable"] | harmonics) == [
+        ["Hysteresis", "joints 1, 2 and 3", "no direction of approach in the data"],
+        ["Drift of the tracker or of the robot's foot", "–", "no time in the data"],
+        ["Gear transmission error", "joints 1 and 2: orders 13-18", "too few different joint angles"],
+    ]
