@@ -12,8 +12,9 @@ from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
 from elastocal.campaigns.columns import reading_columns
 from elastocal.fitting.case import case_from, noise_from
+from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import circumstances, effect_columns, linearize
+from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.noise_estimation import noise_of
 from elastocal.loop.loading import taken_in
 

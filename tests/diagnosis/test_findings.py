@@ -9,7 +9,7 @@ from planted import planted
 from elastocal.diagnosis.averaging import Averaged
 from elastocal.diagnosis.findings import fault_entry, implausible, location_words, parameter_entries, sag_entries
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.fitting.model import predict
+from elastocal.fitting.prediction import predict
 
 WORDS = {
     ("joint_offset", (3,)): "joint 3",

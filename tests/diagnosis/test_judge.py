@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.elastostatics import generalized_forces

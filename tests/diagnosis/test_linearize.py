@@ -21,7 +21,7 @@ from elastocal.diagnosis.other import competitors
 from elastocal.diagnosis.search import first_look
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import residuals
+from elastocal.fitting.prediction import residuals
 
 SETTINGS = Settings()
 KEYS = ("joint_offset@2", "joint_offset@3", "joint_tilt@2", "link_elasticity@3", "payload", "link_geometry@4")

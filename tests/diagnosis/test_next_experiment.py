@@ -23,8 +23,8 @@ from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import stepped
 from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.parameters import stepped
 
 SETTINGS = Settings(pose_steps=(0.0, 2.0), other_features=6)
 RAISED = Alarm(0.002, 10.0, True)

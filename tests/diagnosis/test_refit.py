@@ -11,7 +11,7 @@ from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remainin
 from elastocal.diagnosis.search import Model, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.model import linearize
+from elastocal.fitting.linearization import linearize
 
 SETTINGS = Settings()
 

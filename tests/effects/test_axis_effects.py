@@ -20,9 +20,10 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.displacement import circumstances, displaced_coordinates
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import circumstances, displaced_coordinates, predict
 from elastocal.fitting.observations import Observations
+from elastocal.fitting.prediction import predict
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
 

@@ -24,7 +24,8 @@ from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.effects.protocol import Shape
-from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import linearize
 from elastocal.mechanics.kinematics import poses
 
 # The table of the design, without the data family: that is no physics.

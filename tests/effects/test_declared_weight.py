@@ -23,8 +23,11 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.declared_weight import candidate
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import offered, with_springs
+from elastocal.fitting.displacement import circumstances, displaced_coordinates
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import circumstances, displaced_coordinates, linearize, parameters, residuals
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.prediction import residuals
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Mass, MeasuringPoint
 from elastocal.mechanics.sites import sites_of

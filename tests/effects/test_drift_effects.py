@@ -21,8 +21,9 @@ from synthetic import (
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.protocol import progress_of
+from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import circumstances, predict
+from elastocal.fitting.prediction import predict
 from elastocal.mechanics.kinematics import poses
 
 CHAINS = ["fanuc", "ur10", "fixed rotations"]

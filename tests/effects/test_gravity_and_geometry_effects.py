@@ -10,7 +10,8 @@ from synthetic import candidate_on, circumstances_on, displacements, made_estima
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.model import circumstances, predict
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.prediction import predict
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Mass, MeasuringPoint
 from elastocal.mechanics.sites import sites_of

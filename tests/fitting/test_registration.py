@@ -9,7 +9,8 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly, with
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.model import circumstances, residuals
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.prediction import residuals
 from elastocal.fitting.registration import registered
 
 KNOWN_M, KNOWN_RAD = 1e-6, 1e-6

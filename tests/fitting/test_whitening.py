@@ -7,7 +7,8 @@ import pytest
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations
 from elastocal.fitting.whitening import whitening

@@ -10,9 +10,12 @@ from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.effects.protocol import circumstances_of
-from elastocal.fitting.model import Estimate, Model, circumstances, parameters, predict, residuals, stepped
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.parameters import parameters, stepped
+from elastocal.fitting.prediction import predict, residuals
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.robot import Compensator
 from elastocal.mechanics.sites import sites_of

@@ -13,9 +13,10 @@ from elastocal.campaigns.columns import reading_columns, readings_from
 from elastocal.campaigns.reading import read_campaign
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import case_from, noise_facts, noise_from
-from elastocal.fitting.least_squares import Fit, fit
-from elastocal.fitting.model import parameters
+from elastocal.fitting.fit_result import Fit
+from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
+from elastocal.fitting.parameters import parameters
 from elastocal.io.storage import TableSchema, read_table, write_table
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
 from elastocal.loop.loading import taken_in

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from planted import planted
 
+from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import select_states
 from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
 

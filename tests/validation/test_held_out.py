@@ -9,10 +9,11 @@ from planted import ELBOW_AND_HAND, planted
 from scipy.stats import t as student
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
+from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit, fit_frames
-from elastocal.fitting.model import circumstances, predict
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
+from elastocal.fitting.prediction import predict
 from elastocal.validation.held_out import (
     METRICS,
     Errors,

@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M
-from elastocal.fitting.model import joint_compliances
+from elastocal.fitting.displacement import joint_compliances
 
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's.

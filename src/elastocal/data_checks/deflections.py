@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
-from elastocal.fitting.least_squares import solve_identifiable
+from elastocal.fitting.identifiability import solve_identifiable
 from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians

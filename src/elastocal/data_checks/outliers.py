@@ -15,10 +15,13 @@ from elastocal.data_checks.placement import (
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.effects.catalogue import declared_candidates
-from elastocal.fitting.least_squares import fit, observations_at_once
-from elastocal.fitting.model import circumstances, declared_model, residuals
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.memory import observations_at_once
+from elastocal.fitting.model import declared_model
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import averaged, part_at, parts_of, select_states, spread_poses
+from elastocal.fitting.prediction import residuals
 
 NAMES, FAMILY, AFTER = ("outliers",), "data", ("constant_columns", "alternatives", "loads", "shuffled_rows", "implausible")
 

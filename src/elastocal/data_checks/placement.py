@@ -9,8 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from elastocal.fitting.model import declared_model, measured_in_base
+from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import registered
 from elastocal.mechanics.kinematics import poses, rotation_vectors
 

@@ -13,8 +13,8 @@ from elastocal.diagnosis.linearize import linearized, searched_part, shapes_look
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
 from elastocal.diagnosis.search import first_look, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
+from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.model import joint_compliances
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.random_streams import stream
 

@@ -8,7 +8,7 @@ from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
 from elastocal.effects import payload
 from elastocal.effects.protocol import lever_m
-from elastocal.fitting.model import effect_columns
+from elastocal.fitting.linearization import effect_columns
 
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001

@@ -6,9 +6,10 @@ import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
 from elastocal.effects.protocol import offered
+from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit_frames
-from elastocal.fitting.model import circumstances, measured_in_base, residuals
 from elastocal.fitting.observations import each_approach, state_clusters
+from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
 from elastocal.validation.held_out import (

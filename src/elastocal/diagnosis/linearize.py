@@ -11,9 +11,11 @@ from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_
 from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
 from elastocal.effects.protocol import at_states, offered
-from elastocal.fitting.model import bends as shape_parameters
-from elastocal.fitting.model import circumstances, effect_columns, linearize, parameter_values
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses
+from elastocal.fitting.parameters import bends as shape_parameters
+from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
 
 # Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.

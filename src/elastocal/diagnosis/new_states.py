@@ -14,8 +14,10 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import other
-from elastocal.fitting.model import circumstances, effect_columns, linearize, parameters
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.parameters import parameters
 from elastocal.fitting.whitening import whitening
 from elastocal.mechanics.robot import STANDARD_GRAVITY
 

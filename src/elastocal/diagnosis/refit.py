@@ -15,7 +15,7 @@ import numpy as np
 
 from elastocal.diagnosis.linearize import declared_geometry
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.model import parameter_values
+from elastocal.fitting.parameters import parameter_values
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from scipy.linalg import helmert
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import each_approach, select_states, without_wild_repeats
 
 # Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.

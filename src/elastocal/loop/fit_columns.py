@@ -3,7 +3,8 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.fitting.model import Estimate, parameters
+from elastocal.fitting.model import Estimate
+from elastocal.fitting.parameters import parameters
 
 
 def parameter_columns(fitted):

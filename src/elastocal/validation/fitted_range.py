@@ -3,8 +3,9 @@
 import numpy as np
 
 from elastocal.campaigns.joint_space import beyond_range
-from elastocal.fitting.least_squares import observations_at_once
-from elastocal.fitting.model import circumstances, linearize
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.observations import part_at, parts_of, state_clusters
 
 

@@ -6,10 +6,13 @@ import numpy as np
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from elastocal.fitting.least_squares import fit_frames, observations_at_once
-from elastocal.fitting.model import circumstances, linearize, residuals
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import reading_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states
+from elastocal.fitting.prediction import residuals
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95

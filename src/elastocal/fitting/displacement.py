@@ -1,0 +1,106 @@
+"""Where the robot yields to under its loads and effects, as coordinates of its sites."""
+
+import numpy as np
+
+from elastocal.effects import declared_weight
+from elastocal.effects.protocol import MASS_PARAMETERS, at_coordinates, circumstances_of, with_springs
+
+# Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
+# 3 kN, from ten micrometres at the commanded pose.
+_PASSES = 2
+
+
+def circumstances(model, estimate, states, coordinates=None):
+    """What the effects of a model may depend on, in some states.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+        Its joint compliances and masses, where they are parameters, and where it takes the robot to, at which loads are taken.
+    states : States
+    coordinates : ndarray (S, C), optional
+        Where the robot has yielded to; found without.
+
+    Returns
+    -------
+    Circumstances
+    """
+    compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
+    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
+    for _ in range(_PASSES if coordinates is None else 0):
+        around = at_coordinates(around, displaced_coordinates(model, estimate, around))
+    return around
+
+
+def joint_compliances(model, estimate):
+    """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones where they are parameters."""
+    return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
+
+
+def mass_corrections(model, estimate):
+    """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Circumstances`."""
+    return _values_of(declared_weight.EFFECT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
+
+
+def _values_of(name, model, estimate, otherwise):
+    for effect, values in zip(model.effects, estimate.coefficients, strict=True):
+        if effect.effect == name:
+            return values
+    return otherwise
+
+
+def with_springs_of(model, estimate, circumstances):
+    """Circumstances with the joint compliances and masses of an estimate, where they are parameters.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    circumstances : Circumstances
+
+    Returns
+    -------
+    Circumstances
+    """
+    return with_springs(circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
+
+
+def displaced_coordinates(model, estimate, circumstances):
+    """Coordinates of the sites in each state: joint angles, springs under load and effects.
+
+    Springs yield to the total load, the external one and the weight that the robot file declares.
+
+    Returns
+    -------
+    ndarray (S, C)
+    """
+    around = with_springs_of(model, estimate, circumstances)
+    displaced = np.zeros((len(around.joint_angles), model.sites.chain.coordinates))
+    displaced[:, : model.sites.joints] = around.joint_angles
+    if not model.identifies_compliance:
+        displaced[:, : model.sites.joints] += around.total[:, : model.sites.joints] * model.nominal_compliance
+    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        # The errors of masses are part of the total load.
+        if effect.effect != declared_weight.EFFECT:
+            displace(displaced, effect, values, shapes, around)
+    return displaced
+
+
+def displace(displaced, effect, values, shapes, around):
+    """Add what an effect does to the coordinates of the sites, in place.
+
+    Parameters
+    ----------
+    displaced : ndarray (S, C)
+    effect : Candidate
+    values : ndarray (D,)
+        Its linear parameters.
+    shapes : ndarray
+        Its shape parameters.
+    around : Circumstances
+        Of the S states.
+    """
+    for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
+        for coordinate, per_unit in law.items():
+            displaced[:, coordinate] += value * per_unit

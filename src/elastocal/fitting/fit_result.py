@@ -1,0 +1,97 @@
+"""A model fitted to observations, and what is asked of it: estimate, covariance, weights, whitened sensitivities."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.effects.protocol import at_states
+from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.memory import observations_at_once
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.observations import part_at, parts_of
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.whitening import Whitening, whitening
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to observations.
+
+    Attributes
+    ----------
+    model : Model
+    estimate : Estimate
+    noise : Noise
+    held : ndarray of bool (P,)
+        Parameters that the data cannot tell.
+    covariance : ndarray (P, P)
+        Of the parameters; zero where held.
+    weights : ndarray (M,)
+        Robust weight of each observation.
+    whitener : Whitening
+    residual : ndarray (M, rows)
+        m and rad, base axes.
+    joint_jacobian : ndarray (M, rows, n) or None
+        Of each target with respect to the joints; None where there are too many to keep it.
+    circumstances : Circumstances or None
+        Of the states fitted; None where these are too many to keep it.
+    converged : bool
+        Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
+    """
+
+    model: object
+    estimate: object
+    noise: Noise
+    held: np.ndarray
+    covariance: np.ndarray
+    weights: np.ndarray
+    whitener: Whitening
+    residual: np.ndarray
+    joint_jacobian: np.ndarray
+    circumstances: object
+    converged: bool = True
+
+    @property
+    def parameters(self):
+        """As `parameters.parameters`."""
+        return parameters(self.model, self.estimate)
+
+    def values_of(self, key):
+        """Linear parameters and shapes of one effect."""
+        number = [effect.key for effect in self.model.effects].index(key)
+        return self.estimate.coefficients[number], self.estimate.shapes[number]
+
+    def whitened(self, values):
+        """Rows (M, rows, ...) weighted and whitened as in the fit."""
+        weights = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
+        return self.whitener.apply(values * weights)
+
+    def sensitivities(self, observations):
+        """Sensitivities of the observations that were fitted, as they are and whitened, in parts of whole poses.
+
+        Parameters
+        ----------
+        observations : Observations
+
+        Yields
+        ------
+        seen : slice
+            Observations of the part.
+        plain, whitened : ndarray (M', rows, P)
+        """
+        for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
+            some = part_at(observations, states, seen)
+            if self.circumstances is None:
+                around = circumstances(self.model, self.estimate, some.states)
+            else:
+                around = at_states(self.circumstances, states)
+            line = linearize(self.model, self.estimate, some, around)
+            white = whitening(some, self.jacobian_at(line, seen), self.noise)
+            yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
+
+    def jacobian_at(self, line, seen):
+        """Jacobian of some observations with respect to the joints: as it was kept, or that of their `Linearization`."""
+        if self.joint_jacobian is None:
+            return line.coordinate_jacobian[..., : self.model.sites.joints]
+        return self.joint_jacobian[seen]

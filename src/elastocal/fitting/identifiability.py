@@ -1,0 +1,110 @@
+"""What the data can tell: least squares over that alone, all else held at its value and named."""
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+# Correlation beyond which a parameter cannot be told because of a shape.
+_BOUND_TO_SHAPE = 0.5
+
+
+def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
+    """Least squares over the parameters that the data can tell.
+
+    A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
+    its value. Nothing is regularised but what carries a prior.
+
+    Parameters
+    ----------
+    left : ndarray (R, P)
+        Whitened sensitivities.
+    right : ndarray (R,)
+        Whitened residual.
+    plausible : ndarray (P,)
+        Plausible size of each parameter.
+    frozen : bool or ndarray of bool (P,)
+        Parameters not to move.
+    penalty : float or ndarray (P,)
+        One over the variance of the prior about zero; 0 for none.
+    present : float or ndarray (P,)
+        Values from which the step is taken.
+    bending : bool or ndarray of bool (P,)
+        As in `identifiable`.
+
+    Returns
+    -------
+    step : ndarray (P,)
+        Zero where held.
+    covariance : ndarray (P, P)
+    held : ndarray of bool (P,)
+    """
+    scaled = left * plausible
+    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, bending)
+
+
+def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
+    """As `solve_identifiable`, from products of sensitivities in plausible sizes.
+
+    Parameters
+    ----------
+    gram : ndarray (P, P)
+    along : ndarray (P,)
+    plausible, frozen, penalty, present, bending
+        As in `solve_identifiable`.
+
+    Returns
+    -------
+    step, covariance, held
+        As in `solve_identifiable`.
+    """
+    gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
+    along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
+    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, bending)))
+    free = np.flatnonzero(~held)
+    step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
+    if len(free):
+        inverse = np.linalg.inv(np.linalg.cholesky(gram[np.ix_(free, free)]))
+        step[free] = plausible[free] * (inverse.T @ (inverse @ along[free]))
+        covariance[np.ix_(free, free)] = np.outer(plausible[free], plausible[free]) * (inverse.T @ inverse)
+    return step, covariance, held
+
+
+def identifiable(gram, frozen, bending):
+    """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
+
+    Parameters
+    ----------
+    gram : ndarray (P, P)
+        Information on the parameters, each in units of its plausible size.
+    frozen : ndarray of bool (P,)
+        Left out from the start.
+    bending : ndarray of bool (P,)
+        Shapes: given up before a parameter that they are bound to, as that of their law is where it is nearly a straight line.
+
+    Returns
+    -------
+    ndarray of bool (P,)
+    """
+    kept = []
+    factor = np.zeros_like(gram)
+    for number in range(len(gram)):
+        if frozen[number]:
+            continue
+        row = solve_triangular(factor[: len(kept), : len(kept)], gram[kept, number], lower=True) if kept else np.zeros(0)
+        left_over = gram[number, number] - row @ row
+        # Rounding of the squares counts as nothing.
+        if left_over > max(1.0, 1e-11 * gram[number, number]):
+            factor[len(kept), : len(kept)], factor[len(kept), len(kept)] = row, np.sqrt(left_over)
+            kept.append(number)
+    # Parameters that came later may have taken from what their predecessors could be told by.
+    while kept:
+        covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
+        deviation = np.sqrt(np.diag(covariance))
+        worst = int(np.argmax(deviation))
+        if deviation[worst] <= 1.0:
+            break
+        correlation = np.where(bending[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
+        shape = int(np.argmax(correlation))
+        kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
+    mask = np.zeros(len(gram), bool)
+    mask[kept] = True
+    return mask

@@ -1,0 +1,175 @@
+"""Sensitivities of the readings: the Jacobian of the chain times the displacement of its coordinates per parameter."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from elastocal.effects import declared_weight
+from elastocal.effects.protocol import Circumstances, with_springs
+from elastocal.fitting.displacement import displace, displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
+from elastocal.fitting.prediction import differences, measured_in_base, target_points
+from elastocal.mechanics.kinematics import motion
+
+# Relative step of the central difference in a shape parameter.
+_SHAPE_STEP = 1e-4
+# Of the forward difference in what loads the springs, in plausible sizes: laws of gears bend little over that.
+_SPRING_STEP = 1e-4
+# Parameters on which the laws of other effects depend: they turn a wrench into angles, or are part of the load.
+_SPRINGS = ("joint_compliance", declared_weight.EFFECT)
+
+
+@dataclass(frozen=True)
+class Linearization:
+    """A model about an estimate, for M observations.
+
+    Attributes
+    ----------
+    residual : ndarray (M, rows)
+        Measured less predicted, base axes, m and rad.
+    coordinate_jacobian : ndarray (M, rows, C)
+        Of each target with respect to the coordinates of the sites.
+    sensitivities : ndarray (M, rows, P)
+        With respect to `parameters`.
+    circumstances : Circumstances
+        Where the robot has yielded to, by this estimate.
+    """
+
+    residual: np.ndarray
+    coordinate_jacobian: np.ndarray
+    sensitivities: np.ndarray
+    circumstances: Circumstances
+
+
+def linearize(model, estimate, observations, circumstances):
+    """Residuals of a model and their sensitivities.
+
+    Parameters
+    ----------
+    model, estimate, observations, circumstances
+        As in `predict`.
+
+    Returns
+    -------
+    Linearization
+    """
+    around = with_springs_of(model, estimate, circumstances)
+    coordinates = displaced_coordinates(model, estimate, around)
+    count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
+    moved = motion(chain, coordinates, (*model.sites.followed, *points))
+    position, rotation = np.empty((count, 3)), np.empty((count, 3, 3))
+    # Component first, so that every effect's arithmetic runs along the observations.
+    jacobian = np.empty((rows, chain.coordinates, count))
+    for index, point in enumerate(points):
+        seen = np.flatnonzero(observations.target == index)
+        state, number = observations.state[seen], len(model.sites.followed) + index
+        at = moved.position[number][:, state]
+        position[seen], rotation[seen] = at.T, np.moveaxis(moved.rotation[number][..., state], -1, 0)
+        jacobian[..., seen] = moved.jacobian(point.after, at, rows, state)
+    residual = differences(
+        measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
+    )
+    jacobian = np.moveaxis(jacobian, -1, 0)
+    columns = []
+    if model.fitted_frames:
+        at_base = jacobian[..., list(model.sites.base)]
+        for session in estimate.sessions:
+            in_session = observations.states.session[observations.state] == session
+            columns.append(at_base * in_session[:, None, None])
+    for index, target in enumerate(model.targets):
+        if target.offset_m is None:
+            columns.append(_target_columns(rotation, observations.target == index, rows))
+    for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        if effect.effect in _SPRINGS:
+            laws = _spring_laws(effect, model, estimate, around)
+        else:
+            laws = effect.displacement(around, *shapes)
+        columns.append(_columns(laws, jacobian, observations.state))
+        columns.append(_shape_columns(effect, values, shapes, around, jacobian, observations.state))
+    sensitivities = np.concatenate(columns, axis=-1) if columns else np.empty((count, rows, 0))
+    return Linearization(residual, jacobian, sensitivities, replace(around, motion=moved))
+
+
+def effect_columns(effects, circumstances, coordinate_jacobian, state):
+    """Sensitivities of the readings to the linear parameters of effects.
+
+    Parameters
+    ----------
+    effects : sequence of (Candidate, sequence of float)
+        With their shape parameters.
+    circumstances : Circumstances
+    coordinate_jacobian : ndarray (M, rows, C)
+    state : ndarray (M,)
+        State of each observation.
+
+    Returns
+    -------
+    ndarray (M, rows, D)
+    """
+    laws = [law for effect, shapes in effects for law in effect.displacement(circumstances, *shapes)]
+    return _columns(laws, coordinate_jacobian, state)
+
+
+def _columns(laws, coordinate_jacobian, state):
+    columns = np.empty((coordinate_jacobian.shape[1], len(laws), len(state)))
+    jacobian = np.moveaxis(coordinate_jacobian, 0, -1)
+    for number, law in enumerate(laws):
+        columns[:, number] = sum(jacobian[:, coordinate] * values[state] for coordinate, values in law.items())
+    return np.moveaxis(columns, -1, 0)
+
+
+def _target_columns(rotation, mask, rows):
+    """Shift of a target along the axes of its measuring point and, for poses, its turn about them."""
+    columns = np.zeros((len(mask), rows, rows))
+    for first in range(0, rows, 3):
+        columns[mask, first : first + 3, first : first + 3] = rotation[mask]
+    return columns
+
+
+def _shape_columns(effect, values, shapes, circumstances, jacobian, state):
+    columns = np.zeros((*jacobian.shape[:2], len(shapes)))
+    for number in range(len(shapes)):
+        shape = effect.shapes[number]
+        step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
+        sides = []
+        for sign in (1, -1):
+            moved = shapes.copy()
+            moved[number] += sign * step
+            sides.append(effect_columns([(effect, moved)], circumstances, jacobian, state) @ values)
+        columns[..., number] = (sides[0] - sides[1]) / (2 * step)
+    return columns
+
+
+def _spring_laws(spring, model, estimate, around):
+    """Displacements per unit of compliances or of errors of masses, with all that they do by way of other effects."""
+    laws = spring.displacement(around)
+    through = _through_compliance if spring.effect == "joint_compliance" else _through_load
+    others = [found for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True) if through(found[0])]
+    if not others:
+        return laws
+
+    def of_others(springs):
+        displaced = np.zeros_like(around.load)
+        for other in others:
+            displace(displaced, *other, springs)
+        return displaced
+
+    values, present = joint_compliances(model, estimate), of_others(around)
+    corrections = mass_corrections(model, estimate)
+    for number, parameter in enumerate(spring.parameters):
+        step = np.zeros(len(laws))
+        step[number] = _SPRING_STEP * parameter.plausible
+        moved = (values + step, corrections) if spring.effect == "joint_compliance" else (values, corrections + step)
+        change = (of_others(with_springs(around, *moved)) - present) / step[number]
+        for coordinate in np.flatnonzero(change.any(axis=0)):
+            laws[number][coordinate] = laws[number].get(coordinate, 0.0) + change[:, coordinate]
+    return laws
+
+
+def _through_compliance(effect):
+    """Whether an effect is a load that the joint compliances turn into angles."""
+    return effect.family in ("gravity", "load")
+
+
+def _through_load(effect):
+    """Whether an effect goes with the total load."""
+    return "load" in effect.needs and effect.effect not in _SPRINGS

@@ -1,0 +1,37 @@
+"""How much of a long campaign a fit holds at once: what is beyond comes in parts and is found again in each step."""
+
+from elastocal.fitting.displacement import circumstances
+
+# Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
+# linearised again in each step.
+_MOST_HELD = 4_000_000
+# Observations of a part: what it makes stays in the processor's cache and is not asked of the system again and again.
+_MOST_AT_ONCE = 4000
+# States beyond which circumstances are not kept from step to step but found again: they take some ten kilobytes each.
+_MOST_STATES = 20_000
+
+
+def observations_at_once(rows, columns):
+    """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
+    return max(min(_MOST_HELD // (rows * max(columns, 60)), _MOST_AT_ONCE), 1)
+
+
+def held_at_once(observations, columns):
+    """Whether the sensitivities of all observations to so many parameters are held at once."""
+    return observations.rows * len(observations) * max(columns, 60) <= _MOST_HELD
+
+
+def kept_circumstances(model, estimate, observations):
+    """Circumstances of all states, or None where these are too many to keep them.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    observations : Observations
+
+    Returns
+    -------
+    Circumstances or None
+    """
+    return circumstances(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None

@@ -1,0 +1,170 @@
+"""Normal equations of a step, added up over readings that are held whole or come in parts of whole poses."""
+
+import numpy as np
+
+from elastocal.effects.protocol import at_states, with_springs
+from elastocal.fitting.displacement import circumstances, displaced_coordinates, joint_compliances, mass_corrections
+from elastocal.fitting.fit_result import Fit
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.memory import held_at_once, kept_circumstances, observations_at_once
+from elastocal.fitting.observations import part_at, parts_of
+from elastocal.fitting.prediction import residuals
+from elastocal.fitting.whitening import Whitening, whitening
+
+
+class Parts:
+    """Readings beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
+
+    Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
+    are too many to keep their circumstances, the coordinates are kept at which loads are taken.
+
+    Parameters
+    ----------
+    model : Model
+    observations : Observations
+        M of them.
+    noise : Noise
+    around : Circumstances or None
+        Of all their states; None where these are too many to keep it.
+    plausible : ndarray (P,)
+        Plausible size of each parameter.
+    """
+
+    def __init__(self, model, observations, noise, around, plausible):
+        self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
+        held = held_at_once(observations, len(plausible))
+        most = len(observations) if held else observations_at_once(observations.rows, len(plausible))
+        self.slices = parts_of(observations, most)
+        self.whole = len(self.slices) == 1 and around is not None
+        self.parts = [observations] if self.whole else [part_at(observations, *edges) for edges in self.slices]
+        self.around = [around] if self.whole else [None] * len(self.parts)
+        if not self.whole and around is not None:
+            self.around = [at_states(around, states) for states, _ in self.slices]
+        self.coordinates = [None] * len(self.parts)
+        self.whiteners = [None] * len(self.parts)
+        # Of so many states that circumstances are not kept neither is this.
+        shape = len(observations), observations.rows, model.sites.joints
+        self.jacobian = None if around is None else np.zeros(shape)
+        self.line = None
+
+    def linearize(self, estimate):
+        """Go to an estimate."""
+        self.estimate = estimate
+        if self.whole:
+            self.line = linearize(self.model, estimate, self.observations, self.around[0])
+            self.residual = self.line.residual
+        else:
+            self.residual = np.concatenate(
+                [residuals(self.model, estimate, part, self._around(number)) for number, part in enumerate(self.parts)]
+            )
+
+    def whiten(self):
+        """Take loads and whitening at the present estimate."""
+        self.origin = self.estimate
+        if self.whole:
+            self.around = [self.line.circumstances]
+            self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
+            self.whiteners = [whitening(self.observations, self.jacobian, self.noise)]
+        elif self.whiteners[0] is None:
+            for number, part in enumerate(self.parts):
+                if self.noise.pose_rad or self.noise.joint_rad.any():
+                    self._linearized(number, part)
+                else:
+                    self.whiteners[number] = whitening(part, None, self.noise)
+
+    def normal_equations(self, weights):
+        """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
+        size = len(self.plausible)
+        gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
+        for number, (part, (_, seen)) in enumerate(zip(self.parts, self.slices, strict=True)):
+            line = self.line if self.whole else self._linearized(number, part)
+            whitener, mine = self.whiteners[number], root[seen]
+            right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
+            left = _of_rotation_vectors(line.sensitivities, line.residual) * mine[:, None, None]
+            left = whitener.apply(left).reshape(len(right), -1)
+            left *= self.plausible
+            gram += left.T @ left
+            along += left.T @ right
+        return gram, along
+
+    def distance(self):
+        """Whitened distance of each observation from the prediction, ndarray (M,)."""
+        return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
+
+    def squares(self, weights, estimate=None):
+        """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
+        residual = self.residual
+        if estimate is not None:
+            found = [residuals(self.model, estimate, part, self._around(n, estimate)) for n, part in enumerate(self.parts)]
+            residual = np.concatenate(found)
+        residual = self._in_axes_of_step(residual, self.estimate if estimate is None else estimate)
+        return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
+
+    def _in_axes_of_step(self, residual, estimate):
+        """A residual in the base axes of an estimate in those of the one by which it is whitened."""
+        turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
+        if (turn == np.eye(3)).all():
+            return residual
+        states, state = self.observations.states, self.observations.state
+        session = np.searchsorted(estimate.sessions, states.session[state])
+        vectors = residual.reshape(len(residual), -1, 3)
+        return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
+
+    def fit(self, estimate, held, covariance, weights, converged):
+        """The `Fit` of these readings."""
+        model, around = self.model, None
+        if self.whole:
+            springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
+            around = with_springs(self.line.circumstances, *springs)
+            residual = residuals(model, estimate, self.observations, around)
+        else:
+            self.linearize(estimate)
+            residual = self.residual
+            around = kept_circumstances(model, estimate, self.observations)
+        whitener = Whitening(
+            tuple(
+                (members + edges[1].start, factor)
+                for edges, found in zip(self.slices, self.whiteners, strict=True)
+                for members, factor in found.blocks
+            )
+        )
+        return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, self.jacobian, around, converged)
+
+    def _around(self, number, estimate=None):
+        kept = self.around[number]
+        if kept is not None:
+            return kept
+        states, coordinates = self.parts[number].states, None
+        if self.coordinates[number] is not None:
+            moved, displaced = self.coordinates[number]
+            coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
+            coordinates[:, moved] = displaced
+        return circumstances(self.model, estimate or self.estimate, states, coordinates)
+
+    def _linearized(self, number, part):
+        around = self._around(number)
+        line = linearize(self.model, self.estimate, part, around)
+        if self.around[number] is None:
+            displaced = displaced_coordinates(self.model, self.estimate, around)
+            moved = np.flatnonzero(displaced.any(axis=0))
+            self.coordinates[number] = moved, displaced[:, moved]
+        else:
+            self.around[number] = line.circumstances
+        jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
+        if self.jacobian is not None:
+            self.jacobian[self.slices[number][1]] = jacobian
+        self.whiteners[number] = whitening(part, jacobian, self.noise)
+        return line
+
+    def _whitened(self, residual):
+        pairs = zip(self.whiteners, self.slices, strict=True)
+        return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
+
+
+def _of_rotation_vectors(sensitivities, residual):
+    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2)."""
+    if residual.shape[1] == 3:
+        return sensitivities
+    turned = sensitivities[:, 3:]
+    exact = turned + 0.5 * np.cross(residual[:, 3:, None], turned, axis=1)
+    return np.concatenate([sensitivities[:, :3], exact], axis=1)

@@ -1,0 +1,118 @@
+"""Everything that a model leaves open as one vector of parameters: their names, ranges and values, and a step of them all."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.effects.protocol import Parameter
+from elastocal.fitting.model import Estimate
+
+_LENGTH = ("dx", "dy", "dz")
+_TURN = ("rx", "ry", "rz")
+# Frames and targets may be anywhere in a workshop.
+_ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
+
+
+def parameters(model, estimate):
+    """Everything that is fitted, in the order of the sensitivities.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+
+    Returns
+    -------
+    list of (str, Parameter)
+        What it belongs to ("frame 0", "target A", the key of an effect) and the parameter.
+    """
+    found = []
+    shift = [Parameter(name, "m", _ANYWHERE_M) for name in _LENGTH]
+    turn = [Parameter(name, "rad", _ANYWHERE_RAD) for name in _TURN]
+    if model.fitted_frames:
+        found += [(f"frame {session}", parameter) for session in estimate.sessions for parameter in (*shift, *turn)]
+    for target in model.targets:
+        if target.offset_m is None:
+            found += [(f"target {target.name}", parameter) for parameter in (*shift, *(turn if model.rows == 6 else ()))]
+    for effect in model.effects:
+        found += [(effect.key, parameter) for parameter in effect.parameters]
+        found += [(effect.key, Parameter(s.name, s.unit, s.highest - s.lowest)) for s in effect.shapes]
+    return found
+
+
+def bends(model, estimate):
+    """Which of the `parameters` are shapes, ndarray of bool (P,)."""
+    shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
+    return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
+
+
+def limits(model, estimate):
+    """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
+    ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
+    listed = [ranges.get((owner, p.name), (-np.inf, np.inf)) for owner, p in parameters(model, estimate)]
+    return np.array(listed).reshape(-1, 2)
+
+
+def parameter_values(model, estimate):
+    """Present values of all that is fitted, in the order of `parameters`.
+
+    Frames and targets are fitted by steps from where they are and count as zero.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+
+    Returns
+    -------
+    ndarray (P,)
+    """
+    owned = [owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, estimate)]
+    effects = [part for pair in zip(estimate.coefficients, estimate.shapes, strict=True) for part in pair]
+    return np.concatenate([np.zeros(sum(owned)), *effects])
+
+
+def stepped(model, estimate, step):
+    """An estimate after a step of all parameters, in the order of `parameters`.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    step : ndarray (P,)
+
+    Returns
+    -------
+    Estimate
+    """
+    left = list(step)
+
+    def take(count):
+        taken, left[:] = np.array(left[:count]), left[count:]
+        return taken
+
+    frame_rotation, frame_position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
+    if model.fitted_frames:
+        for number in range(len(estimate.sessions)):
+            shift, turn = take(3), take(3)
+            frame_position[number] += frame_rotation[number] @ shift
+            frame_rotation[number] = frame_rotation[number] @ Rotation.from_rotvec(turn).as_matrix()
+    target_offset, target_rotation = estimate.target_offset.copy(), estimate.target_rotation.copy()
+    for number, target in enumerate(model.targets):
+        if target.offset_m is None:
+            target_offset[number] += take(3)
+            if model.rows == 6:
+                target_rotation[number] = Rotation.from_rotvec(take(3)).as_matrix() @ target_rotation[number]
+    coefficients, shapes = [], []
+    for effect, values, bent in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+        coefficients.append(values + take(len(values)))
+        limits = np.array([(shape.lowest, shape.highest) for shape in effect.shapes]).reshape(-1, 2)
+        shapes.append(np.clip(bent + take(len(bent)), *limits.T))
+    return Estimate(
+        estimate.sessions,
+        frame_rotation,
+        frame_position,
+        target_offset,
+        target_rotation,
+        tuple(coefficients),
+        tuple(shapes),
+    )

@@ -1,0 +1,87 @@
+"""What a model predicts: exact poses of the targets, and residuals of the readings, both in base axes."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from elastocal.fitting.displacement import displaced_coordinates
+from elastocal.mechanics.kinematics import pose_differences, poses_of_points
+
+
+def predict(model, estimate, observations, circumstances):
+    """Exact poses of the targets, in base axes.
+
+    Parameters
+    ----------
+    model : Model
+    estimate : Estimate
+    observations : Observations
+    circumstances : Circumstances
+        Of the states of the observations.
+
+    Returns
+    -------
+    position : ndarray (M, 3)
+    rotation : ndarray (M, 3, 3)
+    """
+    coordinates = displaced_coordinates(model, estimate, circumstances)
+    position, rotation = poses_of_points(model.sites.chain, coordinates, target_points(model, estimate))
+    seen = observations.target, observations.state
+    return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
+
+
+def residuals(model, estimate, observations, circumstances):
+    """Measured less predicted, in base axes.
+
+    Parameters
+    ----------
+    model, estimate, observations, circumstances
+        As in `predict`.
+
+    Returns
+    -------
+    ndarray (M, rows)
+        m and, where poses are measured, rad.
+    """
+    position, rotation = predict(model, estimate, observations, circumstances)
+    return differences(measured_in_base(estimate, observations), position, rotation)
+
+
+def measured_in_base(estimate, observations):
+    """Measured poses, taken from the frames of the sessions into base axes.
+
+    Returns
+    -------
+    position : ndarray (M, 3)
+    rotation : ndarray (M, 3, 3) or None
+    """
+    session = np.searchsorted(estimate.sessions, observations.states.session[observations.state])
+    into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
+    position = (into_base @ (observations.position - estimate.frame_position[session])[..., None])[..., 0]
+    return position, None if observations.rotation is None else into_base @ observations.rotation
+
+
+def differences(measured, position, rotation):
+    """Measured less predicted poses, both in base axes.
+
+    Parameters
+    ----------
+    measured : (ndarray (M, 3), ndarray (M, 3, 3) or None)
+        As by `measured_in_base`.
+    position, rotation : ndarray (M, 3), (M, 3, 3)
+        As by `predict`.
+
+    Returns
+    -------
+    ndarray (M, rows)
+        m and, where poses are measured, rad.
+    """
+    if measured[1] is None:
+        return measured[0] - position
+    return pose_differences(*measured, position, rotation)
+
+
+def target_points(model, estimate):
+    """The targets as points of the kinematic chain, where an estimate has them: a list of `Point`."""
+    points = [model.sites.chain.point(target.point) for target in model.targets]
+    return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]

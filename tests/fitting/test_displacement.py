@@ -1,0 +1,94 @@
+"""Where the robot yields to, by scipy's root finder and by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import root
+from synthetic import made_estimate, made_model, made_states, seen_exactly
+
+from elastocal.campaigns.campaign import Target
+from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.displacement import circumstances, displaced_coordinates, joint_compliances
+from elastocal.fitting.prediction import predict, residuals
+from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
+from elastocal.mechanics.kinematics import poses
+
+
+def equilibrium(chain, compliance, states, weighing=None):
+    """Turn of each joint where the springs hold the load at the pose to which it has turned them, by scipy's root finder."""
+    end = replace(chain.end_effector, offset_m=(0, 0, 0))
+
+    def unbalanced(turned, q, wrench):
+        torque = joint_torques(chain, q + turned, wrench, end)
+        return turned - compliance * (torque if weighing is None else torque + weighing(q + turned))
+
+    pairs = zip(states.joint_angles, states.wrench, strict=True)
+    return np.array([root(unbalanced, np.zeros(len(q)), (q, wrench), tol=1e-15).x for q, wrench in pairs])
+
+
+def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
+    targets = tuple(Target(p.name, p.name, (0.05, 0.1, -0.1)) for p in fanuc.chain.points)
+    model = made_model(fanuc.chain, targets, 6, fitted_frames=False, compliance=fanuc.compliance)
+    estimate, states = made_estimate(model), made_states(6, 6, seed=4)
+    seen = seen_exactly(model, estimate, states)
+    position, rotation = predict(model, estimate, seen, circumstances(model, estimate, states))
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
+    for index, point in enumerate(fanuc.chain.points):
+        target = replace(point, offset_m=(0.05, 0.1, -0.1))
+        expected = poses(fanuc.chain, states.joint_angles + turned, target)
+        np.testing.assert_allclose(position[seen.target == index], expected[0], rtol=0, atol=1e-9)
+        np.testing.assert_allclose(rotation[seen.target == index], expected[1], rtol=0, atol=1e-9)
+    bent = exact_deflections(fanuc.chain, states.joint_angles, turned, fanuc.chain.end_effector)
+    assert np.abs(bent).max() > 1e-4
+
+
+def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_finds_it(fanuc):
+    model = made_model(fanuc.chain, fitted_frames=False, compliance=fanuc.compliance)
+    estimate, states = made_estimate(model), made_states(6, 40, seed=12)
+    states.wrench[:] *= (3000.0 / np.linalg.norm(states.wrench[:, :3], axis=1))[:, None]
+    found = displaced_coordinates(model, estimate, circumstances(model, estimate, states))[:, :6]
+    turned = equilibrium(fanuc.chain, fanuc.compliance, states)
+    end = fanuc.chain.end_effector
+    ends = [poses(fanuc.chain, q, end)[0] for q in (found, states.joint_angles + turned)]
+    assert np.linalg.norm(ends[0] - ends[1], axis=1).max() < 1e-8
+    # At the commanded pose the load would be off by far more than a tracker's noise.
+    torques = joint_torques(fanuc.chain, states.joint_angles, states.wrench, end)
+    there = poses(fanuc.chain, states.joint_angles + fanuc.compliance * torques, end)[0]
+    assert np.linalg.norm(there - ends[1], axis=1).max() > 5e-5
+
+
+def test_wrench_acts_at_the_last_measuring_point_and_not_at_a_target_on_it(fanuc):
+    chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.3, 0.2, 0.1)) for p in fanuc.chain.points))
+    states = made_states(6, 5, seed=5)
+    loads = [circumstances(model, made_estimate(model), states).load for model in (made_model(chain), made_model(fanuc.chain))]
+    np.testing.assert_allclose(*loads, rtol=0, atol=1e-11)
+
+
+def test_identified_compliances_replace_the_nominal_ones(fanuc):
+    fixed = made_model(fanuc.chain, compliance=fanuc.compliance)
+    free = made_model(fanuc.chain, compliance=9 * fanuc.compliance, identified=True)
+    estimate, states = made_estimate(fixed, seed=6), made_states(6, 5, seed=7)
+    same = replace(estimate.with_effects(free.effects), coefficients=(fanuc.compliance,))
+    np.testing.assert_array_equal(joint_compliances(free, same), fanuc.compliance)
+    np.testing.assert_array_equal(joint_compliances(fixed, estimate), fanuc.compliance)
+    seen = seen_exactly(fixed, estimate, states)
+    np.testing.assert_allclose(residuals(free, same, seen, circumstances(free, same, states)), 0.0, atol=1e-14)
+
+
+def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
+    known = candidates_on(made_model(fanuc.chain).sites)
+    offset, growth, frame = (known[key] for key in ("joint_offset@2", "stiffening@2", "base_compliance"))
+    model = made_model(fanuc.chain, compliance=fanuc.compliance, effects=(offset, growth, frame))
+    estimate, states = made_estimate(model, seed=10), made_states(6, 5, seed=11)
+    around = circumstances(model, estimate, states)
+    found = displaced_coordinates(model, estimate, around)
+    torque = joint_torques(model.sites.chain, found, states.wrench, model.sites.chain.end_effector)[:, :6]
+    expected = states.joint_angles + fanuc.compliance * torque
+    (meeting,), load = estimate.shapes[1], torque[:, 1]
+    beyond = load - meeting * np.tanh(load / meeting)
+    expected[:, 1] += estimate.coefficients[0][0] + estimate.coefficients[1][0] * beyond
+    np.testing.assert_allclose(found[:, :6], expected, rtol=0, atol=1e-9)
+    at_base = found[:, list(model.sites.base)]
+    np.testing.assert_allclose(at_base[:, :2], estimate.coefficients[2][0] * states.wrench[:, :2], rtol=1e-9, atol=1e-18)
+    used = {*range(6), *model.sites.base}
+    assert not np.delete(found, list(used), axis=1).any()
