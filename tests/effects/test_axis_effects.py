@@ -23,8 +23,8 @@ from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import circumstances, displaced_coordinates, predict
 from elastocal.fitting.observations import Observations
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
 
 CHAINS = ["fanuc", "ur10", "fixed rotations", "seven joints"]
 

@@ -11,8 +11,9 @@ from synthetic import candidate_on, circumstances_on, displacements, made_estima
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.model import circumstances, predict
+from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Mass, MeasuringPoint
+from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 from elastocal.plant.tracker import EccentricNest
 

@@ -9,7 +9,8 @@ from matplotlib.text import Text
 
 from elastocal.figures.schemes import kinematic_scheme, spring_scheme
 from elastocal.io.documents import read_document
-from elastocal.mechanics.robot import robot_from_document, with_target_offset
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 CHAINS = {

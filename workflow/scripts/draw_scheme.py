@@ -2,7 +2,7 @@
 
 from elastocal.figures import schemes
 from elastocal.figures.style import save
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 from job import run
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from elastocal.campaigns.campaign import write_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 from job import run
 

@@ -25,7 +25,8 @@ from elastocal.campaigns.measurements import (
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import appearing_whole
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.robot import Robot, robot_from_document
+from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot_file import robot_from_document
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}

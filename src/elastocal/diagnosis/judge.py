@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.campaigns.reading_columns import residual_columns
-from elastocal.effects.protocol import offered
+from elastocal.effects.circumstances import offered
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.model import circumstances, measured_in_base, residuals
 from elastocal.fitting.observations import each_approach, state_clusters

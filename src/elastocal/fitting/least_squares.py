@@ -12,7 +12,7 @@ from scipy.linalg import solve_triangular
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
 
-from elastocal.effects.protocol import at_states, with_springs
+from elastocal.effects.circumstances import at_states, with_springs
 from elastocal.fitting.model import (
     bends,
     circumstances,

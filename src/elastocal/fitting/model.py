@@ -12,9 +12,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.effects import declared_weight
+from elastocal.effects.circumstances import MASS_PARAMETERS, Circumstances, at_coordinates, circumstances_of, with_springs
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.effects.protocol import MASS_PARAMETERS, Circumstances, Parameter, at_coordinates, circumstances_of, with_springs
-from elastocal.mechanics.kinematics import motion, pose_differences, poses_of_points
+from elastocal.effects.protocol import Parameter
+from elastocal.mechanics.kinematics import poses_of_points
+from elastocal.mechanics.motion import motion
+from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.sites import Sites, sites_of
 
 _LENGTH = ("dx", "dy", "dz")
