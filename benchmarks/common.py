@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from elastocal.io.documents import read_document
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]

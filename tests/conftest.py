@@ -6,7 +6,7 @@ import hypothesis
 import pytest
 
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import strategy_from_document
 
 CONFIG = Path(__file__).resolve().parents[1] / "config"

@@ -24,8 +24,8 @@ from elastocal.fitting.displacement import circumstances, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import Observations
 from elastocal.fitting.prediction import predict
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
 
 CHAINS = ["fanuc", "ur10", "fixed rotations", "seven joints"]
 

@@ -20,16 +20,17 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.circumstances import offered, with_springs
 from elastocal.effects.declared_weight import candidate
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.effects.protocol import offered, with_springs
 from elastocal.fitting.displacement import circumstances, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.prediction import residuals
+from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Mass, MeasuringPoint
+from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
 TILTED = (3.0, -4.0, -8.0)

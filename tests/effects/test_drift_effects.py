@@ -20,7 +20,6 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.protocol import progress_of
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import predict
@@ -175,17 +174,6 @@ def test_setup_that_is_moved_between_two_rows_moves_all_readings_from_there_on(f
     np.testing.assert_allclose(position[:5], still[0][:5], rtol=0, atol=1e-14)
     np.testing.assert_allclose(position[5:], turn.apply(still[0][5:]) + step[:3], rtol=0, atol=1e-14)
     np.testing.assert_allclose(rotation[5:], turn.as_matrix() @ still[1][5:], rtol=0, atol=1e-14)
-
-
-def test_progress_counts_rows_of_the_campaign_or_else_poses():
-    states = made_states(6, 5, seed=16)
-    np.testing.assert_allclose(progress_of(states), np.arange(5) / 4)
-    # Some of the rows of a longer campaign.
-    np.testing.assert_allclose(progress_of(states, (1, 21)), np.arange(5) / 20)
-    without = replace(states, row=None)
-    np.testing.assert_allclose(progress_of(without), np.arange(5) / 4)
-    # What is to be measured comes after all rows.
-    np.testing.assert_array_equal(progress_of(without, (1, 21)), np.ones(5))
 
 
 # Between two of the values that are tried, nearer to the second.

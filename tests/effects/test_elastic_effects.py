@@ -7,10 +7,10 @@ from support import OTHER_CHAINS, PinocchioPoint, chain_of
 from synthetic import candidate_on, circumstances_on, displacements, made_states
 
 from elastocal.effects.catalogue import candidates_on
+from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, tube_compliance
-from elastocal.mechanics.robot import MeasuringPoint
 from elastocal.mechanics.sites import sites_of
 
 LINEAR = (

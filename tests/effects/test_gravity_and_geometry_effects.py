@@ -12,8 +12,9 @@ from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.prediction import predict
+from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.robot import Mass, MeasuringPoint
+from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 from elastocal.plant.tracker import EccentricNest
 

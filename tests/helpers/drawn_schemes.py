@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
 
 from elastocal.io.documents import read_document
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 CHAINS = {

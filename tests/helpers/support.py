@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 from elastocal.errors import InputError
-from elastocal.mechanics.robot import Robot, parse_chain
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.robot import Robot
 from elastocal.study.experiments import Experiments
 
 UR10 = "Tz(0.1273) Rz(q1) Ty(0.1639) Ry(q2) Tx(0.612) Ry(q3) Tx(0.5723) Ry(q4) Rz(q5) Tz(-0.1157) Ry(q6) Ty(0.0922) [flange]"

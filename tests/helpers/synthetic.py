@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.campaign import Readings, Target
 from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.circumstances import circumstances_of
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.effects.protocol import circumstances_of
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise

@@ -17,7 +17,8 @@ from elastocal.mechanics.elastostatics import (
     transport_wrench,
     wrench_of_offset_force,
 )
-from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.pose_differences import pose_differences
 
 vectors = arrays(float, 3, elements=st.floats(-1e3, 1e3))
 wrenches = arrays(float, 6, elements=st.floats(-1e3, 1e3))

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 from support import (
     ODD_CHAINS,
     OTHER_CHAINS,
@@ -18,18 +17,16 @@ from support import (
     random_angles,
 )
 
-from elastocal.mechanics import kinematics
+from elastocal.mechanics import chain_walk
 from elastocal.mechanics.kinematics import (
     jacobians,
-    motion,
-    pose_differences,
     poses,
     poses_and_jacobians,
     poses_and_jacobians_of_points,
     poses_of_points,
-    rotation_vectors,
 )
 from elastocal.mechanics.links import extended_chain
+from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import with_target_offset
 
 # Metres and radians of order one through a dozen products: some tens of roundings of 1e-16.
@@ -183,7 +180,7 @@ def test_any_leading_axes_are_kept(kuka, batch):
 def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size):
     angles = random_angles(np.random.default_rng(7), fanuc.chain, size)
     whole = poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector)
-    monkeypatch.setattr(kinematics, "BLOCK", 7)
+    monkeypatch.setattr(chain_walk, "BLOCK", 7)
     for found, expected in zip(poses_and_jacobians(fanuc.chain, angles, fanuc.chain.end_effector), whole, strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
     for found, expected in zip(poses(fanuc.chain, angles, fanuc.chain.end_effector), whole[:2], strict=True):
@@ -192,10 +189,10 @@ def test_batches_across_a_block_are_those_of_its_parts(fanuc, monkeypatch, size)
 
 
 def test_a_batch_larger_than_the_real_block_holds_every_configuration(kuka):
-    size = kinematics.BLOCK + 3
+    size = chain_walk.BLOCK + 3
     angles = random_angles(np.random.default_rng(8), kuka.chain, size)
     found = poses_and_jacobians(kuka.chain, angles, kuka.chain.end_effector)
-    picked = [0, 1, kinematics.BLOCK - 1, kinematics.BLOCK, size - 1]
+    picked = [0, 1, chain_walk.BLOCK - 1, chain_walk.BLOCK, size - 1]
     for array, expected in zip(found, poses_and_jacobians(kuka.chain, angles[picked], kuka.chain.end_effector), strict=True):
         np.testing.assert_allclose(array[picked], expected, rtol=0, atol=ROUNDING)
 
@@ -242,36 +239,6 @@ def test_components_lie_contiguous_along_the_batch(kuka):
     assert jacobian[..., 0, 2].flags.c_contiguous
 
 
-@given(st.lists(st.floats(-1, 1), min_size=3, max_size=3), st.floats(0, np.pi - 1e-3))
-def test_rotation_vectors_agree_with_scipy(direction, angle):
-    norm = np.linalg.norm(direction)
-    vector = angle * (np.array(direction) / norm if norm > 1e-3 else np.array([0.0, 0.0, 1.0]))
-    rotation = Rotation.from_rotvec(vector)
-    # sin(angle) near pi - 1e-3 keeps 13 of 16 digits.
-    np.testing.assert_allclose(rotation_vectors(rotation.as_matrix()), rotation.as_rotvec(), rtol=0, atol=1e-12)
-
-
-def test_small_rotation_vectors_keep_their_digits():
-    vectors = np.array([[1e-3, -2e-3, 3e-3], [1e-9, 2e-9, -3e-9], [0.0, 0.0, 1e-12], [0.0, 0.0, 0.0]])
-    found = rotation_vectors(Rotation.from_rotvec(vectors).as_matrix())
-    np.testing.assert_allclose(found, vectors, rtol=1e-12, atol=1e-16)
-
-
-def test_rotation_vectors_keep_leading_axes():
-    rotations = Rotation.random(12, rng=np.random.default_rng(11))
-    found = rotation_vectors(rotations.as_matrix().reshape(3, 4, 3, 3))
-    np.testing.assert_allclose(found.reshape(12, 3), rotations.as_rotvec(), rtol=0, atol=1e-12)
-
-
-def test_pose_difference_is_the_displacement_and_the_rotation_in_base_axes():
-    rng = np.random.default_rng(12)
-    start, turn = Rotation.random(20, rng=rng), Rotation.from_rotvec(rng.uniform(-1, 1, (20, 3)))
-    position, move = rng.uniform(-2, 2, (20, 3)), rng.uniform(-1, 1, (20, 3))
-    found = pose_differences(position + move, (turn * start).as_matrix(), position, start.as_matrix())
-    np.testing.assert_allclose(found[..., :3], move, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found[..., 3:], turn.as_rotvec(), rtol=0, atol=1e-13)
-
-
 def test_points_with_an_offset_are_shifted_in_their_own_frame(kuka):
     angles = random_angles(np.random.default_rng(13), kuka.chain, 5)
     for point in kuka.chain.points:
@@ -301,26 +268,6 @@ def test_several_points_in_one_walk_are_those_of_a_walk_each(kuka, batch):
             np.testing.assert_allclose(found[number], wanted, rtol=0, atol=1e-15)
     for found, wanted in zip(poses_of_points(kuka.chain, angles, points), together, strict=False):
         np.testing.assert_array_equal(found, wanted)
-
-
-@pytest.mark.parametrize("name", ["kuka", *OTHER_CHAINS])
-def test_motion_gives_the_jacobian_of_every_point_and_the_forces_of_every_wrench(name, request):
-    chain = chain_of(OTHER_CHAINS[name]) if name in OTHER_CHAINS else request.getfixturevalue(name).chain
-    rng = np.random.default_rng(31)
-    angles, wrench = random_angles(rng, chain, 7), rng.standard_normal((7, 6))
-    points = [replace(point, offset_m=(0.1, -0.2, 0.3)) for point in chain.points]
-    moved = motion(chain, angles, points)
-    for number, point in enumerate(points):
-        position, rotation, jacobian = poses_and_jacobians(chain, angles, point)
-        np.testing.assert_allclose(moved.position[number].T, position, rtol=0, atol=ROUNDING)
-        np.testing.assert_allclose(np.moveaxis(moved.rotation[number], -1, 0), rotation, rtol=0, atol=ROUNDING)
-        found = moved.jacobian(point.after, moved.position[number])
-        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
-        some = moved.jacobian(point.after, moved.position[number][:, [4, 1, 1]], 3, np.array([4, 1, 1]))
-        np.testing.assert_allclose(np.moveaxis(some, -1, 0), jacobian[[4, 1, 1], :3], rtol=0, atol=ROUNDING)
-        moment = wrench[:, 3:] + np.cross(position, wrench[:, :3])
-        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T)
-        np.testing.assert_allclose(forces.T, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)
 
 
 def test_coordinates_that_nothing_moves_change_no_digit(kuka_extended):
@@ -367,7 +314,6 @@ def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central
     q = np.random.default_rng(35).uniform(-1.5, 1.5, (5, chain.coordinates))
     points = list(chain.points)
     many = poses_and_jacobians_of_points(chain, q, points)[2]
-    moved = motion(chain, q, points)
     for number, point in enumerate(points):
         jacobian = poses_and_jacobians(chain, q, point)[2]
         for coordinate in range(chain.coordinates):
@@ -375,9 +321,3 @@ def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central
             slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
             np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
         np.testing.assert_allclose(many[number], jacobian, rtol=0, atol=ROUNDING)
-        found = moved.jacobian(point.after, moved.position[number])
-        np.testing.assert_allclose(np.moveaxis(found, -1, 0), jacobian, rtol=0, atol=ROUNDING)
-        wrench = np.random.default_rng(36).standard_normal((5, 6))
-        moment = wrench[:, 3:] + np.cross(moved.position[number].T, wrench[:, :3])
-        forces = moved.generalized_forces(point.after, wrench[:, :3].T, moment.T).T
-        np.testing.assert_allclose(forces, np.einsum("sij,si->sj", jacobian, wrench), rtol=0, atol=10 * ROUNDING)

@@ -8,10 +8,11 @@ from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 from support import PinocchioPoint, homogeneous, random_angles, random_loads, robot_of
 
+from elastocal.mechanics.chain import stretches
 from elastocal.mechanics.elastostatics import exact_deflections, generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, link_compliance, spring_compliance, tube_compliance, with_tube
-from elastocal.mechanics.robot import Link, Tube, stretches
+from elastocal.mechanics.robot import Link, Tube
 from elastocal.study.simulation import true_deflections
 
 TUBE = Tube(0.25, 0.02, 70e9, 26e9)

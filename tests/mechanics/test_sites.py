@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, PinocchioPoint, chain_of, homogeneous, random_angles
 
-from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.sites import sites_of
 
 NAMES = ["kuka", "fanuc", *OTHER_CHAINS]

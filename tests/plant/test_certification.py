@@ -10,10 +10,12 @@ import pytest
 from analysed_robots import ROBOTS, analysed
 from support import OTHER_CHAINS, robot_of
 
+from elastocal.mechanics.chain import stretches
 from elastocal.mechanics.elastostatics import generalized_forces as joint_torques
-from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
-from elastocal.mechanics.robot import Link, Tube, stretches
+from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.mechanics.robot import Link, Tube
 from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
 from elastocal.plant.campaigns import usual_force_N
 from elastocal.plant.multibody import machine_of

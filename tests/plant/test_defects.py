@@ -7,7 +7,7 @@ import pytest
 from analysed_robots import analysed
 
 from elastocal.effects.catalogue import effects
-from elastocal.effects.protocol import circumstances_of
+from elastocal.effects.circumstances import circumstances_of
 from elastocal.errors import InputError
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians

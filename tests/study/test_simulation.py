@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import kstest
 from support import random_loads
 
-from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
 

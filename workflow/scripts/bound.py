@@ -2,7 +2,8 @@
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, read_table, write_table
-from elastocal.mechanics.robot import robot_from_document, with_target_offset
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.evaluate import judge_from
 from elastocal.study.table_schemas import BOUNDS, DEFLECTIONS, experiments

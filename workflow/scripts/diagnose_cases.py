@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from elastocal.io.data_frames import write_text
+from elastocal.io.atomic_writes import write_text
 from elastocal.loop.whole import diagnosed
 
 from job import run

@@ -2,7 +2,8 @@
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-from elastocal.mechanics.robot import joint_limits, parse_chain
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.robot_file import joint_limits
 from elastocal.study.simulation import Loading
 from elastocal.study.steps.simulate import experiment_blocks
 from elastocal.study.table_schemas import experiments

@@ -3,7 +3,7 @@
 from elastocal.figures.kinematic_scheme import kinematic_scheme
 from elastocal.figures.spring_scheme import spring_scheme
 from elastocal.figures.style import save
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 from job import run
 

@@ -2,7 +2,8 @@
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
-from elastocal.mechanics.robot import parse_chain, with_target_offset
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.columns import DEFLECTION_COLUMNS
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.strategies import strategy_from_document, without_forgotten_stages

@@ -2,7 +2,8 @@
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
-from elastocal.mechanics.robot import parse_chain, with_target_offset
+from elastocal.mechanics.chain import parse_chain
+from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.design import design_blocks
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import design, experiments

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.campaigns.writing import write_campaign
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 from job import run
 

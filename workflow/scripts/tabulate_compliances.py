@@ -1,7 +1,7 @@
 """Table 1: the compliances that the study takes as true."""
 
 from elastocal.io.data_frames import write_csv
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.tables import table1
 
 from job import run

@@ -15,7 +15,7 @@ from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_m
 from elastocal.campaigns.reading_checks import check_angles, check_readings
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 
 
 def read_campaign(folder, robots_folder, effects=None):

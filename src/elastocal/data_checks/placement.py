@@ -13,7 +13,8 @@ from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import registered
-from elastocal.mechanics.kinematics import poses, rotation_vectors
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.pose_differences import rotation_vectors
 
 # Poses enough to tell what concerns all readings.
 MANY_POSES = 80

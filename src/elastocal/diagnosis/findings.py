@@ -7,7 +7,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
 from elastocal.effects import payload
-from elastocal.effects.protocol import lever_m
+from elastocal.effects.full_load import lever_m
 from elastocal.fitting.linearization import effect_columns
 
 # Hypotheses and locations with less than this are not listed.

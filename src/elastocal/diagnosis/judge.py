@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
-from elastocal.effects.protocol import offered
+from elastocal.effects.circumstances import offered
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import each_approach, state_clusters

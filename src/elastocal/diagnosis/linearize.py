@@ -10,7 +10,7 @@ from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
-from elastocal.effects.protocol import at_states, offered
+from elastocal.effects.circumstances import at_states, offered
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses

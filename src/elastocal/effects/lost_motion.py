@@ -10,7 +10,8 @@ References
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape, full_torque_Nm, per_joint
+from elastocal.effects.full_load import full_torque_Nm
+from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
 
 NAME, FAMILY = "lost_motion", "gearbox"
 WORDS = "lost motion (backlash)"

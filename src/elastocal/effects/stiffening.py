@@ -7,7 +7,8 @@ Neither is linear in tau_1.
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape, full_torque_Nm, lever_m, per_joint
+from elastocal.effects.full_load import full_torque_Nm, lever_m
+from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
 
 NAME, FAMILY = "stiffening", "gearbox"
 WORDS = "gear stiffening"

@@ -8,7 +8,8 @@ or to a first order lag since the campaign began.
 
 import numpy as np
 
-from elastocal.effects.protocol import Candidate, Parameter, by_warmth
+from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.warmth import by_warmth
 
 NAME, FAMILY = "temperature_gradient", "drift"
 WORDS = "temperature gradient"

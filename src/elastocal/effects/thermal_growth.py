@@ -4,7 +4,8 @@ Catalogue row 18. With a measured temperature dT is counted from 20 °C, at whic
 alone it is the rise of a first order lag since the campaign began, 1 - exp(-t / t_0).
 """
 
-from elastocal.effects.protocol import Candidate, Parameter, by_warmth
+from elastocal.effects.protocol import Candidate, Parameter
+from elastocal.effects.warmth import by_warmth
 
 NAME, FAMILY = "thermal_growth", "drift"
 WORDS = "thermal growth of the links"

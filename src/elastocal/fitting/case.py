@@ -10,7 +10,7 @@ from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting.model import Model, declared_model
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, averaged, without_wild_repeats
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
 
 

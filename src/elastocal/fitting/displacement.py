@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.effects import declared_weight
-from elastocal.effects.protocol import MASS_PARAMETERS, at_coordinates, circumstances_of, with_springs
+from elastocal.effects.circumstances import MASS_PARAMETERS, at_coordinates, circumstances_of, with_springs
 
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.

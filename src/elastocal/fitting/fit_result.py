@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.effects.protocol import at_states
+from elastocal.effects.circumstances import at_states
 from elastocal.fitting.displacement import circumstances
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once

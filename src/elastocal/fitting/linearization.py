@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.effects import declared_weight
-from elastocal.effects.protocol import Circumstances, with_springs
+from elastocal.effects.circumstances import Circumstances, with_springs
 from elastocal.fitting.displacement import displace, displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
-from elastocal.mechanics.kinematics import motion
+from elastocal.mechanics.motion import motion
 
 # Relative step of the central difference in a shape parameter.
 _SHAPE_STEP = 1e-4

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from elastocal.effects.protocol import at_states, with_springs
+from elastocal.effects.circumstances import at_states, with_springs
 from elastocal.fitting.displacement import circumstances, displaced_coordinates, joint_compliances, mass_corrections
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.linearization import linearize

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal.fitting.displacement import displaced_coordinates
-from elastocal.mechanics.kinematics import pose_differences, poses_of_points
+from elastocal.mechanics.kinematics import poses_of_points
+from elastocal.mechanics.pose_differences import pose_differences
 
 
 def predict(model, estimate, observations, circumstances):

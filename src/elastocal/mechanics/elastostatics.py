@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import jacobians, pose_differences, poses
+from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.mechanics.pose_differences import pose_differences
 
 
 def wrench_of_offset_force(force, offset_m, rotation=None):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.mechanics.robot import Chain, MeasuringPoint, Transform
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 
 def tube_compliance(tube, length_m):

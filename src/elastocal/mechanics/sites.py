@@ -9,8 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
-from elastocal.mechanics.kinematics import motion, poses
-from elastocal.mechanics.robot import STANDING, Chain, Compensator, MeasuringPoint, Robot, Transform
+from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.motion import motion
+from elastocal.mechanics.robot import STANDING, Compensator, Robot
 
 # Below this a link is a point.
 _SHORTEST_M = 1e-6

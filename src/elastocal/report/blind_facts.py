@@ -9,8 +9,8 @@ from elastocal.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARE
 from elastocal.blind.confusion import CLASS_WITH, CLASS_WITHOUT
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.blind.scores import NONE
-from elastocal.diagnosis.words import listed
-from elastocal.report.wording import at_joints, counted, grouped, plain, words
+from elastocal.diagnosis.words import at_joints, listed
+from elastocal.report.wording import counted, grouped, plain, words
 
 _OUTSIDE = "outside:"
 _GROUPS = {

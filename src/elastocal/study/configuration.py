@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document
-from elastocal.mechanics.robot import robot_from_document
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
 

@@ -6,7 +6,8 @@ Only an iterative solver gives a meaning to a strategy that "uses the estimate a
 import numpy as np
 
 from elastocal.mechanics.elastostatics import regressor
-from elastocal.mechanics.kinematics import pose_differences, poses, poses_and_jacobians
+from elastocal.mechanics.kinematics import poses, poses_and_jacobians
+from elastocal.mechanics.pose_differences import pose_differences
 
 STEPS = 30
 # Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding

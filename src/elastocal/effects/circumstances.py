@@ -1,0 +1,276 @@
+"""What effects may depend on in each state of the robot: its loads, its motion, the approach, time and temperature."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.motion import Motion, motion
+from elastocal.mechanics.sites import Sites
+
+# For each mass that the robot file declares: of the mass itself, and of its first moments along the axes of its frame.
+MASS_PARAMETERS = 4
+
+
+@dataclass(frozen=True)
+class Circumstances:
+    """Everything that an effect may depend on, for S states of the robot.
+
+    Loads are taken where the robot has yielded to them: at the displaced coordinates behind `motion`, not at the commanded ones
+    (the term K_C of Chen and Kao 2000).
+
+    Attributes
+    ----------
+    sites : Sites
+    compliance : ndarray (n,)
+        Joint compliances, rad/(N m).
+    joint_angles : ndarray (S, n)
+        As commanded, rad.
+    wrench : ndarray (S, 6)
+        N, N m, at the last measuring point, base axes.
+    motion : Motion
+        Of `Sites.followed`.
+    mass_corrections : ndarray (4 m,)
+        By how much each of the declared masses is off its robot file, kg, and then its first moments along the axes of its
+        frame beyond what goes with the mass, kg m.
+    approach : ndarray (S, n) or None
+    time_s : ndarray (S,) or None
+        Since the first reading to which the model was fitted.
+    temperature_c : ndarray (S,) or None
+    progress : ndarray (S,)
+        How far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
+    """
+
+    sites: Sites
+    compliance: np.ndarray
+    joint_angles: np.ndarray
+    wrench: np.ndarray
+    motion: Motion
+    mass_corrections: np.ndarray
+    approach: np.ndarray | None = None
+    time_s: np.ndarray | None = None
+    temperature_c: np.ndarray | None = None
+    progress: np.ndarray | None = None
+
+    @cached_property
+    def load(self):
+        """Generalized force of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C).
+
+        N on translations, N m on rotations.
+        """
+        force, moment = self.wrench.T[:3], self.wrench.T[3:] + np.cross(self.motion.position[0], self.wrench.T[:3], axis=0)
+        return self.motion.generalized_forces(self.sites.followed[0].after, force, moment).T
+
+    @cached_property
+    def gravity(self):
+        """Generalized force of the declared masses on every coordinate of the sites, ndarray (S, C)."""
+        sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
+        masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
+        centres = np.array([mass.centre_m for mass in sites.masses])
+        along, rotation = masses[:, None] * centres + corrections[:, 1:], self._body_rotation
+        first = sum(along[:, j, None, None] * rotation[:, :, j] for j in range(3))
+        first += masses[:, None, None] * self._body_position
+        on_each = self._falling[0] * (self._behind @ masses)[:, None]
+        for i in range(3):
+            on_each += self._falling[1][i] * (self._behind @ first[:, i])
+        return self.motion.by_coordinate(on_each).T
+
+    @cached_property
+    def total(self):
+        """External load and weight of the declared masses on every coordinate of the sites, ndarray (S, C)."""
+        return self.load + self.gravity if self.sites.masses else self.load
+
+    @cached_property
+    def mass_torques(self):
+        """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
+        found = []
+        for number, mass in enumerate(self.sites.masses):
+            rotation, after = self._body_rotation[number], self.sites.followed[self.sites.joints + 2 + number].after
+            centre = self._body_position[number] + np.tensordot(mass.centre_m, rotation, (0, 1))
+            found += [self._weighing(after, centre), *(self._weighing(after, rotation[:, axis], 0.0) for axis in range(3))]
+        return np.array(found)
+
+    @cached_property
+    def weight(self):
+        """Torque on each joint of one kilogram at the far end of each link, ndarray (n + 1, S, n)."""
+        ends = enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
+        return np.array([self._weighing(end.after, self.motion.position[number]) for number, end in ends])
+
+    def weight_moment(self, link, axis):
+        """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
+        return self._weighing(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
+
+    def _weighing(self, after, first_moment, mass=1.0):
+        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
+        moved = self.motion
+        joints = slice(np.searchsorted(moved.coordinate, self.sites.joints))
+        falling, turning = self._falling
+        on_each = mass * falling[joints] + sum(turning[i][joints] * first_moment[i] for i in range(3))
+        return moved.by_coordinate(on_each * (moved.place[joints] < after)[:, None]).T
+
+    @cached_property
+    def end_rotation(self):
+        """Orientation of the last measuring point, ndarray (S, 3, 3)."""
+        return np.moveaxis(self.motion.rotation[0], -1, 0)
+
+    @cached_property
+    def end_jacobian(self):
+        """Of the last measuring point, with respect to the joints, ndarray (S, 6, n)."""
+        end = self.sites.followed[0].after
+        return np.moveaxis(self.motion.jacobian(end, self.motion.position[0])[:, : self.sites.joints], -1, 0)
+
+    def joint_deflections(self, wrench):
+        """Turn of each joint under another wrench at the last measuring point: c J^T w, ndarray (S, n)."""
+        return generalized_forces(self.end_jacobian, wrench) * self.compliance
+
+    @property
+    def _body_position(self):
+        return self.motion.position[self.sites.joints + 2 : len(self.sites.followed)]
+
+    @property
+    def _body_rotation(self):
+        return self.motion.rotation[self.sites.joints + 2 : len(self.sites.followed)]
+
+    @cached_property
+    def _behind(self):
+        """Whether each mass is behind each moving transform, ndarray (K, m)."""
+        bodies = self.sites.followed[self.sites.joints + 2 :]
+        return (self.motion.place[:, None] < [body.after for body in bodies]).astype(float)
+
+    @cached_property
+    def _falling(self):
+        """Generalized force of gravity on each moving transform by a kilogram behind it at the base's origin, and per metre.
+
+        ndarrays (K, S) and (3, K, S): g . (v + a x r) = g . v + r . (g x a).
+        """
+        gravity, twist = self.sites.gravity_m_s2, self.motion.twist
+        angular = twist[3:]
+        turning = [gravity[i - 2] * angular[i - 1] - gravity[i - 1] * angular[i - 2] for i in range(3)]
+        return sum(gravity[i] * twist[i] for i in range(3)), turning
+
+
+def progress_of(states, row_span=None):
+    """How far a campaign had come in each state.
+
+    Parameters
+    ----------
+    states : States
+    row_span : (int, int), optional
+        First and last row of the campaign; those of the states without. States that have no row come after it.
+
+    Returns
+    -------
+    ndarray (S,)
+        0 at the first row, 1 at the last. Where no rows are known, poses count in the order of their numbers.
+    """
+    if not len(states) or (states.row is None and row_span is not None):
+        return np.ones(len(states))
+    place = states.pose if states.row is None else states.row
+    first, last = (place.min(), place.max()) if row_span is None else row_span
+    return (place - first) / max(last - first, 1)
+
+
+def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None, coordinates=None):
+    """What effects may depend on, in some states.
+
+    Parameters
+    ----------
+    sites : Sites
+    compliance : ndarray (n,)
+        rad/(N m).
+    states : States
+    time_zero_s : float
+        From which effects count the time.
+    mass_corrections : ndarray (4 m,), optional
+        As in `Circumstances`; zero without.
+    row_span : (int, int), optional
+        As in `progress_of`.
+    coordinates : ndarray (S, C), optional
+        Where the robot has yielded to; the commanded poses without.
+
+    Returns
+    -------
+    Circumstances
+    """
+    if coordinates is None:
+        coordinates = np.zeros((len(states), sites.chain.coordinates))
+        coordinates[:, : sites.joints] = states.joint_angles
+    return Circumstances(
+        sites,
+        np.asarray(compliance),
+        states.joint_angles,
+        states.wrench,
+        motion(sites.chain, coordinates, sites.followed),
+        np.zeros(MASS_PARAMETERS * len(sites.masses)) if mass_corrections is None else mass_corrections,
+        states.approach,
+        None if states.time_s is None else states.time_s - time_zero_s,
+        states.temperature_c,
+        progress_of(states, row_span),
+    )
+
+
+def at_coordinates(circumstances, coordinates):
+    """The same states where the robot has yielded to other coordinates, ndarray (S, C)."""
+    sites = circumstances.sites
+    return replace(circumstances, motion=motion(sites.chain, coordinates, sites.followed))
+
+
+def at_states(circumstances, chosen):
+    """Some of the states.
+
+    Parameters
+    ----------
+    circumstances : Circumstances
+    chosen : slice or ndarray of bool (S,)
+
+    Returns
+    -------
+    Circumstances
+    """
+    moved = circumstances.motion
+    some = replace(
+        moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
+    )
+    by_state = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
+    values = {name: getattr(circumstances, name) for name in by_state}
+    return replace(
+        circumstances, motion=some, **{name: None if value is None else value[chosen] for name, value in values.items()}
+    )
+
+
+def with_springs(circumstances, compliance, mass_corrections):
+    """The same states with other joint compliances (n,) and other errors of the declared masses (4 m,)."""
+    same = np.array_equal(mass_corrections, circumstances.mass_corrections)
+    if same and np.array_equal(compliance, circumstances.compliance):
+        return circumstances
+    changed = replace(circumstances, compliance=compliance, mass_corrections=mass_corrections)
+    # What is known of the loads stays so: they do not depend on the springs but by way of the motion.
+    for name in ("load", "gravity", "total", "mass_torques", "_falling", "end_jacobian", "weight"):
+        if name in vars(circumstances) and (same or name not in ("gravity", "total")):
+            vars(changed)[name] = vars(circumstances)[name]
+    return changed
+
+
+def offered(sites, states):
+    """What is there that effects may need.
+
+    Parameters
+    ----------
+    sites : Sites
+    states : States
+
+    Returns
+    -------
+    frozenset of str
+        "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which
+        nothing tells the compliances; "approach", where it is known somewhere; "time" and "temperature", where they change.
+    """
+    there = {
+        "load": bool(sites.masses) or bool(states.wrench.any()),
+        "external load": bool(states.wrench.any()),
+        "approach": states.approach is not None and bool(states.approach.any()),
+        "time": states.time_s is not None and np.ptp(states.time_s) > 0,
+        "temperature": states.temperature_c is not None and np.ptp(states.temperature_c) > 0,
+    }
+    return frozenset(name for name, present in there.items() if present)

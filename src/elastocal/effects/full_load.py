@@ -1,0 +1,41 @@
+"""The load under which gears are looked at: a pull at the end of the outstretched arm, and the weight of its links."""
+
+import numpy as np
+
+# A pull at the end of the arm, at the least lever of a tool.
+_PULL_N, _LEAST_LEVER_M = 1e3, 0.5
+
+
+def lever_m(sites, joint):
+    """Length of the arm beyond a joint, outstretched; at least that of a tool.
+
+    Parameters
+    ----------
+    sites : Sites
+    joint : int
+        From 0.
+
+    Returns
+    -------
+    float
+    """
+    return max(float(np.linalg.norm(sites.link_vectors_m[joint + 1 :], axis=1).sum()), _LEAST_LEVER_M)
+
+
+def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
+    """Torque of the rated payload, or of a kilonewton, at the end of the outstretched arm and of the weight of its links.
+
+    By it laws of gears are scaled.
+
+    Parameters
+    ----------
+    sites : Sites
+    joint : int
+        From 0.
+
+    Returns
+    -------
+    float
+    """
+    pull = _PULL_N if sites.payload_kg is None else sites.payload_kg * float(np.linalg.norm(sites.gravity_m_s2))
+    return pull * lever_m(sites, joint) + sites.longest_weight_torque_Nm(joint)

@@ -1,0 +1,35 @@
+"""What effects of warmth have in common: by how much the robot is warmer, by the temperature or by the time."""
+
+import numpy as np
+
+from elastocal.effects.protocol import Shape
+
+_REFERENCE_C = 20.0
+# Castings of a robot follow their motors and the air in a quarter of an hour to some hours.
+_LAG = Shape("lag", "s", 3600.0, 900.0, 36000.0)
+
+
+def by_warmth(candidate_of):
+    """Candidates of an effect of warmth: by the temperature where it was measured, and by the time since the campaign began.
+
+    Parameters
+    ----------
+    candidate_of : callable
+        ``candidate_of(cause, rise, needs, shapes)`` gives a candidate; ``rise(circumstances, *shapes)`` is by how much it is
+        warmer, ndarray (S,): in K from 20 °C, at which dimensions are stated (ISO 1), or the share of a first order lag.
+
+    Returns
+    -------
+    list of Candidate
+    """
+
+    def by_temperature(circumstances):
+        return circumstances.temperature_c - _REFERENCE_C
+
+    def by_time(circumstances, lag):
+        return -np.expm1(-circumstances.time_s / lag)
+
+    return [
+        candidate_of("temperature", by_temperature, frozenset({"temperature"}), ()),
+        candidate_of("time", by_time, frozenset({"time"}), (_LAG,)),
+    ]

@@ -1,0 +1,219 @@
+"""A chain of elementary transforms with named measuring points, and the notation in which it is written.
+
+The chain notation is the paper's matrix product written in a line (equations 1-4)::
+
+    Tz(l1) Rz(q1) Tx(l2) Ry(q2) Tx(l3) [2DoF] Ry(q3) ...
+
+``T`` and ``R`` are a translation along and a rotation about x, y or z of the moving frame; the argument is the name of a
+length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), each with an optional minus sign;
+``[NAME]`` marks a measuring point. ``T.(q3)`` is a prismatic joint: its coordinate is in metres, and so are its limits and its
+offset; its compliance is in µm/N. A joint that stands in several places, such as ``Ry(q2) Tz(l) Ry(-q2)``, moves all of them:
+what a parallelogram or another coupling does. It is where it stands first; behind a later place a passive joint turns.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.errors import InputError
+
+AXES = "xyz"
+_TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
+_NUMBER = re.compile(r"\d+(\.\d*)?|\.\d+")
+_NOTATION = "Tx(length) Ty(..) Tz(..) Rx(joint) Ry(..) Rz(..) Rx(90deg) and [POINT], separated by blanks"
+
+
+@dataclass(frozen=True)
+class Transform:
+    """One elementary transform along or about an axis of the moving frame, fixed or moved by a coordinate.
+
+    Attributes
+    ----------
+    kind : {"T", "R"}
+        Translation (m) or rotation (rad).
+    axis : int
+        0, 1, 2 for x, y, z.
+    constant : float
+        How far, where it is fixed (m or rad).
+    coordinate : int or None
+        Index of the coordinate that says how far, where it moves: a joint, or a spring of the extended model.
+    sign : float
+        Sense of the coordinate, +1 or -1.
+    """
+
+    kind: str
+    axis: int
+    constant: float = 0.0
+    coordinate: int | None = None
+    sign: float = 1.0
+
+
+@dataclass(frozen=True)
+class MeasuringPoint:
+    """A place on the chain where a target sits.
+
+    Attributes
+    ----------
+    name : str
+    after : int
+        How many transforms of the chain come before it.
+    offset_m : tuple of float
+        The target in the frame of the point (the paper's T_tool, without rotation).
+    """
+
+    name: str
+    after: int
+    offset_m: tuple = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Elementary transforms from the base to the last measuring point.
+
+    Attributes
+    ----------
+    transforms : tuple of Transform
+    points : tuple of MeasuringPoint
+        In the order of the chain; the last one is the end-effector.
+    coordinates : int
+        Number of coordinates that the transforms refer to.
+    """
+
+    transforms: tuple
+    points: tuple
+    coordinates: int
+
+    @property
+    def end_effector(self):
+        """The last measuring point, where the external wrench is stated."""
+        return self.points[-1]
+
+    def point(self, name):
+        """The measuring point called `name`; KeyError names those there are."""
+        for point in self.points:
+            if point.name == name:
+                return point
+        raise KeyError(f"measuring point {name!r}; the chain has {', '.join(p.name for p in self.points)}")
+
+    def moved_by(self, point):
+        """Indices of the coordinates before `point`, each once: those that can move it."""
+        transforms = self.transforms[: point.after]
+        return tuple(dict.fromkeys(t.coordinate for t in transforms if t.coordinate is not None))
+
+    @property
+    def prismatic(self):
+        """Whether each coordinate is a shift and not a turn, tuple of bool."""
+        kinds = {t.coordinate: t.kind == "T" for t in self.transforms if t.coordinate is not None}
+        return tuple(kinds.get(coordinate, False) for coordinate in range(self.coordinates))
+
+    def is_passive(self, place):
+        """Whether the transform at a place is moved by a coordinate that moves one before it as well."""
+        coordinate = self.transforms[place].coordinate
+        return coordinate is not None and any(t.coordinate == coordinate for t in self.transforms[:place])
+
+
+def parse_chain(text, lengths_m, source):
+    """Read the chain notation.
+
+    Parameters
+    ----------
+    text : str
+        The chain, as in the module's docstring.
+    lengths_m : mapping of str to float
+        Named lengths.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Chain
+
+    Raises
+    ------
+    InputError
+        A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in
+        one place and shifts in another, no measuring point, a measuring point named twice.
+    """
+    transforms, points, used, kinds = [], [], set(), {}
+    for word in text.split():
+        token = _TOKEN.fullmatch(word)
+        if not token:
+            raise InputError(source, "chain", repr(word), _NOTATION)
+        if token["point"]:
+            if token["point"] in {p.name for p in points}:
+                raise InputError(source, "chain", f"[{token['point']}] twice", "each measuring point once")
+            points.append(MeasuringPoint(token["point"], len(transforms)))
+            continue
+        kind, axis, argument = token["kind"], AXES.index(token["axis"]), token["argument"]
+        sign = -1.0 if token["sign"] else 1.0
+        number = argument.removesuffix("deg") if kind == "R" else argument
+        if kind == "T" and argument in lengths_m:
+            used.add(argument)
+            transforms.append(Transform(kind, axis, sign * lengths_m[argument]))
+        elif _NUMBER.fullmatch(number) and (kind == "T" or argument.endswith("deg")):
+            value = float(number)
+            transforms.append(Transform(kind, axis, sign * (value if kind == "T" else math.radians(value))))
+        elif argument == f"q{len(kinds) + 1}" or argument in kinds:
+            if kinds.setdefault(argument, kind) != kind:
+                raise InputError(source, "chain", repr(word), f"{argument} in R.() or in T.() alone")
+            transforms.append(Transform(kind, axis, 0.0, int(argument[1:]) - 1, sign))
+        else:
+            others = "degrees such as 90deg" if kind == "R" else f"{', '.join(lengths_m)} or metres"
+            allowed = f"q{len(kinds) + 1}{', a joint before it' if kinds else ''} or {others}"
+            raise InputError(source, "chain", repr(word), f"in {kind}{token['axis']}(): {allowed}")
+    if not kinds:
+        raise InputError(source, "chain", "no joint", "at least one R.(q1) or T.(q1)")
+    if not points or points[-1].after != len(transforms):
+        raise InputError(source, "chain", f"{text.split()[-1]!r} at its end", "a measuring point such as [6DoF] at the end")
+    if unused := sorted(set(lengths_m) - used):
+        raise InputError(source, "lengths_m", ", ".join(unused), "lengths that the chain uses")
+    return Chain(tuple(transforms), tuple(points), len(kinds))
+
+
+def notation(chain):
+    """A chain in the notation that `parse_chain` reads, with its lengths as numbers.
+
+    Parameters
+    ----------
+    chain : Chain
+
+    Returns
+    -------
+    str
+    """
+    words = []
+    for place in range(len(chain.transforms) + 1):
+        words += [f"[{point.name}]" for point in chain.points if point.after == place]
+        if place < len(chain.transforms):
+            words.append(_word(chain.transforms[place]))
+    return " ".join(words)
+
+
+def _word(transform):
+    turns = transform.kind == "R"
+    if transform.coordinate is not None:
+        sign, argument = transform.sign, f"q{transform.coordinate + 1}"
+    else:
+        sign, amount = math.copysign(1.0, transform.constant), abs(transform.constant)
+        number = np.format_float_positional(math.degrees(amount) if turns else amount, trim="-")
+        argument = f"{number}deg" if turns else number
+    return f"{transform.kind}{AXES[transform.axis]}({'-' if sign < 0 else ''}{argument})"
+
+
+def stretches(chain):
+    """Rigid stretches between the joints, as (transforms before the far end, vector in the frame of the chain there).
+
+    Rotations by a fixed angle inside a stretch are not supported here, as in any chain that turns at its joints only.
+    """
+    found, vector = [], np.zeros(3)
+    for index, transform in enumerate(chain.transforms):
+        if transform.kind == "T":
+            vector[transform.axis] += transform.constant
+        if transform.kind == "R" or index == len(chain.transforms) - 1:
+            end = index if transform.kind == "R" else index + 1
+            if np.linalg.norm(vector) > 0:
+                found.append((end, tuple(vector.tolist())))
+            vector = np.zeros(3)
+    return tuple(found)

@@ -1,0 +1,171 @@
+"""One walk along a chain: the frames of its points, and the screws of all that moves.
+
+Entries of the frame that a chain leaves at 0 or 1 for every configuration stay plain numbers and cost nothing.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from elastocal.mechanics.products import product, product_difference, product_sum
+
+# So many configurations at a time keep all intermediate arrays in a second-level cache.
+BLOCK = 8192
+
+
+def blocks(size):
+    """Cut so many configurations into blocks of `BLOCK`.
+
+    Parameters
+    ----------
+    size : int
+
+    Returns
+    -------
+    list of slice
+    """
+    return [slice(start, min(start + BLOCK, size)) for start in range(0, size, BLOCK)]
+
+
+@dataclass(frozen=True, slots=True)
+class Screw:
+    """A moving transform: its place in the chain, and its axis.
+
+    Attributes
+    ----------
+    place : int
+        How many transforms come before it.
+    kind, sign, coordinate
+        As of a `Transform`.
+    axis : list
+        Its direction, base frame; each component a float or an ndarray (S,).
+    origin : list or None
+        A point of it, m; None where points behind it can only turn.
+    """
+
+    place: int
+    kind: str
+    sign: float
+    axis: list
+    origin: list
+    coordinate: int
+
+
+def sweep(chain, coordinates, points, lines=False):
+    """Walk the chain up to the last of the points.
+
+    Parameters
+    ----------
+    chain : Chain
+    coordinates : ndarray (C, S)
+        rad and m.
+    points : sequence of MeasuringPoint
+    lines : bool
+        Without, the origin of a screw is None where all points behind lie on the axis and only turn; with them the walk goes on
+        to the end of the chain.
+
+    Returns
+    -------
+    frames : list of (axes, target)
+        Of each point, base frame; each component a float or an ndarray (S,).
+    screws : list of Screw
+        Of each moving transform on the way.
+    """
+    transforms = chain.transforms if lines else chain.transforms[: max(point.after for point in points)]
+    # Springs that no configuration moves cost nothing.
+    still = set(np.flatnonzero(~coordinates.any(axis=1)).tolist())
+    rotations = [transform for transform in transforms if transform.kind == "R" and transform.coordinate not in still]
+    turns = iter(_cosines_and_sines(coordinates, rotations))
+    axes = before_turns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    origin, turned_about = [0.0, 0.0, 0.0], None
+    screws = []
+    frames = {0: (axes, origin)}
+    for number, transform in enumerate(transforms):
+        axis, coordinate, sign = transform.axis, transform.coordinate, transform.sign
+        if coordinate is not None:
+            moves = (
+                lines
+                or transform.kind == "T"
+                or not all(_lies_on(axis, transforms[number : point.after], point) for point in points if point.after > number)
+            )
+            screws.append(Screw(number, transform.kind, sign, axes[axis], origin if moves else None, coordinate))
+        if coordinate in still:
+            pass
+        elif transform.kind == "T":
+            amount = transform.constant if coordinate is None else product(sign, coordinates[coordinate])
+            origin = _moved(origin, amount, axes[axis])
+        else:
+            if axis != turned_about:
+                before_turns, turned_about = axes, axis
+            axes = _turned(before_turns, axis, *next(turns))
+        frames[number + 1] = (axes, origin)
+    return [(frames[point.after][0], _offset(*frames[point.after], point.offset_m)) for point in points], screws
+
+
+def _offset(axes, origin, offset_m):
+    for axis, length in zip(axes, offset_m, strict=True):
+        origin = _moved(origin, length, axis)
+    return origin
+
+
+def _lies_on(axis, transforms, point):
+    """Whether transforms along and about one axis are all that lies between this axis and the point."""
+    offset = [length for direction, length in enumerate(point.offset_m) if direction != axis]
+    return not any(offset) and all(transform.axis == axis for transform in transforms)
+
+
+def _cosines_and_sines(coordinates, rotations):
+    """Cosine and sine of each rotation, counted from the first of those before it that turn about the same axis."""
+    angles, turned_about = [], None
+    for rotation in rotations:
+        angle = rotation.constant if rotation.coordinate is None else product(rotation.sign, coordinates[rotation.coordinate])
+        angles.append(angles[-1] + angle if rotation.axis == turned_about else angle)
+        turned_about = rotation.axis
+    moving = iter(_cosines_and_sines_of_arrays([angle for angle in angles if type(angle) is not float], coordinates.shape[1]))
+    return [(math.cos(angle), math.sin(angle)) if type(angle) is float else next(moving) for angle in angles]
+
+
+def _cosines_and_sines_of_arrays(angles, size):
+    """By the tangent of half the angle, which is faster in numpy than either of them."""
+    tangent = np.empty((len(angles), size))
+    for half, angle in zip(tangent, angles, strict=True):
+        np.multiply(0.5, angle, out=half)
+    np.tan(tangent, out=tangent)
+    scale = tangent * tangent
+    scale += 1.0
+    np.divide(2.0, scale, out=scale)
+    tangent *= scale
+    scale -= 1.0
+    return zip(scale, tangent, strict=True)
+
+
+def _turned(axes, about, cosine, sine):
+    """Axes of a frame after it has turned about one of them."""
+    second, third = axes[about - 2], axes[about - 1]
+    axes = list(axes)
+    axes[about - 2] = [product_sum(cosine, a, sine, b) for a, b in zip(second, third, strict=True)]
+    axes[about - 1] = [product_difference(cosine, b, sine, a) for a, b in zip(second, third, strict=True)]
+    return axes
+
+
+def _moved(origin, amount, axis):
+    return [product_sum(amount, a, 1.0, o) for o, a in zip(origin, axis, strict=True)]
+
+
+def store_pose(axes, origin, position, rotation):
+    """Write a frame of a walk to arrays.
+
+    Parameters
+    ----------
+    axes, origin : list
+        As `sweep` gives them.
+    position : ndarray (3, S)
+        Overwritten.
+    rotation : ndarray (3, 3, S)
+        Overwritten; columns are the axes.
+    """
+    for i in range(3):
+        position[i] = origin[i]
+        for j in range(3):
+            rotation[i, j] = axes[j][i]

@@ -1,0 +1,141 @@
+"""How a chain moves all that lies behind its joints: poses of points, their Jacobians and the forces of wrenches from one walk.
+
+Arrays are component first, with the configurations behind.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Poses of some points of a chain, and how each transform that moves would move everything behind it; component first.
+
+    Attributes
+    ----------
+    position : ndarray (T, 3, S)
+        m, base frame.
+    rotation : ndarray (T, 3, 3, S)
+    twist : ndarray (6, K, S)
+        For each moving transform, in the order of their coordinates, the velocity of what lies behind it, per unit of the
+        coordinate: of the body's point at the base's origin, then the angular one (the spatial twist of Murray, Li and Sastry
+        1994, 3.4).
+    place, coordinate : ndarray of int (K,)
+        How many transforms come before each, and the coordinate that moves it.
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    twist: np.ndarray
+    place: np.ndarray
+    coordinate: np.ndarray
+
+    def jacobian(self, after, position, rows=6, chosen=slice(None)):
+        """Geometric Jacobian of points behind so many transforms of the chain.
+
+        Parameters
+        ----------
+        after : int
+        position : ndarray (3, S')
+            Where the points are, m.
+        rows : {3, 6}
+            Linear velocities alone, or also angular ones.
+        chosen : slice or ndarray of int (S',), optional
+            Configuration of each.
+
+        Returns
+        -------
+        ndarray (rows, C, S')
+        """
+        twist = self.twist[..., chosen]
+        angular, product = twist[3:], np.empty_like(twist[0])
+        moved = np.empty_like(twist[:rows])
+        for i in range(3):
+            np.multiply(angular[i - 2], position[i - 1], out=moved[i])
+            np.multiply(angular[i - 1], position[i - 2], out=product)
+            moved[i] -= product
+            moved[i] += twist[i]
+        moved[3:] = angular[: rows - 3]
+        return self._behind_none(moved, after)
+
+    def generalized_forces(self, after, force, moment):
+        """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
+
+        Parameters
+        ----------
+        after : int
+        force, moment : ndarray (3, S)
+            The moment about the base's origin.
+
+        Returns
+        -------
+        ndarray (C, S)
+        """
+        on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
+        return self._behind_none(on_each, after)
+
+    def by_coordinate(self, values):
+        """Values (..., K', S) of the transforms of the first coordinates, or of all, summed for each: (..., C', S)."""
+        if self._one_each:
+            return values
+        coordinate = self.coordinate[: values.shape[-2]]
+        out = np.zeros((*values.shape[:-2], coordinate[-1] + 1, values.shape[-1]))
+        np.add.at(out, (..., coordinate, slice(None)), values)
+        return out
+
+    def _behind_none(self, values, after):
+        """By coordinate, without transforms behind a place of the chain."""
+        behind = self.place >= after
+        if behind.any():
+            values[..., behind, :] = 0.0
+        return self.by_coordinate(values)
+
+    @cached_property
+    def _one_each(self):
+        return len(np.unique(self.coordinate)) == len(self.coordinate)
+
+
+def motion(chain, coordinates, points):
+    """Poses of several measuring points and the twist of every transform that moves, in one walk along the chain.
+
+    Parameters
+    ----------
+    chain : Chain
+    coordinates : ndarray (S, C)
+        rad and m.
+    points : sequence of MeasuringPoint
+
+    Returns
+    -------
+    Motion
+    """
+    components = np.ascontiguousarray(np.asarray(coordinates, float).T)
+    size = components.shape[1]
+    walked = chain.transforms
+    position, rotation = np.empty((len(points), 3, size)), np.empty((len(points), 3, 3, size))
+    moving = sorted((t.coordinate, place) for place, t in enumerate(walked) if t.coordinate is not None)
+    order = {place: number for number, (_, place) in enumerate(moving)}
+    axis, origin = np.empty((2, 3, len(moving), size))
+    for part in blocks(size):
+        frames, screws = sweep(chain, components[:, part], points, lines=True)
+        for number, frame in enumerate(frames):
+            store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
+        for screw in screws:
+            for i in range(3):
+                axis[i, order[screw.place], part], origin[i, order[screw.place], part] = screw.axis[i], screw.origin[i]
+    driven, places = np.array(moving, int).T
+    signs = np.array([walked[place].sign for place in places])[:, None]
+    if (signs < 0).any():
+        axis *= signs
+    twist = np.empty((6, len(moving), size))
+    twist[3:] = axis
+    for i in range(3):
+        np.multiply(origin[i - 2], axis[i - 1], out=twist[i])
+        twist[i] -= origin[i - 1] * axis[i - 2]
+    shifts = np.array([walked[place].kind == "T" for place in places], bool)
+    twist[:3, shifts], twist[3:, shifts] = axis[:, shifts], 0.0
+    return Motion(position, rotation, twist, places, driven)

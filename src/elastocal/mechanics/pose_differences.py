@@ -1,0 +1,53 @@
+"""How far one pose is from another: a displacement and a rotation vector."""
+
+import numpy as np
+
+
+def pose_differences(position, rotation, position_0, rotation_0):
+    """How far one pose is from another: displacement (m) and rotation vector (rad), both in base axes.
+
+    Parameters
+    ----------
+    position, position_0 : ndarray (..., 3)
+    rotation, rotation_0 : ndarray (..., 3, 3)
+
+    Returns
+    -------
+    ndarray (..., 6)
+        Memory is component first.
+    """
+    relative = np.empty((3, 3, *position.shape[:-1]))
+    for i in range(3):
+        for j in range(3):
+            relative[i, j] = sum(rotation[..., i, k] * rotation_0[..., j, k] for k in range(3))
+    turn = rotation_vectors(np.moveaxis(relative, (0, 1), (-2, -1)))
+    difference = np.empty((6, *position.shape[:-1]))
+    difference[:3] = np.moveaxis(position - position_0, -1, 0)
+    difference[3:] = np.moveaxis(turn, -1, 0)
+    return np.moveaxis(difference, 0, -1)
+
+
+def rotation_vectors(rotation):
+    """Rotation vectors of rotation matrices, for angles below pi.
+
+    Parameters
+    ----------
+    rotation : ndarray (..., 3, 3)
+
+    Returns
+    -------
+    ndarray (..., 3)
+        rad.
+    """
+    skew = 0.5 * np.stack(
+        [
+            rotation[..., 2, 1] - rotation[..., 1, 2],
+            rotation[..., 0, 2] - rotation[..., 2, 0],
+            rotation[..., 1, 0] - rotation[..., 0, 1],
+        ]
+    )
+    sine = np.sqrt((skew**2).sum(axis=0))
+    cosine = 0.5 * (rotation[..., 0, 0] + rotation[..., 1, 1] + rotation[..., 2, 2] - 1.0)
+    angle = np.arctan2(sine, cosine)
+    scale = np.divide(angle, sine, out=np.ones_like(sine), where=sine > 0)
+    return np.moveaxis(skew * scale, 0, -1)

@@ -1,0 +1,223 @@
+"""A robot from its file and back, with the checks that the file's schema cannot make.
+
+The chain is in the notation of `chain`. A robot file may say what the links weigh::
+
+    masses:
+      - {link: 2, mass_kg: 190, centre_m: [0.52, 0.0, 0.03], relative_std: 0.1}
+    gravity_m_s2: [0, 0, -9.80665]
+    gear_ratio: [null, 171, 153, null, null, null]
+    compensator: {joint: 2, kind: spring}
+    payload_kg: 165
+
+Link k is what joint k carries; link 0 is the column before joint 1. ``centre_m`` is stated in the frame of the chain directly
+behind the transform ``R.(qk)`` (of link 0: in the base frame): its origin lies on the axis of joint k, where the chain has it,
+and its axes turn with the joint, so that one axis is the joint's own. With all of the chain at zero these are base axes unless
+the chain has fixed rotations before. ``relative_std`` is the standard deviation of the mass over the mass, and of each
+component of the centre over its distance from the origin (0.1 m at least). Gravity is given in base axes: a robot on a wall or
+on a tilted foot has another.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from elastocal.errors import InputError
+from elastocal.mechanics.chain import notation, parse_chain, stretches
+from elastocal.mechanics.robot import STANDING, Compensator, Link, Mass, Robot, Tube
+
+# The longest serial arms of the market reach 4.7 m and their lengths, the column's included, sum to 7; any of them written in
+# centimetres, inches or millimetres is beyond this.
+LONGEST_REACH_M = 10.0
+
+
+def robot_from_document(document, source="robot"):
+    """Make a robot from the contents of its file, already validated against the robot schema.
+
+    Parameters
+    ----------
+    document : mapping
+        Keys as in ``schemas/robot.yaml``.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Robot
+
+    Raises
+    ------
+    InputError
+        Where the chain does not parse or reaches farther than any machine, or a list has another length than there are joints.
+    """
+    chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
+    _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
+    n = chain.coordinates
+    if len(document["compliance_urad_per_Nm"]) != n:
+        found = f"{len(document['compliance_urad_per_Nm'])} entries"
+        raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {n} joints")
+    reported = document.get("reported_joints", {})
+    matrix = reported.get("matrix", np.eye(n).tolist())
+    offset = reported.get("offset_deg", [0.0] * n)
+    if [len(row) for row in matrix] != [n] * n or len(offset) != n:
+        found = f"rows of {[len(row) for row in matrix]} and {len(offset)} offsets"
+        raise InputError(source, "reported_joints", found, f"{n} rows of {n} numbers and {n} offsets")
+    return Robot(
+        name=document["name"],
+        chain=chain,
+        compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
+        joint_limits=joint_limits(document["joint_limits_deg"], chain, source),
+        links=_links(chain, document.get("links"), source),
+        reported_matrix=np.array(matrix, float),
+        reported_offset=np.array(offset, float) * _per_degree(chain),
+        masses=_masses(document.get("masses", ()), n, source),
+        gravity_m_s2=_gravity(document.get("gravity_m_s2", STANDING), source),
+        gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
+        compensator=_compensator(document.get("compensator"), n, source),
+        payload_kg=document.get("payload_kg"),
+    )
+
+
+def document_of(robot):
+    """A robot as the contents of its file, the inverse of `robot_from_document`.
+
+    Parameters
+    ----------
+    robot : Robot
+        Without elastic links: their tubes are no data of an arm but of a study.
+
+    Returns
+    -------
+    dict
+        Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
+    """
+    document = {
+        "name": robot.name,
+        "chain": notation(robot.chain),
+        "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
+        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
+    }
+    if (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
+        offset = (robot.reported_offset / _per_degree(robot.chain)).tolist()
+        document["reported_joints"] = {"matrix": robot.reported_matrix.tolist(), "offset_deg": offset}
+    if robot.masses:
+        document["masses"] = [vars(mass) | {"centre_m": list(mass.centre_m)} for mass in robot.masses]
+    if robot.gravity_m_s2 != STANDING:
+        document["gravity_m_s2"] = list(robot.gravity_m_s2)
+    if robot.gear_ratio is not None:
+        document["gear_ratio"] = list(robot.gear_ratio)
+    if robot.compensator is not None:
+        document["compensator"] = dict(vars(robot.compensator))
+    if robot.payload_kg is not None:
+        document["payload_kg"] = robot.payload_kg
+    return document
+
+
+def joint_limits(limits_deg, chain, source):
+    """Joint limits in rad, of prismatic joints in m.
+
+    Parameters
+    ----------
+    limits_deg : sequence of (float, float)
+        Lower and upper limit of each joint; of prismatic ones in metres.
+    chain : Chain
+        Whose joints they are.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    ndarray (n, 2)
+
+    Raises
+    ------
+    InputError
+        Where there are too few or too many, or a lower limit is not below the upper one.
+    """
+    joints = chain.coordinates
+    if len(limits_deg) != joints:
+        raise InputError(source, "joint_limits_deg", f"{len(limits_deg)} entries", f"one for each of the {joints} joints")
+    for joint, (low, high) in enumerate(limits_deg):
+        if low >= high:
+            raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
+    return np.array(limits_deg, float) * _per_degree(chain)[:, None]
+
+
+def _per_degree(chain):
+    """What one degree, or of prismatic joints one metre, of a robot file is in SI units, ndarray (n,)."""
+    return np.where(chain.prismatic, 1.0, math.radians(1.0))
+
+
+def _masses(described, joints, source):
+    masses = sorted((Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described), key=_link_of)
+    for index, entry in enumerate(described):
+        if entry["link"] > joints:
+            raise InputError(
+                source, f"masses[{index}].link", str(entry["link"]), f"0 for the column, or a joint up to {joints}"
+            )
+    for one, other in pairwise(masses):
+        if one.link == other.link:
+            raise InputError(source, "masses", f"link {one.link} twice", "each link once, with all that it carries")
+    return tuple(masses)
+
+
+def _link_of(mass):
+    return mass.link
+
+
+def _gravity(vector, source):
+    if not any(vector):
+        raise InputError(source, "gravity_m_s2", str(list(vector)), "a vector with a length, in base axes")
+    return tuple(map(float, vector))
+
+
+def _gear_ratio(ratios, joints, source):
+    if ratios is None:
+        return None
+    if len(ratios) != joints:
+        raise InputError(source, "gear_ratio", f"{len(ratios)} entries", f"one or null for each of the {joints} joints")
+    return tuple(ratios)
+
+
+def _compensator(described, joints, source):
+    if described is None:
+        return None
+    if described["joint"] > joints:
+        raise InputError(source, "compensator.joint", str(described["joint"]), f"a joint from 1 to {joints}")
+    return Compensator(**described)
+
+
+def _check_reach(chain, key, source):
+    reach = sum(abs(transform.constant) for transform in chain.transforms if transform.kind == "T")
+    if reach > LONGEST_REACH_M:
+        allowed = f"lengths in metres (not millimetres) that reach {LONGEST_REACH_M:g} m at most"
+        raise InputError(source, key, f"a chain that reaches {reach:.4g} m", allowed)
+
+
+def _links(chain, described, source):
+    if described is None:
+        return ()
+    odd = {
+        "fixed rotations": any(t.kind == "R" and t.coordinate is None for t in chain.transforms),
+        "prismatic joints": any(chain.prismatic),
+        "passive joints": any(chain.is_passive(place) for place in range(len(chain.transforms))),
+    }
+    for what in (what for what, there in odd.items() if there):
+        raise InputError(source, "links", f"a chain with {what}", "links on chains that turn at their joints only")
+    rigid = stretches(chain)
+    tubes = described["tubes"]
+    if len(tubes) not in (1, len(rigid)):
+        raise InputError(source, "links.tubes", f"{len(tubes)} tubes", f"one for all links or one for each of the {len(rigid)}")
+    links = []
+    for number, (after, vector) in enumerate(rigid):
+        size = tubes[number if len(tubes) > 1 else 0]
+        if 2 * size["wall_m"] > size["outer_diameter_m"]:
+            raise InputError(source, "links.tubes", f"wall_m {size['wall_m']}", "at most half the outer_diameter_m")
+        tube = Tube(
+            size["outer_diameter_m"],
+            size["wall_m"],
+            1e9 * described["youngs_modulus_GPa"],
+            1e9 * described["shear_modulus_GPa"],
+        )
+        links.append(Link(after, vector, tube))
+    return tuple(links)

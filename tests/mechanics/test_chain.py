@@ -1,0 +1,144 @@
+"""The chain notation: what it means, and that every fault is refused in one line."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from support import chain_of, refused
+
+from elastocal.mechanics.chain import Transform, notation, parse_chain, stretches
+
+
+def test_each_token_becomes_one_transform():
+    text = "Tz(l1) Rz(q1) Tx(-l2) Ry(-q2) Rx(90deg) Rx(-30.5deg) Ty(-.25) Tz(2) [EE]"
+    chain = parse_chain(text, {"l1": 0.6, "l2": 0.3}, "test")
+    assert chain.transforms == (
+        Transform("T", 2, 0.6),
+        Transform("R", 2, 0.0, 0, 1.0),
+        Transform("T", 0, -0.3),
+        Transform("R", 1, 0.0, 1, -1.0),
+        Transform("R", 0, math.pi / 2),
+        Transform("R", 0, -math.radians(30.5)),
+        Transform("T", 1, -0.25),
+        Transform("T", 2, 2.0),
+    )
+    assert chain.coordinates == 2
+    assert [(p.name, p.after) for p in chain.points] == [("EE", 8)]
+
+
+def test_minus_sign_of_a_negative_length_is_plus():
+    assert parse_chain("Rz(q1) Tx(-l) [A]", {"l": -0.041}, "test").transforms[1].constant == 0.041
+
+
+def test_points_stand_where_they_are_written_and_the_last_is_the_end_effector():
+    chain = chain_of("[base] Rz(q1) Tx(1) [A] Ry(q2) [B] [C]")
+    assert [(p.name, p.after) for p in chain.points] == [("base", 0), ("A", 2), ("B", 3), ("C", 3)]
+    assert chain.end_effector == chain.point("C")
+    assert [chain.moved_by(p) for p in chain.points] == [(), (0,), (0, 1), (0, 1)]
+
+
+def test_unknown_point_names_those_of_the_chain():
+    with pytest.raises(KeyError, match=r"'C'.*A, B"):
+        chain_of("Rz(q1) [A] Ry(q2) [B]").point("C")
+
+
+def test_both_robots_have_the_points_and_joints_of_the_paper(robot):
+    assert [p.name for p in robot.chain.points] == ["2DoF", "3DoF", "4DoF", "6DoF"]
+    assert [robot.chain.moved_by(p) for p in robot.chain.points] == [(0, 1), (0, 1, 2), (0, 1, 2, 3), (0, 1, 2, 3, 4, 5)]
+    assert robot.joints == 6
+
+
+@st.composite
+def written_chains(draw):
+    """(text, transforms) of a chain of random tokens."""
+    words, transforms, joints = [], [], 0
+    for kind in [*draw(st.lists(st.sampled_from("TRq"), min_size=1, max_size=12)), "q"]:
+        axis, sign = draw(st.integers(0, 2)), draw(st.sampled_from(["", "-"]))
+        factor = -1.0 if sign else 1.0
+        if kind == "q":
+            joints += 1
+            words.append(f"R{'xyz'[axis]}({sign}q{joints})")
+            transforms.append(Transform("R", axis, 0.0, joints - 1, factor))
+        else:
+            number = f"{draw(st.integers(0, 359))}.{draw(st.integers(0, 999)):03d}"
+            words.append(f"{kind}{'xyz'[axis]}({sign}{number}{'deg' if kind == 'R' else ''})")
+            amount = math.radians(float(number)) if kind == "R" else float(number)
+            transforms.append(Transform(kind, axis, factor * amount))
+    return " ".join([*words, "[EE]"]), tuple(transforms)
+
+
+@given(written_chains())
+def test_any_written_chain_is_read_as_written(written):
+    text, transforms = written
+    assert chain_of(text).transforms == transforms
+
+
+@given(written_chains())
+def test_notation_of_a_chain_is_read_as_that_chain(written):
+    chain = chain_of(written[0])
+    again = chain_of(notation(chain))
+    for ours, theirs in zip(again.transforms, chain.transforms, strict=True):
+        assert replace(ours, constant=0.0) == replace(theirs, constant=0.0)
+        assert ours.constant == pytest.approx(theirs.constant, rel=1e-15)
+    assert again.points == chain.points
+
+
+def test_blanks_and_line_breaks_separate_tokens_alike():
+    assert chain_of("Tz(1)\n  Rz(q1)   Tx(2)\t[EE]") == chain_of("Tz(1) Rz(q1) Tx(2) [EE]")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("Tz(l1) Rz(q1) Tw(l2) [A]", ["'Tw(l2)'", "Tx(length)", "[POINT]"]),
+        ("Tz(l1) rz(q1) Tx(l2) [A]", ["'rz(q1)'"]),
+        ("Tz(l1)Rz(q1) Tx(l2) [A]", ["'Tz(l1)Rz(q1)'", "separated by blanks"]),
+        ("Tz(l1) Rz(q1) Tx(l2 [A]", ["'Tx(l2'"]),
+        ("Tz(l1) Rz(q1) Tx(--l2) [A]", ["'Tx(--l2)'"]),
+        ("Tz(l1) Rz(q1) Tx() [A]", ["'Tx()'"]),
+        ("Tz(l1) Rz(q1) Tx(l2) []", ["'[]'"]),
+        ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(q3) [A]", ["'Ry(q3)'", "q2, a joint before it or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(q1) Tx(l2) [A]", ["'Tx(q1)'", "R.() or in T.() alone"]),
+        ("Tz(l1) Tx(q1) Rz(q1) Tx(l2) [A]", ["'Rz(q1)'", "R.() or in T.() alone"]),
+        ("Tz(l1) Rz(q2) Tx(l2) [A]", ["'Rz(q2)'", "q1 or degrees"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(90) [A]", ["'Ry(90)'", "90deg"]),
+        ("Tz(l1) Rz(q1) Tx(l2) Ry(l2) [A]", ["'Ry(l2)'"]),
+        ("Tz(l1) Rz(q1) Tx(l9) [A]", ["'Tx(l9)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(q3) [A]", ["'Tx(q3)'", "q2, a joint before it or l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(5deg) [A]", ["'Tx(5deg)'", "l1, l2 or metres"]),
+        ("Tz(l1) Rz(q1) Tx(1,5) [A]", ["'Tx(1,5)'"]),
+        ("Tz(l1) Rz(q1) [A] Tx(l2) [A]", ["[A] twice", "once"]),
+        ("Tz(l1) Rz(q1) [A] Tx(l2)", ["'Tx(l2)' at its end", "measuring point"]),
+        ("Tz(l1) Rz(q1) Tx(l2)", ["'Tx(l2)' at its end", "[6DoF] at the end"]),
+        ("Tz(l1) Tx(l2) [A]", ["no joint", "q1"]),
+        ("", ["no joint", "q1"]),
+    ],
+)
+def test_faulty_chain_is_refused_in_one_line(text, words):
+    with refused("robots/x.yaml", "chain", *words):
+        parse_chain(text, {"l1": 1.0, "l2": 2.0}, "robots/x.yaml")
+
+
+def test_length_that_the_chain_does_not_use_is_refused():
+    with refused("robots/x.yaml", "lengths_m", "l2, l3", "that the chain uses"):
+        parse_chain("Tz(l1) Rz(q1) [A]", {"l1": 1.0, "l3": 2.0, "l2": 2.0}, "robots/x.yaml")
+
+
+def test_joint_in_two_places_is_one_coordinate_and_passive_in_the_second():
+    chain = chain_of("Tx(q1) Tz(0.5) Rz(q2) Tx(1) Ry(q3) Tx(1) Ry(-q3) [hand]")
+    assert [t.coordinate for t in chain.transforms if t.coordinate is not None] == [0, 1, 2, 2]
+    assert [place for place in range(len(chain.transforms)) if chain.is_passive(place)] == [6]
+    assert chain.moved_by(chain.end_effector) == (0, 1, 2)
+
+
+def test_stretches_are_the_rigid_parts_between_the_joints(kuka):
+    assert stretches(kuka.chain) == (
+        (1, (0.0, 0.0, 0.675)),
+        (3, (0.35, 0.0, 0.0)),
+        (5, (1.15, 0.0, 0.0)),
+        (8, (1.2, 0.0, -0.041)),
+        (12, (0.24, 0.0, 0.0)),
+    )

@@ -1,0 +1,201 @@
+"""The robot file: what it means, that every fault is refused in one line, and the way back to it."""
+
+from copy import deepcopy
+
+import numpy as np
+import pytest
+from support import refused
+
+from elastocal.io.documents import check_document, read_document
+from elastocal.mechanics.robot import Compensator, Mass
+from elastocal.mechanics.robot_file import document_of, robot_from_document
+
+TWO_JOINTS = {
+    "name": "two joints",
+    "chain": "Tz(l1) Rz(q1) Tx(l2) [A] Ry(q2) Tx(l3) [B]",
+    "lengths_m": {"l1": 0.5, "l2": 0.25, "l3": 1.5},
+    "joint_limits_deg": [[-180, 180], [-90, 45]],
+    "compliance_urad_per_Nm": [1.5, 2.5],
+}
+
+
+TUBES = {"youngs_modulus_GPa": 70, "shear_modulus_GPa": 26, "tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.02}]}
+
+
+def document(**changes):
+    changed = deepcopy(TWO_JOINTS) | changes
+    return {key: value for key, value in changed.items() if value is not None}
+
+
+def test_robot_file_comes_in_si_units():
+    robot = robot_from_document(document())
+    assert robot.joints == 2 and robot.links == ()
+    np.testing.assert_allclose(robot.compliance, [1.5e-6, 2.5e-6], rtol=1e-15)
+    np.testing.assert_allclose(robot.joint_limits, [[-np.pi, np.pi], [-np.pi / 2, np.pi / 4]], rtol=1e-15)
+    np.testing.assert_array_equal(robot.reported_matrix, np.eye(2))
+    np.testing.assert_array_equal(robot.reported_offset, np.zeros(2))
+
+
+def test_reported_joints_come_in_radians():
+    robot = robot_from_document(document(reported_joints={"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}))
+    np.testing.assert_array_equal(robot.reported_matrix, [[1, 0], [1, -1]])
+    np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"joint_limits_deg": [[-180, 180]]}, "joint_limits_deg", ["1 entries", "each of the 2 joints"]),
+        ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
+        ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
+        ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
+        ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 rows of 2 numbers"]),
+        ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["and 2 offsets"]),
+        ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),
+        ({"lengths_m": None}, "chain", ["'Tz(l1)'", "metres"]),
+        ({"lengths_m": {"l1": 1, "l2": 1, "l3": 1, "l4": 1}}, "lengths_m", ["l4"]),
+        (
+            {"lengths_m": {"l1": 500, "l2": 250, "l3": 1500}},
+            "lengths_m",
+            ["reaches 2250 m", "in metres (not millimetres)", "10 m"],
+        ),
+        ({"chain": "Tz(0.5) Rz(q1) Tx(-9) Ry(q2) Tx(0.6) [B]", "lengths_m": None}, "chain", ["reaches 10.1 m", "metres"]),
+        ({"links": TUBES | {"tubes": TUBES["tubes"] * 2}}, "links.tubes", ["2 tubes", "each of the 3"]),
+        ({"links": TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.101}]}}, "links.tubes", ["0.101", "half"]),
+    ],
+)
+def test_faulty_robot_file_is_refused_in_one_line(changes, key, words):
+    with refused("robots/two.yaml", key, *words):
+        robot_from_document(document(**changes), "robots/two.yaml")
+
+
+def test_links_on_a_chain_with_fixed_rotations_are_refused():
+    with refused("robots/two.yaml", "links", "turn at their joints only"):
+        turned = document(chain="Tz(l1) Rz(q1) Tx(l2) Rx(90deg) [A] Ry(q2) Tx(l3) [B]", links=TUBES)
+        robot_from_document(turned, "robots/two.yaml")
+
+
+def test_one_tube_serves_every_link_and_a_list_of_tubes_goes_from_the_base_on():
+    same = robot_from_document(document(links=TUBES))
+    assert len(same.links) == 3 and len({link.tube for link in same.links}) == 1
+    sizes = [{"outer_diameter_m": d, "wall_m": 0.01} for d in (0.3, 0.2, 0.1)]
+    each = robot_from_document(document(links=TUBES | {"tubes": sizes}))
+    assert [link.tube.outer_diameter_m for link in each.links] == [0.3, 0.2, 0.1]
+    assert {(link.tube.youngs_modulus_Pa, link.tube.shear_modulus_Pa) for link in each.links} == {(70e9, 26e9)}
+
+
+def test_a_solid_tube_is_allowed():
+    solid = TUBES | {"tubes": [{"outer_diameter_m": 0.2, "wall_m": 0.1}]}
+    assert len(robot_from_document(document(links=solid)).links) == 3
+
+
+def test_every_robot_of_the_repository_has_the_compliances_of_table_1(config_folder):
+    table = {"kuka": [0.54, 0.29, 0.42, 2.79, 3.48, 2.07], "fanuc": [1.23, 0.37, 0.46, 2.68, 2.70, 2.72]}
+    for name, compliance in (table | {"kuka_extended": table["kuka"]}).items():
+        robot = robot_from_document(read_document(config_folder / "robots" / f"{name}.yaml"))
+        np.testing.assert_allclose(robot.compliance, 1e-6 * np.array(compliance), rtol=1e-12)
+
+
+WEIGHED = {
+    "masses": [
+        {"link": 2, "mass_kg": 40, "centre_m": [0.5, 0, -0.02], "relative_std": 0.1},
+        {"link": 0, "mass_kg": 90.5, "centre_m": [0, 0, 0.2], "relative_std": 0.2},
+    ],
+    "gravity_m_s2": [0, 9.80665, 0],
+    "gear_ratio": [None, 171],
+    "compensator": {"joint": 2, "kind": "spring"},
+    "payload_kg": 12,
+}
+
+
+def test_what_the_links_weigh_comes_in_their_order():
+    robot = robot_from_document(document(**WEIGHED))
+    assert robot.masses == (Mass(0, 90.5, (0.0, 0.0, 0.2), 0.2), Mass(2, 40, (0.5, 0.0, -0.02), 0.1))
+    assert robot.gravity_m_s2 == (0.0, 9.80665, 0.0) and robot.gear_ratio == (None, 171)
+    assert robot.compensator == Compensator(2, "spring") and robot.payload_kg == 12
+
+
+def test_robot_file_that_says_nothing_of_weights_is_a_weightless_arm_on_a_floor():
+    robot = robot_from_document(document())
+    assert robot.masses == () and robot.gravity_m_s2 == (0.0, 0.0, -9.80665)
+    assert robot.gear_ratio is None and robot.compensator is None and robot.payload_kg is None
+
+
+@pytest.mark.parametrize("more", [{}, WEIGHED, {"reported_joints": {"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}}])
+def test_robot_becomes_a_document_that_gives_it_back(more):
+    robot = robot_from_document(document(**more))
+    written = document_of(robot)
+    check_document(written, "robot", "robot.yaml")
+    again = robot_from_document(written)
+    assert again.chain == robot.chain
+    for name, value in vars(robot).items():
+        if isinstance(value, np.ndarray):
+            np.testing.assert_allclose(getattr(again, name), value, rtol=1e-15)
+        else:
+            assert getattr(again, name) == value, name
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"masses": [WEIGHED["masses"][0] | {"link": 3}]}, "masses[0].link", ["3", "to 2"]),
+        ({"masses": WEIGHED["masses"][:1] * 2}, "masses", ["link 2 twice", "each link once"]),
+        ({"gravity_m_s2": [0, 0, 0]}, "gravity_m_s2", ["[0, 0, 0]", "base axes"]),
+        ({"gear_ratio": [100]}, "gear_ratio", ["1 entries", "2 joints"]),
+        ({"compensator": {"joint": 3, "kind": "gas"}}, "compensator.joint", ["3", "1 to 2"]),
+    ],
+)
+def test_weights_that_do_not_suit_the_robot_are_refused(changes, key, words):
+    with refused("robots/two.yaml", key, *words):
+        robot_from_document(document(**changes), "robots/two.yaml")
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"masses": [{"link": 1, "mass_kg": 5, "centre_m": [0, 0, 0]}]}, "masses[0].relative_std"),
+        ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 0}]}, "masses[0].mass_kg"),
+        ({"masses": [WEIGHED["masses"][0] | {"centre_m": [0, 0]}]}, "masses[0].centre_m"),
+        ({"gravity_m_s2": [0, 0]}, "gravity_m_s2"),
+        ({"gear_ratio": [0, 100]}, "gear_ratio[0]"),
+        ({"compensator": {"joint": 2, "kind": "rope"}}, "compensator.kind"),
+        ({"payload_kg": 0}, "payload_kg"),
+    ],
+)
+def test_schema_refuses_weights_that_cannot_be(changes, key):
+    with refused("robots/two.yaml", key):
+        check_document(document(**changes), "robot", "robots/two.yaml")
+
+
+TRACKED = {
+    "name": "on a track",
+    "chain": "Tx(q1) Tz(0.5) Rz(q2) Tx(1) Ry(q3) Tx(1) Ry(-q3) [hand]",
+    "joint_limits_deg": [[-0.5, 4.0], [-180, 180], [-90, 90]],
+    "compliance_urad_per_Nm": [0.02, 1.0, 2.0],
+    "reported_joints": {"matrix": [[-1, 0, 0], [0, 1, 0], [0, 0, 1]], "offset_deg": [2.5, 0, 90]},
+}
+
+
+def test_prismatic_joints_are_in_metres_and_newtons():
+    robot = robot_from_document(TRACKED)
+    assert robot.chain.prismatic == (True, False, False) and robot.joints == 3
+    np.testing.assert_allclose(robot.joint_limits, [[-0.5, 4.0], [-np.pi, np.pi], [-np.pi / 2, np.pi / 2]], rtol=1e-15)
+    np.testing.assert_allclose(robot.reported_offset, [2.5, 0.0, np.pi / 2], rtol=1e-15)
+    np.testing.assert_allclose(robot.compliance, [2e-8, 1e-6, 2e-6], rtol=1e-15)
+
+
+def test_robot_on_a_track_becomes_a_document_that_gives_it_back():
+    robot = robot_from_document(TRACKED)
+    again = robot_from_document(document_of(robot))
+    assert again.chain == robot.chain
+    for name in ("joint_limits", "reported_offset", "compliance", "reported_matrix"):
+        np.testing.assert_allclose(getattr(again, name), getattr(robot, name), rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("chain", "what"),
+    [("Tx(q1) Tz(0.5) Rz(q2) Tx(1) [B]", "prismatic joints"), ("Rz(q1) Tx(1) Ry(q2) Tx(1) Ry(-q2) [B]", "passive joints")],
+)
+def test_tubes_are_refused_where_links_change_their_length_or_turn_by_themselves(chain, what):
+    with refused("robots/x.yaml", "links", what):
+        robot_from_document(document(chain=chain, lengths_m=None, links=TUBES), "robots/x.yaml")
