@@ -21,12 +21,12 @@ def rows(work):
     """Rows of the report, for the estimates alone and with what the study stores beside them; `work` is not used."""
     robot, strategy = load_robot("kuka"), load_strategy("6DoF")
     joints = robot.joints
-    blocks = [_readings(robot, strategy, range(i, i + SETS_PER_BLOCK)) for i in range(0, SETS, SETS_PER_BLOCK)]
-    systems = [_systems(readings["6DoF"]) for readings in blocks]
+    blocks = [_measurements(robot, strategy, range(i, i + SETS_PER_BLOCK)) for i in range(0, SETS, SETS_PER_BLOCK)]
+    systems = [_systems(measurements["6DoF"]) for measurements in blocks]
     order = list(strategy.stages[0].identified)
 
     def ours():
-        return [estimate_compliance(strategy, readings, joints)[0] for readings in blocks]
+        return [estimate_compliance(strategy, measurements, joints)[0] for measurements in blocks]
 
     def loop():
         found = np.empty((SETS, CONFIGURATIONS, joints))
@@ -40,7 +40,7 @@ def rows(work):
         return found
 
     def with_covariance():
-        return [identify(strategy, readings, joints) for readings in blocks]
+        return [identify(strategy, measurements, joints) for measurements in blocks]
 
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())
     functions = {"elastocal": ours, "with covariance": with_covariance, "numpy.linalg.lstsq": loop}
@@ -56,7 +56,7 @@ def rows(work):
     ]
 
 
-def _readings(robot, strategy, sets):
+def _measurements(robot, strategy, sets):
     experiments = random_experiments(
         robot.chain, robot.joint_limits, 1, "kuka", LOADING, "identification", sets, CONFIGURATIONS
     )
@@ -64,14 +64,14 @@ def _readings(robot, strategy, sets):
     noise = NOISE * measurement_noise(1, "kuka", point.name, sets, CONFIGURATIONS)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise
     columns = {point.name: deflection_columns(point.name, sets, measured)}
-    return Situation(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector").readings
+    return Situation(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector").measurements
 
 
-def _systems(readings):
+def _systems(measurements):
     """Matrix and right-hand side of each data set, contiguous, so that the loop has nothing to do but to solve."""
-    _, joints, _, sets = readings.regressor.shape
-    matrices = np.ascontiguousarray(readings.regressor.transpose(3, 2, 0, 1)).reshape(sets, -1, joints)
-    return matrices, np.ascontiguousarray(readings.deflection.transpose(2, 1, 0)).reshape(sets, -1)
+    _, joints, _, sets = measurements.regressor.shape
+    matrices = np.ascontiguousarray(measurements.regressor.transpose(3, 2, 0, 1)).reshape(sets, -1, joints)
+    return matrices, np.ascontiguousarray(measurements.deflection.transpose(2, 1, 0)).reshape(sets, -1)
 
 
 def _assert_equal(ours, theirs):

@@ -1,4 +1,4 @@
-"""The diagnosing engine in one process: a case of the blind proof, UR10 Series A, a million readings; growth.
+"""The diagnosing engine in one process: a case of the blind proof, UR10 Series A, a million measurements; growth.
 
 Each campaign is diagnosed and judged by a process of its own, from its folder to the verdict, which notes its peak memory at
 the end (Linux).
@@ -42,7 +42,7 @@ for folder in folders:
     seconds.append(time.perf_counter() - start)
 print(json.dumps({"seconds": seconds}))
 """
-# Readings of the growth; the larger number twice the smaller.
+# Measurements of the growth; the larger number twice the smaller.
 GROWTH = (20_000, 40_000)
 # What a process of its own does: campaigns one after the other, all candidates or every second one.
 SCRIPT = """
@@ -62,7 +62,7 @@ for folder in folders:
     judge(diagnose(replace(training, candidates=dict(kept)), Settings(), 1), held_out, 1)
     seconds.append(time.perf_counter() - start)
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9
-print(json.dumps({"seconds": seconds, "peak_gb": peak, "candidates": len(kept), "readings": len(training.observations)}))
+print(json.dumps({"seconds": seconds, "peak_gb": peak, "candidates": len(kept), "measurements": len(training.observations)}))
 """
 
 
@@ -81,7 +81,7 @@ def rows(work):
         ur10_ipa.write_campaign(source, work / "series_a", "ur10_series_a")
         how = "UR10 Series A, 11,911 poses, from its folder to its verdict, linear algebra on two threads"
         yield from _limits("large ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
-    how = "a million readings of a tracker's dynamic mode, from the file to the verdict, linear algebra on two threads"
+    how = "a million measurements of a tracker's dynamic mode, from the file to the verdict, linear algebra on two threads"
     yield from _limits("large million", _dynamic(work, MILLION), MILLION_S, MILLION_GB, how)
     yield from _growth(work)
 
@@ -136,9 +136,9 @@ def _limits(name, folder, allowed_s, allowed_gb, how):
 
 
 def _growth(work):
-    few, many = (_dynamic(work, readings) for readings in GROWTH)
+    few, many = (_dynamic(work, measurements) for measurements in GROWTH)
     small, large, half = _run([few]), _run([many]), _run([many], share=2)
-    for name, less, part in (("readings", small, "readings"), ("candidates", half, "candidates")):
+    for name, less, part in (("measurements", small, "measurements"), ("candidates", half, "candidates")):
         (ours,), (theirs,) = large["seconds"], less["seconds"]
         how = f"{large[part]} {name} against {less[part]}, the rest alike, from the file to the verdict"
         yield Row(f"large {name} time", ours, theirs, ours / theirs, "", None, how)
@@ -146,10 +146,10 @@ def _growth(work):
         yield Row(f"large {name} memory", None, None, ratio, "", None, f"peak of {large['peak_gb']:.2f} GB: {how}")
 
 
-def _dynamic(work, readings):
-    arm, folder = arm_from_file(ROBOTS / "fanuc.yaml"), work / f"dynamic{readings}"
+def _dynamic(work, measurements):
+    arm, folder = arm_from_file(ROBOTS / "fanuc.yaml"), work / f"dynamic{measurements}"
     robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
-    write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, readings, 4, declared_masses(arm))
+    write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, measurements, 4, declared_masses(arm))
     return folder
 
 

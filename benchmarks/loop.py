@@ -1,4 +1,4 @@
-"""The loop on one campaign: wall time against what is allowed, growth with readings and candidates, share of linear algebra."""
+"""The loop on one campaign: wall time against what is allowed, growth with measurements and candidates, share of algebra."""
 
 import cProfile
 import os
@@ -62,8 +62,8 @@ def _growth(work):
         "half the candidates": lambda: diagnose(fewer, Settings(), 1),
     }
     all_of, poses, candidates = map(min, interleaved(functions, REPETITIONS))
-    rows, readings = len(whole.observations) * whole.model.rows, len(half.observations) * half.model.rows
-    how = f"diagnosis of {rows} rows against {readings}, minimum of {REPETITIONS}"
+    rows, measurements = len(whole.observations) * whole.model.rows, len(half.observations) * half.model.rows
+    how = f"diagnosis of {rows} rows against {measurements}, minimum of {REPETITIONS}"
     yield Row("loop rows", all_of, poses, all_of / poses, "", None, how)
     how = f"the same with {len(whole.candidates)} candidates against {len(fewer.candidates)}"
     yield Row("loop candidates", all_of, candidates, all_of / candidates, "", None, how)
@@ -95,6 +95,6 @@ def _campaign(folder, poses):
 
 def _case(folder, poses):
     campaign = read_campaign(_campaign(folder, poses), ROOT / "config" / "robots")
-    campaign = replace(campaign, readings=split(campaign)[0])
+    campaign = replace(campaign, measurements=split(campaign)[0])
     sites = sites_of(campaign.robot)
-    return Case(campaign, averaged(campaign.readings), declared_model(campaign), candidates_on(sites))
+    return Case(campaign, averaged(campaign.measurements), declared_model(campaign), candidates_on(sites))

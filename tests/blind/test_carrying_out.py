@@ -39,10 +39,10 @@ def folder(tmp_path_factory, experiment):
 
 
 def first_and_further(folder, arm, poses, robots=ROBOTS):
-    """Campaign before, campaign after, and which readings of the latter are new."""
+    """Campaign before, campaign after, and which measurements of the latter are new."""
     before = read_campaign(folder / "blind" / CASE.name, ROBOTS)
     after = read_campaign(folder / "again" / folder_name(arm, poses) / CASE.name, robots)
-    return before, after, after.readings.pose > before.readings.pose.max()
+    return before, after, after.measurements.pose > before.measurements.pose.max()
 
 
 @pytest.mark.parametrize("poses", POSES)
@@ -50,44 +50,44 @@ def first_and_further(folder, arm, poses, robots=ROBOTS):
 def test_what_was_read_before_stays_and_the_held_out_poses_too(folder, arm, poses):
     before, after, new = first_and_further(folder, arm, poses)
     for name in ("pose", "position", "rotation_vector", "joint_angles", "wrench", "time_s"):
-        np.testing.assert_array_equal(getattr(after.readings, name)[~new], getattr(before.readings, name))
-    assert len(np.unique(after.readings.pose[new])) == poses
+        np.testing.assert_array_equal(getattr(after.measurements, name)[~new], getattr(before.measurements, name))
+    assert len(np.unique(after.measurements.pose[new])) == poses
     training, held_out = split(after)
     np.testing.assert_array_equal(held_out.position, split(before)[1].position)
-    assert set(np.unique(after.readings.pose[new])) <= set(training.pose)
+    assert set(np.unique(after.measurements.pose[new])) <= set(training.pose)
 
 
 def test_the_proposed_poses_and_loads_are_those_carried_out(folder, experiment):
     shown, wrench = experiment
     _, after, new = first_and_further(folder, "proposed", STATES)
-    readings = after.readings.select(new)
+    measurements = after.measurements.select(new)
     for number in range(STATES):
-        mine = readings.pose == np.unique(readings.pose)[number]
-        np.testing.assert_allclose(readings.joint_angles[mine], np.tile(shown[number], (mine.sum(), 1)), atol=1e-12)
-        shares = np.array(LADDER)[readings.load[mine]]
+        mine = measurements.pose == np.unique(measurements.pose)[number]
+        np.testing.assert_allclose(measurements.joint_angles[mine], np.tile(shown[number], (mine.sum(), 1)), atol=1e-12)
+        shares = np.array(LADDER)[measurements.load[mine]]
         assert set(shares) == set(design_of(CASE).ladder)
-        np.testing.assert_allclose(readings.wrench[mine], shares[:, None] * wrench[number], atol=1e-9)
+        np.testing.assert_allclose(measurements.wrench[mine], shares[:, None] * wrench[number], atol=1e-9)
 
 
 @pytest.mark.parametrize("arm", ARMS)
 def test_fewer_poses_are_the_first_of_more(folder, arm):
     _, few, _ = first_and_further(folder, arm, POSES[0])
     _, many, _ = first_and_further(folder, arm, POSES[-1])
-    count = len(few.readings.pose)
+    count = len(few.measurements.pose)
     for name in ("position", "rotation_vector", "approach", "joint_angles"):
-        np.testing.assert_array_equal(getattr(many.readings, name)[:count], getattr(few.readings, name))
+        np.testing.assert_array_equal(getattr(many.measurements, name)[:count], getattr(few.measurements, name))
 
 
 def test_random_poses_are_read_like_the_proposed_and_others_than_the_campaigns(folder):
     before, after, new = first_and_further(folder, "random", STATES)
     _, proposed, theirs = first_and_further(folder, "proposed", STATES)
-    np.testing.assert_array_equal(after.readings.load[new], proposed.readings.load[theirs])
-    force = np.linalg.norm(after.readings.wrench[new, :3], axis=1)
-    np.testing.assert_allclose(force, np.abs(np.array(LADDER)[after.readings.load[new]]) * 1000.0, atol=1e-9)
-    known = {tuple(row) for row in before.readings.joint_angles.round(9)}
-    assert not known & {tuple(row) for row in after.readings.joint_angles[new].round(9)}
+    np.testing.assert_array_equal(after.measurements.load[new], proposed.measurements.load[theirs])
+    force = np.linalg.norm(after.measurements.wrench[new, :3], axis=1)
+    np.testing.assert_allclose(force, np.abs(np.array(LADDER)[after.measurements.load[new]]) * 1000.0, atol=1e-9)
+    known = {tuple(row) for row in before.measurements.joint_angles.round(9)}
+    assert not known & {tuple(row) for row in after.measurements.joint_angles[new].round(9)}
     low, high = arm_from_file(ROBOTS / "kuka.yaml").limits.T
-    assert ((low <= after.readings.joint_angles[new]) & (after.readings.joint_angles[new] <= high)).all()
+    assert ((low <= after.measurements.joint_angles[new]) & (after.measurements.joint_angles[new] <= high)).all()
 
 
 def test_angles_are_those_that_the_controller_shows(tmp_path, experiment):
@@ -102,11 +102,11 @@ def test_angles_are_those_that_the_controller_shows(tmp_path, experiment):
     shown, wrench = experiment
     carry_out(CASE, shown, wrench, tmp_path / "again", robots)
     written = read_campaign(tmp_path / "again" / folder_name("proposed", 5) / CASE.name, robots)
-    new = written.readings.pose >= design_of(CASE).poses
-    poses = np.unique(written.readings.pose[new], return_index=True)[1]
+    new = written.measurements.pose >= design_of(CASE).poses
+    poses = np.unique(written.measurements.pose[new], return_index=True)[1]
     # The campaign is read into angles of the model.
     expected = shown[:5] @ matrix.T + np.radians([0, 30, 0, 0, 0, 0])
-    np.testing.assert_allclose(written.readings.joint_angles[new][poses], expected, atol=1e-9)
+    np.testing.assert_allclose(written.measurements.joint_angles[new][poses], expected, atol=1e-9)
 
 
 def test_random_experiments_of_two_cases_differ_and_of_one_do_not():

@@ -93,9 +93,9 @@ def test_cases_to_develop_on_are_in_no_other_size_even_at_the_same_seed():
 def test_robots_that_cannot_have_a_compensator_are_those_without_one():
     for name in (*PROOF, *TUNED):
         arm = arm_from_file(ROBOTS / f"{name}.yaml")
-        absent = {effect for effect in KINDS if not KINDS[effect].places(arm)}
+        absent = {effect for effect in KINDS if not KINDS[effect].locations(arm)}
         cases = [case for case in cases_of(SIZES["full"], 1) if case.robot == name]
-        assert not absent & {effect for case in cases for effect in (*case.effects, case.rival)}
+        assert not absent & {effect for case in cases for effect in (*case.effects, case.alternative)}
         assert absent <= {"compensator_torque", "compensator_stiffness"}
 
 
@@ -152,12 +152,12 @@ def test_each_setting_makes_a_campaign_that_can_be_read(tmp_path, setting):
     assert not truth["defects"]
     design = design_of(case)
     for covariate, column in (("approach", "approach"), ("time", "time_s"), ("temperature", "temperature_c")):
-        assert (getattr(campaign.readings, column) is not None) == (covariate in design.covariates)
+        assert (getattr(campaign.measurements, column) is not None) == (covariate in design.covariates)
     assert bool(truth["outliers"]) == setting.startswith("outliers")
     if setting.startswith("declared"):
         ratio = float(setting.rpartition("_")[2])
         assert campaign.noise["position_m"] == pytest.approx(ratio * 60e-6)
-        assert campaign.readings.repeat.max() == 0
+        assert campaign.measurements.repeat.max() == 0
     assert campaign.frame == ("tracker" if setting == "unknown_frame" else "base")
 
 
@@ -189,7 +189,7 @@ def test_gear_defects_under_gravity_sit_at_the_shoulder_or_the_elbow(seed):
     assert defect.joints in ((2,), (3,))
 
 
-def test_an_error_of_the_pose_is_common_to_its_readings_and_other_at_other_poses():
+def test_an_error_of_the_pose_is_common_to_its_measurements_and_other_at_other_poses():
     case = a_case(setting="pose_common_15urad")
     robot, design = specimen_of(case, ROBOTS), design_of(case)
     assert design.repeats == 1 and design.declared_noise == (60e-6, 60e-6)
@@ -222,7 +222,7 @@ def test_centres_off_the_line_lie_beyond_what_is_declared_and_three_kilonewtons_
 
 
 @pytest.mark.parametrize("setting", ["usual", "without_time_and_temperature"])
-def test_a_stand_that_is_knocked_moves_all_readings_after_one_row_among_the_training_poses(setting):
+def test_a_stand_that_is_knocked_moves_all_measurements_after_one_row_among_the_training_poses(setting):
     case = replace(a_case(("setup_step",), (200.0,), setting=setting), group="moved")
     robot, design = specimen_of(case, ROBOTS), design_of(case)
     bad = with_defects(robot, [defect for defect, _ in defects_of(case, robot, design)])

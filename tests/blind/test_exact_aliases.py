@@ -10,13 +10,13 @@ pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
 from elastocal.blind.case_rows import EXACT_ALIASES
 from elastocal.blind.cases import Case, make_case
-from elastocal.campaigns.columns import reading_columns
+from elastocal.campaigns.columns import columns_of
 from elastocal.fitting.case import case_from, noise_from
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.noise_estimation import noise_of
-from elastocal.loop.loading import taken_in
+from elastocal.loop.loading import load_campaign
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 _SINE, _ROUNDING = 1e-6, 1e-7
@@ -26,12 +26,12 @@ _BENT = 2e-3
 
 def directions(declared, observations, candidates):
     """Orthonormal bases of what each candidate contributes beyond the declared model, whitened; without a column, nothing."""
-    line = linearize(declared.model, declared.estimate, observations, declared.circumstances)
+    line = linearize(declared.model, declared.estimate, observations, declared.conditions)
     left = declared.whitened(line.sensitivities).reshape(line.residual.size, -1)
     basis = np.linalg.qr(left / np.linalg.norm(left, axis=0))[0]
     found = []
     for candidate in candidates:
-        made = effect_columns([(candidate, ())], line.circumstances, line.coordinate_jacobian, observations.state)
+        made = effect_columns([(candidate, ())], line.conditions, line.coordinate_jacobian, observations.state)
         columns = declared.whitened(made).reshape(line.residual.size, -1)
         columns = columns / np.linalg.norm(columns, axis=0)
         for _ in range(2):
@@ -43,13 +43,13 @@ def directions(declared, observations, candidates):
 
 @pytest.fixture(scope="module", params=["fanuc", "abb"])
 def seen(request, tmp_path_factory):
-    """What every candidate makes of the readings of a robot without an effect, off the declared model."""
+    """What every candidate makes of the measurements of a robot without an effect, off the declared model."""
     folder = tmp_path_factory.mktemp(request.param)
     # Of an arm whose file tells no weights: where it does, weights absorb some of what is compared here.
     made = Case("aliases", "none", request.param, (), (), "weight_compensated", 314159)
     make_case(made, folder / "blind", folder / "sealed", ROBOTS)
-    descriptions, training, _ = taken_in((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
-    case = case_from(descriptions, reading_columns(training))
+    descriptions, training, _ = load_campaign((folder / "blind" / made.name).as_posix(), ROBOTS.as_posix())
+    case = case_from(descriptions, columns_of(training))
     declared = fit(case.model, case.observations, noise_from(noise_of(case)))
     candidates = [c for c in case.candidates.values() if not c.shapes]
     return declared, case.observations, directions(declared, case.observations, candidates)
@@ -75,7 +75,7 @@ def test_nothing_of_a_wrong_force_scale_is_left_off_the_compliances(seen):
 
 def test_the_weight_of_the_upper_arm_turns_joint_2_as_a_compensator_does(seen):
     declared, observations, _ = seen
-    states = circumstances(declared.model, declared.estimate, observations.states)
+    states = conditions(declared.model, declared.estimate, observations.states)
     angle = states.joint_angles[:, 1]
     waves = np.linalg.qr(np.array([np.cos(angle), np.sin(angle)]).T)[0]
     torque = states.weight[2][:, 1]

@@ -10,7 +10,16 @@ from scipy.stats import beta
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
 
-from elastocal.blind.cases import SIZES, SWEEP_DESIGNS, SWEEP_PAIRS, Counts, angle_to_rival, cases_of, design_of, specimen_of
+from elastocal.blind.cases import (
+    SIZES,
+    SWEEP_DESIGNS,
+    SWEEP_PAIRS,
+    Counts,
+    angle_to_alternative,
+    cases_of,
+    design_of,
+    specimen_of,
+)
 from elastocal.blind.sweep import against_angle, swept
 from elastocal.figures.style import save
 from elastocal.figures.sweep import sweep
@@ -25,7 +34,7 @@ def test_a_sweep_has_each_effect_of_each_pair_under_each_design_and_moves_no_oth
     cases = cases_of(ONE, 1)
     mine = [case for case in cases if case.group == "sweep"]
     expected = {(pair, design) for one in SWEEP_PAIRS for pair in (one, one[::-1]) for design in SWEEP_DESIGNS}
-    assert {((case.effects[0], case.rival), case.setting) for case in mine} == expected
+    assert {((case.effects[0], case.alternative), case.setting) for case in mine} == expected
     assert len(mine) == len(expected) and len({case.name for case in mine}) == len(mine)
     quick = {case.name for case in cases_of(SIZES["quick"], 1) if case.group != "sweep"}
     assert {case.name for case in cases_of(Counts(2, 0, 0, 0, 0, robots=("kuka",)), 1)} <= {case.name for case in cases}
@@ -43,21 +52,21 @@ def test_designs_differ_in_points_loads_and_reach_of_the_joints():
     np.testing.assert_allclose(schedule_of(arm, narrow, 1).angle.mean(axis=0), (low + high) / 2, atol=0.1 * (high - low).max())
 
 
-def test_the_angle_is_that_to_all_that_the_rival_can_make():
+def test_the_angle_is_that_to_all_that_the_alternative_can_make():
     """A stiffness that depends on the angle by a phase of its own: of two phases all others are made."""
     case = next(
         c for c in cases_of(ONE, 1) if c.effects == ("compensator_stiffness",) and c.setting == "all points, ladder, wide"
     )
     robot, design = specimen_of(case, ROBOTS), design_of(case)
     same = with_defects(robot, [Defect("joint_dependent_stiffness", (2,), 0.1, 1)])
-    assert angle_to_rival(case, robot, design, same) < 3
+    assert angle_to_alternative(case, robot, design, same) < 3
     play = with_defects(robot, [Defect("lost_motion", (4,), 1e-4, 1)])
-    assert angle_to_rival(case, robot, design, play) > 60
+    assert angle_to_alternative(case, robot, design, play) > 60
 
 
 def a_truth(angle, *effects):
     document = truth(*effects, group="sweep")
-    return document | {"rival": {"effect": "link_weight", "angle_deg": angle}}
+    return document | {"alternative": {"effect": "link_weight", "angle_deg": angle}}
 
 
 def nearest(verdict, angle):

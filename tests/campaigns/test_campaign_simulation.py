@@ -72,7 +72,7 @@ def test_the_plan_is_kept(kuka):
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4])
-def test_noise_is_of_its_size_and_new_at_each_reading(noise, kuka):
+def test_noise_is_of_its_size_and_new_at_each_measurement(noise, kuka):
     plan = replace(PLAN, poses=120, noise_m=noise, noise_rad=3 * noise)
     exact, read = (simulated_measurements(kuka, p, 4, "noise") for p in (PLAN, plan))
     exact = simulated_measurements(kuka, replace(plan, noise_m=0.0, noise_rad=0.0), 4, "noise")
@@ -114,5 +114,5 @@ def test_it_makes_a_campaign_that_reads(kuka, tmp_path, config_folder):
     }
     write_campaign(tmp_path / "reads", document, table, kuka.joints)
     campaign = read_campaign(tmp_path / "reads", config_folder / "robots")
-    assert len(campaign.readings) == len(table["pose"])
-    np.testing.assert_array_equal(campaign.readings.position[:, 0], table["x"])
+    assert len(campaign.measurements) == len(table["pose"])
+    np.testing.assert_array_equal(campaign.measurements.position[:, 0], table["x"])

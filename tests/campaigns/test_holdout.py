@@ -10,8 +10,8 @@ from support import refused
 from elastocal.campaigns.holdout import split
 
 
-def poses_of(readings):
-    return set(zip(readings.session.tolist(), readings.pose.tolist(), strict=True))
+def poses_of(measurements):
+    return set(zip(measurements.session.tolist(), measurements.pose.tolist(), strict=True))
 
 
 def with_sessions(cell):
@@ -36,7 +36,7 @@ def test_split_parts_no_pose_of_any_session(cell):
     assert poses_of(training).isdisjoint(poses_of(held_out))
     assert poses_of(training) | poses_of(held_out) == {(session, pose) for session in (0, 7) for pose in range(POSES)}
     assert len(poses_of(held_out)) == 6
-    assert sorted([*training.row, *held_out.row]) == campaign.readings.row.tolist()
+    assert sorted([*training.row, *held_out.row]) == campaign.measurements.row.tolist()
 
 
 @given(st.randoms(use_true_random=False))

@@ -13,7 +13,7 @@ def test_parquet_is_csv(cell):
     from_csv = cell.read()
     (cell.folder / "measurements.csv").unlink()
     cell.write("parquet")
-    assert_same(read_campaign(cell.folder, cell.robots).readings, from_csv.readings)
+    assert_same(read_campaign(cell.folder, cell.robots).measurements, from_csv.measurements)
 
 
 def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
@@ -23,9 +23,9 @@ def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
     lines.insert(3, "")
     lines.insert(5, "," * lines[0].count(","))
     path.write_text("\ufeff" + "\n".join(line.replace(",", ", ") for line in lines), encoding="utf-8")
-    readings = read_campaign(cell.folder, cell.robots).readings
-    assert readings.row.tolist()[:5] == [1, 2, 4, 6, 7]
-    assert len(readings) == len(cell.table["pose"])
+    measurements = read_campaign(cell.folder, cell.robots).measurements
+    assert measurements.row.tolist()[:5] == [1, 2, 4, 6, 7]
+    assert len(measurements) == len(cell.table["pose"])
 
 
 @pytest.mark.parametrize(

@@ -24,20 +24,20 @@ def test_campaign_is_read_as_written(cell):
     assert (campaign.compliance, campaign.declared) == ("identify", ("joint_offset",))
     assert campaign.noise == {"position_m": 6e-5, "orientation_rad": 7e-5}
     assert campaign.holdout == {"fraction": 0.4, "seed": 5}
-    readings = campaign.readings
-    assert len(readings) == POSES * LOADS * REPEATS * 2
+    measurements = campaign.measurements
+    assert len(measurements) == POSES * LOADS * REPEATS * 2
     for name in ("pose", "load", "repeat"):
-        np.testing.assert_array_equal(getattr(readings, name), table[name])
-    assert [campaign.targets[index].name for index in readings.target] == table["target"]
-    np.testing.assert_array_equal(readings.joint_angles, np.column_stack([table[f"q{j}"] for j in (1, 2, 3)]))
-    np.testing.assert_array_equal(readings.wrench, np.column_stack([table[name] for name in WRENCH]))
-    np.testing.assert_array_equal(readings.position, np.column_stack([table[name] for name in "xyz"]))
-    np.testing.assert_array_equal(readings.rotation_vector, np.column_stack([table[f"r{name}"] for name in "xyz"]))
-    np.testing.assert_array_equal(readings.approach, np.column_stack([table[f"approach{j}"] for j in (1, 2, 3)]))
-    np.testing.assert_array_equal(readings.time_s, table["time_s"])
-    np.testing.assert_array_equal(readings.temperature_c, table["temperature_c"])
-    np.testing.assert_array_equal(readings.session, np.zeros(len(readings)))
-    np.testing.assert_array_equal(readings.row, np.arange(1, len(readings) + 1))
+        np.testing.assert_array_equal(getattr(measurements, name), table[name])
+    assert [campaign.targets[index].name for index in measurements.target] == table["target"]
+    np.testing.assert_array_equal(measurements.joint_angles, np.column_stack([table[f"q{j}"] for j in (1, 2, 3)]))
+    np.testing.assert_array_equal(measurements.wrench, np.column_stack([table[name] for name in WRENCH]))
+    np.testing.assert_array_equal(measurements.position, np.column_stack([table[name] for name in "xyz"]))
+    np.testing.assert_array_equal(measurements.rotation_vector, np.column_stack([table[f"r{name}"] for name in "xyz"]))
+    np.testing.assert_array_equal(measurements.approach, np.column_stack([table[f"approach{j}"] for j in (1, 2, 3)]))
+    np.testing.assert_array_equal(measurements.time_s, table["time_s"])
+    np.testing.assert_array_equal(measurements.temperature_c, table["temperature_c"])
+    np.testing.assert_array_equal(measurements.session, np.zeros(len(measurements)))
+    np.testing.assert_array_equal(measurements.row, np.arange(1, len(measurements) + 1))
 
 
 def test_what_a_campaign_leaves_out_has_a_default(cell):
@@ -45,19 +45,19 @@ def test_what_a_campaign_leaves_out_has_a_default(cell):
     campaign = cell.read()
     assert (campaign.compliance, campaign.declared, campaign.noise) == ("nominal", (), None)
     assert campaign.holdout == {"fraction": 0.3, "seed": 1}
-    assert campaign.readings.approach is campaign.readings.time_s is campaign.readings.temperature_c is None
+    assert campaign.measurements.approach is campaign.measurements.time_s is campaign.measurements.temperature_c is None
 
 
 def test_no_wrench_column_at_all_means_no_load(cell):
     keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
     cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
     cell.without(*WRENCH)
-    np.testing.assert_array_equal(cell.read().readings.wrench, np.zeros((len(keep), 6)))
+    np.testing.assert_array_equal(cell.read().measurements.wrench, np.zeros((len(keep), 6)))
 
 
 def test_orientations_are_left_aside_where_positions_are_measured(cell):
     cell.document["measured"] = "position"
-    assert cell.read().readings.rotation_vector is None
+    assert cell.read().measurements.rotation_vector is None
 
 
 def test_robot_is_found_by_its_name_as_well(cell):
@@ -68,15 +68,15 @@ def test_robot_is_found_by_its_name_as_well(cell):
 def test_joint_angles_are_those_of_the_model(cell):
     cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]], "offset_deg": [0, -30, 0]}
     reported = np.column_stack([cell.table[f"q{j}"] for j in (1, 2, 3)])
-    readings = cell.read().readings
+    measurements = cell.read().measurements
     expected = np.column_stack([reported[:, 0], -reported[:, 1] - np.pi / 6, reported[:, 1] + reported[:, 2]])
-    np.testing.assert_allclose(readings.joint_angles, expected, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(measurements.joint_angles, expected, rtol=0, atol=1e-15)
 
 
 def test_sense_of_approach_is_that_of_the_models_joints(cell):
     cell.arm["reported_joints"] = {"matrix": [[1, 0, 0], [0, -1, 0], [0, 1, 1]]}
     second, third = np.array(cell.table["approach2"]), np.array(cell.table["approach3"])
-    approach = cell.read().readings.approach
+    approach = cell.read().measurements.approach
     np.testing.assert_array_equal(approach[:, 1], -second)
     np.testing.assert_array_equal(approach[:, 2], np.where(second == third, second, 0))
 
@@ -89,15 +89,15 @@ def other_campaign(cell, tmp_path, **changes):
     cell.document["holdout"] = {"campaign": "../other"}
 
 
-def test_other_campaign_is_the_test_of_all_readings(cell, tmp_path):
+def test_other_campaign_is_the_test_of_all_measurements(cell, tmp_path):
     other_campaign(cell, tmp_path)
     campaign = cell.read()
     training, held_out = split(campaign)
     assert len(held_out) == 0
-    assert_same(training, campaign.readings)
+    assert_same(training, campaign.measurements)
     other = held_out_campaign(campaign, cell.folder, cell.robots)
     assert (other.name, [target.name for target in other.targets]) == ("other", ["T"])
-    assert len(other.readings) == len(campaign.readings)
+    assert len(other.measurements) == len(campaign.measurements)
 
 
 def test_two_campaigns_may_test_each_other(cell, tmp_path):
@@ -134,7 +134,11 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, "1"]}}}, "targets.A.offset_m[2]", ["'1'", "number"]),
         ({"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}}, "targets.A.point", ["'elbw'", "'elbow'? (elbow, hand)"]),
         ({"targets": {1: {"point": "elbow", "offset_m": "unknown"}}}, "targets", ["the name 1", "in quotes"]),
-        ({"targets": DOCUMENT["targets"] | {"C": DOCUMENT["targets"]["A"]}}, "targets.C", ["no reading", "measurements.csv"]),
+        (
+            {"targets": DOCUMENT["targets"] | {"C": DOCUMENT["targets"]["A"]}},
+            "targets.C",
+            ["no measurement", "measurements.csv"],
+        ),
         ({"robot": "planer"}, "robot", ["'planer'", "'planar'? (planar)"]),
         ({"robot": "../arm.yaml"}, "robot", ["'../arm.yaml'", "relative to this folder", "planar"]),
         ({"declared": ["joint_ofset"]}, "declared[0]", ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"]),

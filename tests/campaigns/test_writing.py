@@ -6,7 +6,7 @@ import pytest
 from made_cells import assert_same
 from support import refused
 
-from elastocal.campaigns.measurements import measurement_columns
+from elastocal.campaigns.measurements import file_columns
 from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.writing import write_campaign
 
@@ -17,7 +17,7 @@ def test_written_campaign_is_the_one_read(cell, tmp_path, kind):
     document = cell.document | {"robot": "planar"}
     write_campaign(tmp_path / "again", document, cell.table, 3, kind)
     second = read_campaign(tmp_path / "again", cell.robots)
-    assert_same(first.readings, second.readings)
+    assert_same(first.measurements, second.measurements)
     assert second.targets == first.targets
     assert sorted(path.name for path in (tmp_path / "again").iterdir()) == ["campaign.yaml", f"measurements.{kind}"]
 
@@ -26,13 +26,13 @@ def test_campaign_written_as_another_kind_leaves_one_file_of_measurements(cell, 
     cell.write()
     for kind in ("csv", "parquet"):
         write_campaign(tmp_path / "again", cell.document | {"robot": "planar"}, cell.table, 3, kind)
-    assert len(read_campaign(tmp_path / "again", cell.robots).readings) == len(cell.table["pose"])
+    assert len(read_campaign(tmp_path / "again", cell.robots).measurements) == len(cell.table["pose"])
 
 
 def test_parquet_of_a_written_campaign_carries_units_and_meanings(cell, tmp_path):
     write_campaign(tmp_path / "again", cell.document, cell.table, 3)
     schema = pq.read_schema(tmp_path / "again" / "measurements.parquet")
-    for name, column in measurement_columns(3).items():
+    for name, column in file_columns(3).items():
         if name in cell.table:
             assert schema.field(name).metadata == {b"unit": column.unit.encode(), b"meaning": column.meaning.encode()}
 

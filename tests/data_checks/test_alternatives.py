@@ -1,4 +1,4 @@
-"""A sense, axis, unit, frame or target is named where reading it otherwise lets absurd readings fit, and nowhere else."""
+"""A sense, axis, unit, frame or target is named where reading it otherwise lets absurd measurements fit, and nowhere else."""
 
 from dataclasses import replace
 
@@ -18,8 +18,8 @@ def campaign(request, fanuc):
 
 @pytest.mark.parametrize("joint", range(6))
 def test_a_joint_counted_the_other_way_round_is_named(campaign, joint):
-    angles = campaign.readings.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
-    (fault,) = find(campaign, replace(campaign.readings, joint_angles=angles))
+    angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
+    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert (fault.name, fault.joints, fault.decisive) == ("wrong_sign", (joint + 1,), True)
     before, after = fault.evidence
     assert before > 0.02 and after < 1e-3
@@ -27,16 +27,16 @@ def test_a_joint_counted_the_other_way_round_is_named(campaign, joint):
 
 @pytest.mark.parametrize(("sign", "words"), [(1.0, "taken from"), (-1.0, "added to")])
 def test_a_joint_counted_from_its_neighbour_is_named_with_it(campaign, sign, words):
-    angles = campaign.readings.joint_angles.copy()
+    angles = campaign.measurements.joint_angles.copy()
     angles[:, 2] += sign * angles[:, 1]
-    (fault,) = find(campaign, replace(campaign.readings, joint_angles=angles))
+    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert fault.joints == (2, 3)
     assert words in fault.detail
 
 
 def test_two_joints_counted_the_other_way_round_are_both_named(campaign):
-    angles = campaign.readings.joint_angles * [1, -1, 1, 1, -1, 1]
-    found = find(campaign, replace(campaign.readings, joint_angles=angles))
+    angles = campaign.measurements.joint_angles * [1, -1, 1, 1, -1, 1]
+    found = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert [fault.joints for fault in found] == [(2,), (5,)]
 
 
@@ -45,22 +45,22 @@ def test_the_sign_is_that_of_the_column_of_the_file(fanuc):
     reported_matrix = np.diag([1.0, 1.0, -1.0, 1.0, 1.0, 1.0])
     robot = replace(fanuc, reported_matrix=reported_matrix, reported_offset=np.radians([0, -40, 60, 0, 0, 0]))
     campaign = made(robot, 3, Plan(poses=20))
-    reported = (campaign.readings.joint_angles - robot.reported_offset) @ reported_matrix
+    reported = (campaign.measurements.joint_angles - robot.reported_offset) @ reported_matrix
     reported[:, 2] *= -1
     angles = reported @ reported_matrix + robot.reported_offset
-    (fault,) = find(campaign, replace(campaign.readings, joint_angles=angles))
+    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert fault.joints == (3,)
 
 
 def test_a_joint_that_is_still_in_most_poses_is_named(fanuc):
     campaign = made(fanuc, 4, Plan(poses=40, tracker=True, oriented=False), moving={2: 3})
-    angles = campaign.readings.joint_angles * [1, 1, -1, 1, 1, 1]
-    (fault,) = find(campaign, replace(campaign.readings, joint_angles=angles))
+    angles = campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1]
+    (fault,) = find(campaign, replace(campaign.measurements, joint_angles=angles))
     assert fault.joints == (3,)
 
 
 def test_orientations_turned_round_are_named(campaign):
-    (fault,) = find(campaign, replace(campaign.readings, rotation_vector=-campaign.readings.rotation_vector))
+    (fault,) = find(campaign, replace(campaign.measurements, rotation_vector=-campaign.measurements.rotation_vector))
     assert fault.joints == ()
     assert "rotation vectors" in fault.detail
 
@@ -69,16 +69,18 @@ ELSEWHERE = Rotation.from_rotvec([0.3, -0.5, 1.2]), np.array([2.0, 0.6, -0.2])
 
 
 def with_measured(campaign, position=None, vectors=None):
-    readings = campaign.readings
-    position = readings.position if position is None else position
-    return replace(readings, position=position, rotation_vector=readings.rotation_vector if vectors is None else vectors)
+    measurements = campaign.measurements
+    position = measurements.position if position is None else position
+    return replace(
+        measurements, position=position, rotation_vector=measurements.rotation_vector if vectors is None else vectors
+    )
 
 
 def in_another_frame(campaign):
     rotation, place = ELSEWHERE
-    vectors = campaign.readings.rotation_vector
+    vectors = campaign.measurements.rotation_vector
     turned = None if vectors is None else (rotation * Rotation.from_rotvec(vectors)).as_rotvec()
-    return with_measured(campaign, rotation.apply(campaign.readings.position) + place, turned)
+    return with_measured(campaign, rotation.apply(campaign.measurements.position) + place, turned)
 
 
 EXCHANGED = {
@@ -90,38 +92,38 @@ EXCHANGED = {
 
 @pytest.mark.parametrize("words", EXCHANGED)
 def test_exchanged_axes_of_positions_are_named(campaign, words):
-    written = campaign.readings.position @ np.array(EXCHANGED[words], float).T
+    written = campaign.measurements.position @ np.array(EXCHANGED[words], float).T
     (fault,) = find(campaign, with_measured(campaign, written))
     assert (fault.name, fault.decisive) == ("swapped_axes", True)
-    assert fault.detail.endswith(f"readings fit with {words}")
+    assert fault.detail.endswith(f"measurements fit with {words}")
 
 
 def test_mirrored_positions_in_a_frame_that_nobody_knows_say_no_more_than_that(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=True, oriented=False))
-    (fault,) = find(campaign, with_measured(campaign, campaign.readings.position[:, [1, 0, 2]]))
+    (fault,) = find(campaign, with_measured(campaign, campaign.measurements.position[:, [1, 0, 2]]))
     assert fault.name == "swapped_axes" and "mirrored" in fault.detail
     # The frame takes up what only turns.
-    assert find(campaign, with_measured(campaign, campaign.readings.position[:, [1, 2, 0]])) == []
+    assert find(campaign, with_measured(campaign, campaign.measurements.position[:, [1, 2, 0]])) == []
 
 
 @pytest.mark.parametrize(
     ("factor", "unit"), [(10, "decimetres"), (1000, "millimetres"), (1 / 0.0254, "inches"), (0.1, "tenth")]
 )
 def test_positions_in_another_unit_are_named(campaign, factor, unit):
-    (fault,) = find(campaign, with_measured(campaign, factor * campaign.readings.position))
+    (fault,) = find(campaign, with_measured(campaign, factor * campaign.measurements.position))
     assert (fault.name, fault.decisive) == ("wrong_unit", True) and unit in fault.detail
     assert fault.parameters[0].value == pytest.approx(1 / factor)
 
 
 @pytest.mark.parametrize(("factor", "words"), [(0.5, "halves"), (2.0, "doubles"), (180 / np.pi, "degrees")])
 def test_scaled_rotation_vectors_are_named(campaign, factor, words):
-    (fault,) = find(campaign, with_measured(campaign, vectors=factor * campaign.readings.rotation_vector))
+    (fault,) = find(campaign, with_measured(campaign, vectors=factor * campaign.measurements.rotation_vector))
     assert fault.name == "wrong_unit" and "rotation vectors" in fault.detail and words in fault.detail
 
 
 @pytest.mark.parametrize(("letters", "words"), [("XYZ", "moved x, y, z"), ("xyz", "roll, pitch, yaw")])
 def test_angles_in_the_columns_of_the_rotation_vector_are_named(campaign, letters, words):
-    angles = Rotation.from_rotvec(campaign.readings.rotation_vector).as_euler(letters)
+    angles = Rotation.from_rotvec(campaign.measurements.rotation_vector).as_euler(letters)
     (fault,) = find(campaign, with_measured(campaign, vectors=angles))
     assert words in fault.detail
 
@@ -131,7 +133,7 @@ def test_a_frame_that_is_not_the_base_is_named_with_the_transform(fanuc, oriente
     campaign = made(fanuc, 1, Plan(poses=20, oriented=oriented))
     (fault,) = find(campaign, in_another_frame(campaign))
     assert fault.name == "wrong_frame"
-    assert fault.detail.startswith("readings do not lie in the base frame: the robot would stand 2.1 m away")
+    assert fault.detail.startswith("measurements do not lie in the base frame: the robot would stand 2.1 m away")
     told = np.array([value.value for value in fault.parameters[:6]])
     rotation, place = ELSEWHERE
     np.testing.assert_allclose(told, [*place, *rotation.as_rotvec()], atol=1e-4)
@@ -141,16 +143,16 @@ def test_a_frame_that_is_not_the_base_is_named_with_the_transform(fanuc, oriente
 def test_positions_in_another_frame_than_orientations_are_named_by_themselves(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
     rotation, place = ELSEWHERE
-    (fault,) = find(campaign, with_measured(campaign, rotation.apply(campaign.readings.position) + place))
+    (fault,) = find(campaign, with_measured(campaign, rotation.apply(campaign.measurements.position) + place))
     assert fault.name == "wrong_frame" and "orientations do not go with them" in fault.detail
 
 
 def test_each_session_has_a_transform_of_its_own(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20, oriented=False))
-    readings, rotation = campaign.readings, ELSEWHERE[0]
-    session = (readings.pose >= 10).astype(np.int32)
-    position = rotation.apply(readings.position) + np.where(session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0])
-    (fault,) = find(campaign, replace(readings, session=session, position=position))
+    measurements, rotation = campaign.measurements, ELSEWHERE[0]
+    session = (measurements.pose >= 10).astype(np.int32)
+    position = rotation.apply(measurements.position) + np.where(session[:, None], [0.0, 3.0, 0.0], [1.0, 0.0, 0.0])
+    (fault,) = find(campaign, replace(measurements, session=session, position=position))
     told = {value.name: value.value for value in fault.parameters}
     assert told["x of the base in the frame of session 0"] == pytest.approx(1.0, abs=1e-3)
     assert told["y of the base in the frame of session 1"] == pytest.approx(3.0, abs=1e-3)
@@ -159,7 +161,7 @@ def test_each_session_has_a_transform_of_its_own(fanuc):
 @pytest.mark.parametrize("joint", [1, 2])
 def test_a_wrong_frame_and_a_wrong_sense_are_both_named(fanuc, joint):
     campaign = made(fanuc, 1, Plan(poses=20))
-    angles = campaign.readings.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
+    angles = campaign.measurements.joint_angles * (1.0 - 2.0 * np.eye(6)[joint])
     found = find(campaign, replace(in_another_frame(campaign), joint_angles=angles))
     assert [(fault.name, fault.joints) for fault in found] == [("wrong_frame", ()), ("wrong_sign", (joint + 1,))]
 
@@ -170,23 +172,23 @@ def known_targets(fanuc, factor=1.0, which=slice(None)):
     transforms = fanuc.chain.points
     chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=tuple(o)) for p, o in zip(transforms, offsets, strict=True)))
     rng, plain = np.random.default_rng(4), made(fanuc, 1, Plan(poses=20))
-    position = np.empty_like(plain.readings.position)
+    position = np.empty_like(plain.measurements.position)
     for number, point in enumerate(chain.points):
-        mask = plain.readings.target == number
-        position[mask] = poses(chain, plain.readings.joint_angles[mask], point)[0]
+        mask = plain.measurements.target == number
+        position[mask] = poses(chain, plain.measurements.joint_angles[mask], point)[0]
     written = offsets.copy()
     written[which] *= factor
     targets = tuple(replace(t, offset_m=tuple(o)) for t, o in zip(plain.targets, written, strict=True))
     return replace(
         plain,
         targets=targets,
-        readings=replace(plain.readings, position=position + 6e-5 * rng.standard_normal(position.shape)),
+        measurements=replace(plain.measurements, position=position + 6e-5 * rng.standard_normal(position.shape)),
     )
 
 
 def test_target_offsets_as_they_are_are_no_fault(fanuc):
     campaign = known_targets(fanuc)
-    assert find(campaign, campaign.readings) == []
+    assert find(campaign, campaign.measurements) == []
 
 
 @pytest.mark.parametrize(
@@ -194,7 +196,7 @@ def test_target_offsets_as_they_are_are_no_fault(fanuc):
 )
 def test_target_offsets_in_millimetres_are_named(fanuc, which, words):
     campaign = known_targets(fanuc, 1000.0, which)
-    (fault,) = find(campaign, campaign.readings)
+    (fault,) = find(campaign, campaign.measurements)
     assert fault.name == "wrong_unit" and fault.detail.startswith(f"{words} like millimetres")
 
 
@@ -202,7 +204,7 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
     campaign = known_targets(fanuc)
     moved = replace(campaign.targets[3], offset_m=(0.3, 0.1, 0.0))
     campaign = replace(campaign, targets=(*campaign.targets[:3], moved))
-    (fault,) = find(campaign, campaign.readings.select(campaign.readings.target == 3))
+    (fault,) = find(campaign, campaign.measurements.select(campaign.measurements.target == 3))
     assert fault.name == "wrong_target" and "T6DoF would sit" in fault.detail
     told = {value.name: value.value for value in fault.parameters}
     assert told["T6DoF offset y"] == pytest.approx(-0.1, abs=1e-3)
@@ -211,7 +213,7 @@ def test_a_target_that_sits_elsewhere_is_named_with_its_place(fanuc):
 @pytest.mark.parametrize("shift", [0.0, 0.004, 0.03])
 def test_a_base_that_stands_a_little_off_stops_nothing(fanuc, shift):
     campaign = made(fanuc, 1, Plan(poses=20))
-    found = find(campaign, with_measured(campaign, campaign.readings.position + np.array([0.0, 0.0, shift])))
+    found = find(campaign, with_measured(campaign, campaign.measurements.position + np.array([0.0, 0.0, shift])))
     assert not [fault for fault in found if fault.decisive]
     assert len(found) == (shift > 0.02)
 
@@ -219,7 +221,7 @@ def test_a_base_that_stands_a_little_off_stops_nothing(fanuc, shift):
 def test_the_first_joint_far_off_its_zero_stops_nothing(fanuc):
     """It turns everything about the vertical, as a base does that is turned."""
     campaign = made(fanuc, 1, Plan(poses=20), true_offset=[0.02, 0, 0, 0, 0, 0])
-    assert not [fault for fault in find(campaign, campaign.readings) if fault.decisive]
+    assert not [fault for fault in find(campaign, campaign.measurements) if fault.decisive]
 
 
 def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
@@ -227,24 +229,25 @@ def test_what_fits_as_well_is_listed_as_an_alternative(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=True))
     order = [1, 0, 2]
     (fault,) = find(
-        campaign, with_measured(campaign, campaign.readings.position[:, order], campaign.readings.rotation_vector[:, order])
+        campaign,
+        with_measured(campaign, campaign.measurements.position[:, order], campaign.measurements.rotation_vector[:, order]),
     )
     assert fault.name == "swapped_axes" and len(fault.alternatives) >= 3
     assert all("rotation vectors likewise" in words for words in fault.alternatives)
 
 
-def test_readings_of_nothing_are_mended_by_nothing(campaign):
+def test_measurements_of_nothing_are_mended_by_nothing(campaign):
     rng = np.random.default_rng(5)
-    assert find(campaign, with_measured(campaign, rng.normal(0.0, 1.0, campaign.readings.position.shape))) == []
+    assert find(campaign, with_measured(campaign, rng.normal(0.0, 1.0, campaign.measurements.position.shape))) == []
 
 
-def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_readings_in_one_place(fanuc):
+def test_a_robot_that_hardly_moves_is_not_fitted_by_gathering_measurements_in_one_place(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20, tracker=True, oriented=False))
     angles = 0.3 + 1e-3 * np.random.default_rng(2).normal(size=(20, 6))
     rng = np.random.default_rng(3)
-    readings = replace(
-        campaign.readings,
-        joint_angles=angles[campaign.readings.pose],
-        position=rng.normal(0.0, 1.0, (20, 3))[campaign.readings.pose],
+    measurements = replace(
+        campaign.measurements,
+        joint_angles=angles[campaign.measurements.pose],
+        position=rng.normal(0.0, 1.0, (20, 3))[campaign.measurements.pose],
     )
-    assert find(campaign, readings) == []
+    assert find(campaign, measurements) == []

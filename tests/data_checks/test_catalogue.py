@@ -22,7 +22,7 @@ PLANS = {
 @pytest.mark.parametrize("seed", range(2))
 def test_no_fault_is_found_where_the_model_is_right(robot, plan, seed):
     campaign = made(robot, seed, PLANS[plan])
-    assert faults(campaign, campaign.readings) == ()
+    assert faults(campaign, campaign.measurements) == ()
 
 
 @pytest.mark.parametrize("plan", PLANS)
@@ -32,26 +32,26 @@ def test_nothing_decisive_is_found_where_the_model_lacks_something(robot, plan, 
     softer = with_other_compliances(robot, seed, 0.5)
     for true_robot in (softer, with_geometric_errors(robot, seed, 0.006), with_geometric_errors(softer, seed, 0.01)):
         campaign = made(robot, seed, PLANS[plan], true_robot, offsets, sag=3e-3)
-        assert not [fault for fault in faults(campaign, campaign.readings) if fault.decisive]
+        assert not [fault for fault in faults(campaign, campaign.measurements) if fault.decisive]
 
 
 def test_two_faults_of_the_loads_are_both_named(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
-    readings = replace(campaign.readings, wrench=-campaign.readings.wrench / 9.80665)
-    assert [fault.name for fault in faults(campaign, readings)] == ["wrong_sign", "wrong_unit"]
+    measurements = replace(campaign.measurements, wrench=-campaign.measurements.wrench / 9.80665)
+    assert [fault.name for fault in faults(campaign, measurements)] == ["wrong_sign", "wrong_unit"]
 
 
 def test_a_wrong_sign_is_not_called_shuffled_rows_or_outliers(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
-    readings = replace(campaign.readings, joint_angles=campaign.readings.joint_angles * [1, 1, -1, 1, 1, 1])
-    assert [fault.name for fault in faults(campaign, readings)] == ["wrong_sign"]
+    measurements = replace(campaign.measurements, joint_angles=campaign.measurements.joint_angles * [1, 1, -1, 1, 1, 1])
+    assert [fault.name for fault in faults(campaign, measurements)] == ["wrong_sign"]
 
 
 def test_the_sentences_are_single_lines(fanuc):
     campaign = made(fanuc, 1, Plan(poses=20))
-    position = campaign.readings.position.copy()
+    position = campaign.measurements.position.copy()
     position[5] += 0.1
-    (fault,) = faults(campaign, replace(campaign.readings, position=position))
+    (fault,) = faults(campaign, replace(campaign.measurements, position=position))
     assert "\n" not in fault.detail
     assert not fault.decisive
 
@@ -59,7 +59,7 @@ def test_the_sentences_are_single_lines(fanuc):
 def test_every_fault_of_the_design_is_there_and_of_family_data():
     assert known_faults() == {
         "constant_columns",
-        "implausible_readings",
+        "implausible_measurements",
         "outliers",
         "shuffled_rows",
         "swapped_axes",

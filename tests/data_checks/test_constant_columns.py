@@ -17,38 +17,40 @@ def campaign(request, fanuc):
 @pytest.mark.parametrize(("kept", "words"), [((0, 0, 0), "x, y, z of"), ((1, 1, 0), "z of"), ((0, 1, 0), "x, z of")])
 def test_positions_that_stand_still_are_named(campaign, kept, words):
     for value, same in ((0.0, "zero"), (1.5, "the same")):
-        position = np.where(kept, campaign.readings.position, value)
-        (fault,) = find(campaign, replace(campaign.readings, position=position))
+        position = np.where(kept, campaign.measurements.position, value)
+        (fault,) = find(campaign, replace(campaign.measurements, position=position))
         assert (fault.name, fault.decisive) == ("constant_columns", True)
         assert fault.detail.startswith(words) and f" {same} in all 12 poses" in fault.detail
 
 
-def test_angles_that_stand_still_while_the_readings_move_are_named(campaign):
-    (fault,) = find(campaign, replace(campaign.readings, joint_angles=np.full_like(campaign.readings.joint_angles, 0.4)))
+def test_angles_that_stand_still_while_the_measurements_move_are_named(campaign):
+    (fault,) = find(
+        campaign, replace(campaign.measurements, joint_angles=np.full_like(campaign.measurements.joint_angles, 0.4))
+    )
     assert fault.detail.startswith("the joint angles are the same in all 12 poses")
 
 
 def test_one_target_that_stands_still_is_named(campaign):
-    position = np.where(campaign.readings.target[:, None] == 2, 1.0, campaign.readings.position)
-    (fault,) = find(campaign, replace(campaign.readings, position=position))
+    position = np.where(campaign.measurements.target[:, None] == 2, 1.0, campaign.measurements.position)
+    (fault,) = find(campaign, replace(campaign.measurements, position=position))
     assert "of T4DoF" in fault.detail
 
 
-def test_readings_as_they_are_are_no_fault(campaign):
-    assert find(campaign, campaign.readings) == []
+def test_measurements_as_they_are_are_no_fault(campaign):
+    assert find(campaign, campaign.measurements) == []
 
 
 def test_a_robot_that_moves_in_a_plane_may_have_a_constant_coordinate(fanuc):
     campaign = made(fanuc, 1, Plan(poses=12, noise=0.0, loads=0), moving={1: 0, 2: 0, 3: 0, 4: 0, 5: 0})
-    assert np.ptp(campaign.readings.position[campaign.readings.target == 3, 2]) < 1e-9
-    assert find(campaign, campaign.readings) == []
+    assert np.ptp(campaign.measurements.position[campaign.measurements.target == 3, 2]) < 1e-9
+    assert find(campaign, campaign.measurements) == []
 
 
 def test_one_pose_read_again_and_again_is_no_fault(campaign):
-    readings, first = campaign.readings, campaign.readings.position[: len(campaign.targets)]
+    measurements, first = campaign.measurements, campaign.measurements.position[: len(campaign.targets)]
     still = replace(
-        readings,
-        joint_angles=np.full_like(readings.joint_angles, 0.4),
-        position=first[readings.target] + 1e-5 * readings.pose[:, None],
+        measurements,
+        joint_angles=np.full_like(measurements.joint_angles, 0.4),
+        position=first[measurements.target] + 1e-5 * measurements.pose[:, None],
     )
     assert find(campaign, still) == []

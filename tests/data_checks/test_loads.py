@@ -16,13 +16,13 @@ def campaign(request, fanuc):
     return made(fanuc, 2, Plan(poses=20, tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
 
 
-def scaled(readings, force, moment):
-    return replace(readings, wrench=readings.wrench * np.repeat([force, moment], 3))
+def scaled(measurements, force, moment):
+    return replace(measurements, wrench=measurements.wrench * np.repeat([force, moment], 3))
 
 
 @pytest.mark.parametrize("factor", [GRAVITY, 1 / GRAVITY, 1e3, 1e-3, POUND, 1 / POUND])
 def test_loads_in_another_unit_are_named_with_its_factor(campaign, factor):
-    (fault,) = find(campaign, scaled(campaign.readings, 1 / factor, 1 / factor))
+    (fault,) = find(campaign, scaled(campaign.measurements, 1 / factor, 1 / factor))
     assert (fault.name, fault.joints, fault.decisive) == ("wrong_unit", (), True)
     force, moment, slope = fault.parameters
     assert force.value == pytest.approx(factor, rel=1e-3)
@@ -32,59 +32,59 @@ def test_loads_in_another_unit_are_named_with_its_factor(campaign, factor):
 
 
 def test_the_sentence_names_kilogram_force(campaign):
-    (fault,) = find(campaign, scaled(campaign.readings, 1 / GRAVITY, 1 / GRAVITY))
-    assert fault.detail == "the loads look like kilogram-force: readings fit 9.81 times the written loads"
+    (fault,) = find(campaign, scaled(campaign.measurements, 1 / GRAVITY, 1 / GRAVITY))
+    assert fault.detail == "the loads look like kilogram-force: measurements fit 9.81 times the written loads"
 
 
 @pytest.mark.parametrize(("force", "moment"), [(1.0, 1e-3), (1e3, 1.0), (GRAVITY, 1.0)])
 def test_forces_and_moments_in_units_that_do_not_match_are_named(campaign, force, moment):
-    (fault,) = find(campaign, scaled(campaign.readings, 1 / force, 1 / moment))
+    (fault,) = find(campaign, scaled(campaign.measurements, 1 / force, 1 / moment))
     assert [value.value for value in fault.parameters[:2]] == [force, moment]
 
 
 def test_a_unit_is_named_of_loads_that_are_turned_round_too(campaign):
-    sign, unit = find(campaign, scaled(campaign.readings, -1 / GRAVITY, -1 / GRAVITY))
+    sign, unit = find(campaign, scaled(campaign.measurements, -1 / GRAVITY, -1 / GRAVITY))
     assert (sign.name, unit.name, unit.parameters[0].value) == ("wrong_sign", "wrong_unit", GRAVITY)
 
 
 def test_a_unit_is_named_beside_heavy_geometric_errors(fanuc):
     campaign = made(fanuc, 3, Plan(), with_geometric_errors(fanuc, 3, 0.006))
-    (fault,) = find(campaign, scaled(campaign.readings, 1 / GRAVITY, 1 / GRAVITY))
+    (fault,) = find(campaign, scaled(campaign.measurements, 1 / GRAVITY, 1 / GRAVITY))
     assert fault.parameters[0].value == GRAVITY
 
 
-def test_a_unit_is_named_without_unloaded_readings(fanuc):
+def test_a_unit_is_named_without_unloaded_measurements(fanuc):
     campaign = made(fanuc, 5, Plan(poses=40, loads=1, tracker=True, oriented=False))
-    readings = campaign.readings.select(campaign.readings.load > 0)
-    (fault,) = find(campaign, scaled(readings, 1 / GRAVITY, 1 / GRAVITY))
+    measurements = campaign.measurements.select(campaign.measurements.load > 0)
+    (fault,) = find(campaign, scaled(measurements, 1 / GRAVITY, 1 / GRAVITY))
     assert fault.parameters[0].value == GRAVITY
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.7, 1.5, 2.0, 3.0])
 def test_a_factor_that_is_no_unit_is_none(campaign, factor):
-    assert find(campaign, scaled(campaign.readings, factor, factor)) == []
+    assert find(campaign, scaled(campaign.measurements, factor, factor)) == []
 
 
 def test_joints_that_give_way_by_different_factors_are_no_unit(fanuc):
     softer = replace(fanuc, compliance=fanuc.compliance * [2.0, 20.0, 4.0, 9.0, 30.0, 9.0])
     campaign = made(fanuc, 4, Plan(), softer)
-    assert find(campaign, campaign.readings) == []
+    assert find(campaign, campaign.measurements) == []
 
 
 def test_no_unit_is_named_without_loads(campaign):
-    assert find(campaign, campaign.readings.select(campaign.readings.load == 0)) == []
+    assert find(campaign, campaign.measurements.select(campaign.measurements.load == 0)) == []
 
 
 def test_loads_turned_round_are_named(campaign):
-    (fault,) = find(campaign, replace(campaign.readings, wrench=-campaign.readings.wrench))
+    (fault,) = find(campaign, replace(campaign.measurements, wrench=-campaign.measurements.wrench))
     assert fault.joints == ()
     assert "loads" in fault.detail
     assert -2.0 < fault.parameters[0].value < -0.5
 
 
-def test_loads_turned_round_are_named_without_unloaded_readings(fanuc):
+def test_loads_turned_round_are_named_without_unloaded_measurements(fanuc):
     campaign = made(fanuc, 5, Plan(poses=40, loads=1, tracker=True, oriented=False))
-    readings = campaign.readings.select(campaign.readings.load > 0)
-    assert find(campaign, readings) == []
-    (fault,) = find(campaign, replace(readings, wrench=-readings.wrench))
+    measurements = campaign.measurements.select(campaign.measurements.load > 0)
+    assert find(campaign, measurements) == []
+    (fault,) = find(campaign, replace(measurements, wrench=-measurements.wrench))
     assert "loads" in fault.detail

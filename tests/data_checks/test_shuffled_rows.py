@@ -1,4 +1,4 @@
-"""Rows are named where other rows' readings or loads belong to them, beyond what chance can do."""
+"""Rows are named where other rows' measurements or loads belong to them, beyond what chance can do."""
 
 from dataclasses import replace
 
@@ -14,76 +14,76 @@ def campaign(request, fanuc):
     return made(fanuc, 1, Plan(tracker=request.param == "tracker"), with_other_compliances(fanuc, 1, 0.3))
 
 
-def with_measured(readings, source):
-    return replace(readings, position=readings.position[source], rotation_vector=readings.rotation_vector[source])
+def with_measured(measurements, source):
+    return replace(measurements, position=measurements.position[source], rotation_vector=measurements.rotation_vector[source])
 
 
-def permuted(readings, share, seed=0):
-    rng, source = np.random.default_rng(seed), np.arange(len(readings))
+def permuted(measurements, share, seed=0):
+    rng, source = np.random.default_rng(seed), np.arange(len(measurements))
     some = rng.choice(len(source), max(round(share * len(source)), 2), replace=False)
     source[some] = rng.permutation(some) if share else some[::-1]
-    return with_measured(readings, source), some[source[some] != some]
+    return with_measured(measurements, source), some[source[some] != some]
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
-def test_readings_in_the_rows_of_each_other_are_named_with_these_rows(campaign, share):
-    readings, moved = permuted(campaign.readings, share)
-    (fault,) = find(campaign, readings)
+def test_measurements_in_the_rows_of_each_other_are_named_with_these_rows(campaign, share):
+    measurements, moved = permuted(campaign.measurements, share)
+    (fault,) = find(campaign, measurements)
     assert (fault.name, fault.joints, fault.decisive) == ("shuffled_rows", (), True)
     assert set(fault.rows) <= set((moved + 1).tolist())
     assert len(fault.rows) >= 0.9 * len(moved)
     assert fault.evidence[1] < fault.evidence[0] / 5
 
 
-def test_readings_that_are_all_out_of_place_are_named(campaign):
-    (fault,) = find(campaign, permuted(campaign.readings, 1.0)[0])
-    assert len(fault.rows) > 0.9 * len(campaign.readings)
+def test_measurements_that_are_all_out_of_place_are_named(campaign):
+    (fault,) = find(campaign, permuted(campaign.measurements, 1.0)[0])
+    assert len(fault.rows) > 0.9 * len(campaign.measurements)
 
 
-def test_poses_whose_readings_are_swapped_are_named(campaign):
+def test_poses_whose_measurements_are_swapped_are_named(campaign):
     of_pose = 4 * len(POINTS)
-    source = np.arange(len(campaign.readings)).reshape(-1, of_pose)
+    source = np.arange(len(campaign.measurements)).reshape(-1, of_pose)
     source[[3, 9]] = source[[9, 3]]
-    (fault,) = find(campaign, with_measured(campaign.readings, source.ravel()))
+    (fault,) = find(campaign, with_measured(campaign.measurements, source.ravel()))
     assert len(fault.rows) == 2 * of_pose
 
 
 @pytest.mark.parametrize(("steps", "words"), [(1, "row further up"), (-1, "row further down")])
 def test_measured_columns_moved_by_one_row_are_named(campaign, steps, words):
-    source = np.roll(np.arange(len(campaign.readings)), steps)
-    (fault,) = find(campaign, with_measured(campaign.readings, source))
+    source = np.roll(np.arange(len(campaign.measurements)), steps)
+    (fault,) = find(campaign, with_measured(campaign.measurements, source))
     assert words in fault.detail
     assert fault.parameters[0].value == -steps
 
 
 def test_measured_columns_moved_by_one_pose_are_named(campaign):
-    source = np.roll(np.arange(len(campaign.readings)), 4 * len(POINTS))
-    (fault,) = find(campaign, with_measured(campaign.readings, source))
+    source = np.roll(np.arange(len(campaign.measurements)), 4 * len(POINTS))
+    (fault,) = find(campaign, with_measured(campaign.measurements, source))
     assert "pose further up" in fault.detail
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 1.0])
 def test_loads_beside_the_deflections_of_others_are_named(campaign, share):
-    readings, rng = campaign.readings, np.random.default_rng(2)
+    measurements, rng = campaign.measurements, np.random.default_rng(2)
     loaded = np.array([(pose, load) for pose in range(30) for load in (1, 2, 3)])
     some = rng.choice(len(loaded), round(share * len(loaded)), replace=False)
-    wrench = readings.wrench.copy()
+    wrench = measurements.wrench.copy()
     for mine, other in zip(loaded[some], loaded[rng.permutation(some)], strict=True):
-        theirs = readings.wrench[(readings.pose == other[0]) & (readings.load == other[1])][0]
-        wrench[(readings.pose == mine[0]) & (readings.load == mine[1])] = theirs
-    (fault,) = find(campaign, replace(readings, wrench=wrench))
+        theirs = measurements.wrench[(measurements.pose == other[0]) & (measurements.load == other[1])][0]
+        wrench[(measurements.pose == mine[0]) & (measurements.load == mine[1])] = theirs
+    (fault,) = find(campaign, replace(measurements, wrench=wrench))
     assert "load" in fault.detail
     assert fault.evidence[1] < fault.evidence[0] / 5
     assert 0.6 * share < fault.parameters[0].value <= share
 
 
-def test_readings_that_belong_nowhere_are_not_shuffled(campaign):
-    rng, position = np.random.default_rng(3), campaign.readings.position.copy()
+def test_measurements_that_belong_nowhere_are_not_shuffled(campaign):
+    rng, position = np.random.default_rng(3), campaign.measurements.position.copy()
     some = rng.choice(len(position), 20, replace=False)
     position[some] += rng.normal(0.0, 0.3, (20, 3))
-    assert find(campaign, replace(campaign.readings, position=position)) == []
+    assert find(campaign, replace(campaign.measurements, position=position)) == []
 
 
 def test_another_robot_is_no_permutation(campaign, kuka):
     """Among many points some point is always near."""
-    assert find(replace(campaign, robot=kuka), campaign.readings) == []
+    assert find(replace(campaign, robot=kuka), campaign.measurements) == []

@@ -11,7 +11,7 @@ from scipy.stats import binom
 from elastocal.diagnosis.alarm import alarm_of
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import first_look, posterior
+from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.settings import Settings
 
 UNITS = (
@@ -31,7 +31,7 @@ def test_bounds_have_the_power_that_is_stated():
 
 
 def p_values(drawn):
-    """Of simulated readings, each at the pose error that they make most probable."""
+    """Of simulated measurements, each at the pose error that they make most probable."""
     settings = replace(Settings(), alarm_draws=99, alarm_level=LEVEL)
     found = []
     for number in range(PROBLEMS):
@@ -67,7 +67,7 @@ def test_what_is_declared_raises_no_alarm(size):
     assert FEWEST <= (found <= LEVEL).sum() <= MOST, (found <= LEVEL).mean()
 
 
-def test_p_value_is_the_rank_of_the_readings_among_the_draws():
+def test_p_value_is_the_rank_of_the_measurements_among_the_draws():
     problem, products = made_problem(made_rows(3, candidates=8), UNITS)
     found = alarm_of(problem, products, 0.0, np.random.default_rng(4))
     assert found.p_value * (problem.settings.alarm_draws + 1) == pytest.approx(round(found.p_value * 500))
@@ -153,6 +153,6 @@ def test_it_is_the_same_for_one_seed():
 
 def test_it_agrees_with_the_posterior_on_what_cannot_be_missed():
     problem, products = signalled(1.5)
-    found, (nothing, _) = posterior(problem), first_look(problem)
+    found, (nothing, _) = posterior(problem), initial_screening(problem)
     assert alarm_of(problem, products, nothing.pose_error_rad, np.random.default_rng(9)).raised
     assert found.models[0].units == (2,)

@@ -166,7 +166,7 @@ def test_what_is_there_or_not_helps_where_it_is_more_probable_than_not(made):
 
 
 def test_what_other_models_predict_as_well_helps_however_improbable_it_is_by_itself():
-    """Two names of one displacement: either may be adopted, as the readings at hand cannot tell between them."""
+    """Two names of one displacement: either may be adopted, as the measurements at hand cannot tell between them."""
     rows = made_rows(1, poses=12)
     candidates = rows.candidates.copy()
     candidates[:, 2] = candidates[:, 0]

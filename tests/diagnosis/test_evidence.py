@@ -1,4 +1,4 @@
-"""Bayes factors: marginal likelihoods of all readings, integrated by brute force."""
+"""Bayes factors: marginal likelihoods of all measurements, integrated by brute force."""
 
 from dataclasses import replace
 
@@ -98,7 +98,7 @@ def test_evidence_does_not_depend_on_where_the_search_for_the_sizes_starts(numbe
 @pytest.mark.parametrize("signal", SIGNALS)
 @pytest.mark.parametrize("chosen", [(0, 1), (0, 2), (0, 1, 2)])
 def test_evidence_of_several_units_is_that_of_all_combinations_of_sizes(signal, chosen):
-    """To 0.03 nats: sizes of different units are not quite independent given the readings."""
+    """To 0.03 nats: sizes of different units are not quite independent given the measurements."""
     rows, units = quiet(3, SIGNALS[signal]), [UNITS[number] for number in chosen]
     expected = brute_log_bayes_factor(rows, units)
     assert log_bayes_factor(rows, units) == pytest.approx(expected, abs=0.03)
@@ -117,7 +117,7 @@ def test_evidence_of_two_units_that_contribute_the_same_is_at_most_a_little_too_
 
 
 def test_evidence_of_units_that_do_not_overlap_is_exact():
-    """Orthogonal after projection: sizes are independent given the readings, and the product of sums is the sum of products."""
+    """Orthogonal after projection: sizes are independent given the data, and the product of sums is the sum of products."""
     rows = quiet(4)
     rows = replace(rows, jacobian=np.zeros_like(rows.jacobian), prior_std=np.full(4, 1e4))
     basis = np.linalg.qr(np.column_stack([rows.declared, rows.candidates]))[0][:, 4:]

@@ -111,7 +111,7 @@ def test_sag_is_how_far_the_weight_moves_a_target_at_most(found, kuka):
     taken = declared_springs(heavy, kuka.compliance)
     (entry,) = sag_entries("payload", [payload], taken, campaign.observations)
     # Predictions with and without the mass, by the exact kinematics.
-    around = taken.circumstances
+    around = taken.conditions
     light = with_value(taken, "payload", 0.0, 1.0)
     positions = [predict(each.model, each.estimate, campaign.observations, around)[0] for each in (taken, light)]
     largest = np.linalg.norm(positions[0] - positions[1], axis=1).max()

@@ -70,14 +70,14 @@ def fitted_of(steps, kind):
     return next(step.fitted for step in steps if step.kind == kind)
 
 
-def test_residuals_are_measured_less_predicted_for_every_reading_in_its_order(made):
+def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_order(made):
     case, held_out, steps = made
     robot = case.campaign.robot
     blocks = list(residual_blocks(diagnosis_of(case, steps), held_out))
     assert [block["held_out"].all() for block in blocks] == [False, True]
     for block, part in zip(blocks, (case, held_out), strict=True):
-        read = part.campaign.readings
-        # Repeats of one state stand in the order of their target: the rows still are all readings, each once.
+        read = part.campaign.measurements
+        # Repeats of one state stand in the order of their target: the rows still are all measurements, each once.
         assert sorted(block["row"]) == sorted(read.row)
         order = np.argsort(read.row)[np.searchsorted(np.sort(read.row), block["row"])]
         for name in ("pose", "load", "repeat", "target"):
@@ -103,12 +103,12 @@ def test_residuals_are_measured_less_predicted_for_every_reading_in_its_order(ma
     assert sorted(rows) == list(range(1, len(rows) + 1))
 
 
-def test_each_reading_stands_by_itself_and_the_training_ones_come_first(made):
-    """As many rows as readings, repeats included, though the fit averages them."""
+def test_each_measurement_stands_by_itself_and_the_training_ones_come_first(made):
+    """As many rows as measurements, repeats included, though the fit averages them."""
     case, held_out, steps = made
     first, second = residual_blocks(diagnosis_of(case, steps), held_out)
-    assert len(first["row"]) == len(case.campaign.readings) > len(case.observations)
-    assert len(second["row"]) == len(held_out.campaign.readings)
+    assert len(first["row"]) == len(case.campaign.measurements) > len(case.observations)
+    assert len(second["row"]) == len(held_out.campaign.measurements)
     assert {*zip(first["session"], first["pose"], strict=True)}.isdisjoint(zip(second["session"], second["pose"], strict=True))
 
 
@@ -123,7 +123,7 @@ def test_figures_before_and_after(made):
     low, high = found.document["heldout"]["reduction_ci95"]
     assert low < 1 - after["rms_m"] / before["rms_m"] < high
     assert found.document["heldout"]["poses"] == len(np.unique(held_out.observations.states.pose))
-    # No joint errs, and a mean of two readings has half the square of the noise of one.
+    # No joint errs, and a mean of two measurements has half the square of the noise of one.
     repeats = held_out.observations.states.repeats[held_out.observations.state]
     assert found.document["heldout"]["noise_floor_rms_m"] == pytest.approx(6e-5 * np.sqrt((3 / repeats).mean()))
     assert about_errors(found) == []
@@ -140,11 +140,11 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
         away[2] = 8.0
         return replace(states, joint_angles=states.joint_angles + (states.pose == first)[:, None] * away)
 
-    observations, readings = held_out.observations, held_out.campaign.readings
+    observations, measurements = held_out.observations, held_out.campaign.measurements
     away = replace(
         held_out,
         observations=replace(observations, states=turned(observations.states)),
-        campaign=replace(held_out.campaign, readings=turned(readings)),
+        campaign=replace(held_out.campaign, measurements=turned(measurements)),
     )
     found = judged(steps, case, away)
     beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
@@ -185,7 +185,7 @@ def test_a_session_held_out_is_placed_and_judged(frame, kuka, config_folder, tmp
         table |= dict(zip("xyz", position.T, strict=True))
     made_folder(tmp_path / "made", kuka, table=table, frame=frame, holdout={"session": 2})
     case, held_out = cases_in(tmp_path / "made", config_folder / "robots")
-    assert set(case.campaign.readings.session) == {1} and set(held_out.campaign.readings.session) == {2}
+    assert set(case.campaign.measurements.session) == {1} and set(held_out.campaign.measurements.session) == {2}
     steps = steps_of(case, "joint_offset@3")
     found = judged(steps, case, held_out).document["heldout"]
     assert found["after"]["rms_m"] < 1.5 * found["noise_floor_rms_m"] and found["after"]["rms_m"] < found["before"]["rms_m"]
@@ -246,7 +246,7 @@ def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config
     made_folder(tmp_path / "made", kuka, table=own, holdout={"campaign": "../other"})
     case, held_out = cases_in(tmp_path / "made", config_folder / "robots")
     assert case.campaign.name == "made" and held_out.campaign.name == "other"
-    assert len(case.campaign.readings) == len(own["pose"])
+    assert len(case.campaign.measurements) == len(own["pose"])
     steps = steps_of(case, "joint_offset@3")
     found = judged(steps, case, held_out)
     assert found.document["heldout"]["after"]["rms_m"] < 1.3 * found.document["heldout"]["noise_floor_rms_m"]

@@ -18,7 +18,7 @@ from elastocal.diagnosis.linearize import (
     smallest_shown,
 )
 from elastocal.diagnosis.other import competitors
-from elastocal.diagnosis.search import first_look
+from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import residuals
@@ -53,13 +53,13 @@ def unit_of(found, key):
 
 @pytest.mark.parametrize("key", ["joint_offset@2", "joint_tilt@2", "link_elasticity@3"])
 def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(campaign, key):
-    """By W'My: the change of W'My is what the column itself has along W, where readings move by what the effect does."""
+    """By W'My: the change of W'My is what the column itself has along W, where measurements move by what the effect does."""
     found, fitted = problem_of(campaign), campaign.declared
     unit = unit_of(found, key)
     step = np.zeros(len(unit.columns))
     step[0] = 1e-3
     model, moved = with_effect(campaign, key, step * unit.sizes)
-    off = residuals(model, moved, campaign.observations, fitted.circumstances)
+    off = residuals(model, moved, campaign.observations, fitted.conditions)
     # Robust weights of the fit stay as they are.
     pushed = replace(fitted, estimate=fitted.estimate)
     observations = replace(campaign.observations, position=campaign.observations.position + (fitted.residual - off))
@@ -70,7 +70,7 @@ def test_a_column_is_the_change_of_the_exact_prediction_at_the_plausible_size(ca
 
 
 def test_a_problem_about_a_model_with_an_effect_is_the_one_about_the_model_without(campaign):
-    """Coefficients count from zero, not from the fit: what the fit gives to a candidate is given back to the readings."""
+    """Coefficients count from zero, not from the fit: what the fit gives to a candidate is given back to the measurements."""
     model, start = with_effect(campaign, "joint_offset@3", [0.0])
     noise = campaign.declared.noise
     fitted = fit(model, campaign.observations, noise, start)
@@ -92,7 +92,7 @@ def test_an_effect_is_found_at_its_true_size(campaign):
 
 
 @pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
-def test_declared_geometry_has_the_size_that_the_readings_make_most_probable(offset, size, kuka):
+def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
     keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
     signs = np.array([1.0, -1.0, 1.0, -1.0])
     campaign = planted(kuka, {key: [sign * offset] for key, sign in zip(keys, signs, strict=True)}, seed=2)
@@ -126,7 +126,7 @@ def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_an
     found = problem_of(campaign, quiet, KEYS[:1])
     assert loud < {unit.key for unit in found.problem.units}
     against = [unit.competitor for unit in found.problem.units if unit.mechanism == OTHER]
-    assert against == competitors(campaign.declared.circumstances)
+    assert against == competitors(campaign.declared.conditions)
     assert {each.location for each in against} == {(1,), (2,), (3,), (4,), (5,), (6,), ()}
     columns = [len(unit.columns) for unit in found.problem.units if unit.mechanism == OTHER and unit.location]
     assert set(columns) == {SETTINGS.other_features}
@@ -164,7 +164,7 @@ def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
 
 
 def test_what_is_too_small_to_be_seen_at_its_plausible_size_is_untestable(kuka):
-    """Readings a thousand times as noisy show no offset."""
+    """Measurements a thousand times as noisy show no offset."""
     campaign = planted(kuka, {}, seed=5)
     loud = replace(campaign.declared, noise=NOISE.scaled(1e3))
     found = problem_of(campaign, loud, KEYS[:2])
@@ -186,7 +186,7 @@ def test_the_smallest_size_is_the_first_that_would_be_found_with_a_power_of_a_ha
             assert smallest_shown(scaled, units, SETTINGS)[0] == shown
 
 
-def test_units_know_the_smallest_size_that_readings_show(campaign):
+def test_units_know_the_smallest_size_that_measurements_show(campaign):
     """Ten times as noisy, sizes ten times as large; none left where even the plausible size does not show."""
     smallest = {}
     for factor in (1.0, 10.0):
@@ -304,10 +304,10 @@ def test_a_step_is_found_closer_to_where_it_was_by_a_closer_look(kuka):
     candidates = [campaign.candidates["setup_step"]]
     fitted = fit(campaign.declared.model, observations, campaign.declared.noise)
     first = linearized(fitted, observations, candidates, SETTINGS).problem
-    alone = first_look(first)[1]
+    alone = initial_screening(first)[1]
     closer = shapes_looked_at_closely(first, alone)
     then = linearized(fitted, observations, candidates, SETTINGS, closer).problem
-    again = first_look(then)[1]
+    again = initial_screening(then)[1]
     near, nearer = (problem.units[np.argmax(found)].shapes[0] for problem, found in ((first, alone), (then, again)))
     assert abs(nearer - true) < abs(near - true) and abs(nearer - true) < 0.02
     assert again.max() > alone.max() + 3

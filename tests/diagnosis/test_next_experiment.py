@@ -1,4 +1,4 @@
-"""The next experiment: what it promises is what readings bring on average, and an exact alias is told apart where it can be."""
+"""The next experiment: it promises what measurements bring on average, and resolves an exact alias where that is possible."""
 
 import json
 from dataclasses import replace
@@ -13,12 +13,12 @@ from synthetic import seen_exactly, with_noise
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import new_states, next_experiment
 from elastocal.diagnosis.alarm import Alarm
+from elastocal.diagnosis.alternatives import members_of
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.promise import PROMISE_DRAWS, Promise, separation_resolved
 from elastocal.diagnosis.proposal import DATA_AT_FAULT, NOTHING_AMBIGUOUS, facts_of, sentence_of, table_of
-from elastocal.diagnosis.rivals import members_of
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.verdict import concluded
@@ -70,7 +70,7 @@ def keys_like(campaign, *starts):
 
 @pytest.fixture(scope="module")
 def ambiguous(kuka):
-    """A bending link in eight poses, which the tilt of a joint explains as well."""
+    """A nonlinear link in eight poses, which the tilt of a joint explains as well."""
     states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
     campaign = planted(kuka, {"link_elasticity@2": (3e-8, 3e-8)}, seed=3, poses=8, states=states)
     return diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC)), campaign
@@ -97,13 +97,13 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     total = made.information(entries, [0, 1]).sum(axis=0)
     at = np.concatenate([np.arange(line.products.declared), line.products.declared + made.columns])
     expected = line.products.white_gram[np.ix_(at, at)]
-    # Declared parameters that readings do not show have their prior, of information one, and only rounding beside it.
+    # Declared parameters that measurements do not show have their prior, of information one, and only rounding beside it.
     size = np.sqrt(np.diag(expected) + 1e-6)
     np.testing.assert_allclose(total / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)
 
 
-def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_readings(ambiguous, kuka):
-    """Readings row by row and their normal densities, against the promise from the information alone; 2,000 draws of each."""
+def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_measurements(ambiguous, kuka):
+    """Measurements row by row and their normal densities, against the promise from information alone; 2,000 draws of each."""
     members, instrument, reach = pieces(ambiguous[0], kuka)
     rng = np.random.default_rng(0)
     targets = list(range(len(instrument.model.targets)))
@@ -125,8 +125,8 @@ def test_promised_separation_is_twice_the_mean_log_bayes_factor_of_simulated_rea
         weight = np.exp(members.log_weights[mine])
         models = rng.choice(mine, draws, p=weight / weight.sum())
         truths = np.concatenate([members.drawn(model, 1, rng) for model in models])
-        readings = truths @ rows.T + rng.standard_normal((draws, len(rows)))
-        each = np.column_stack([density.logpdf(readings) for density in densities]) + members.log_weights
+        measurements = truths @ rows.T + rng.standard_normal((draws, len(rows)))
+        each = np.column_stack([density.logpdf(measurements) for density in densities]) + members.log_weights
         for h in range(hypotheses):
             these = members.hypothesis == h
             logs[source, :, h] = log_sum_exp(each[:, these], axis=1) - log_sum_exp(members.log_weights[these])
@@ -248,7 +248,7 @@ def test_an_exact_alias_is_said_to_be_none_that_measuring_helps(kuka):
 
 
 def test_an_alias_does_not_keep_the_others_from_being_told(kuka):
-    """Beside an alias, which leaves the promise, a tilt is told from the link that bends."""
+    """Beside an alias, which leaves the promise, a tilt is told from the link that nonlinear_parameters."""
     states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
     campaign = planted(kuka, {"link_elasticity@2": (3e-8, 3e-8)}, seed=3, poses=8, states=states)
     # At every joint, or the tilt of several would not be what the alias of one is.
@@ -304,7 +304,7 @@ def test_further_targets_at_unknown_places_tell_only_beyond_their_offsets(kuka):
 
 
 def carried_out(diagnosis, campaign, proposal, members, instrument, model, rng):
-    """The campaign with readings of what was proposed, from coefficients that the posterior of one model allows."""
+    """The campaign with measurements of what was proposed, from coefficients that the posterior of one model allows."""
     line, (truth,) = diagnosis.evidence.linearized, members.drawn(model, 1, rng)
     products, declared = line.products, line.products.declared
     contributions = truth[declared:]

@@ -1,4 +1,4 @@
-"""A campaign that declares far less noise than its readings have: sizes of effects stay what they are in mm and mrad."""
+"""A campaign that declares far less noise than its measurements have: sizes of effects stay what they are in mm and mrad."""
 
 from dataclasses import replace
 
@@ -15,7 +15,7 @@ OFFSET = 1e-3
 
 @pytest.fixture(scope="module")
 def diagnosed(kuka, config_folder, tmp_path_factory):
-    """Diagnoses by the noise that is declared, m, of readings that scatter by 60 um without repeats."""
+    """Diagnoses by the noise that is declared, m, of measurements that scatter by 60 um without repeats."""
     found = {}
     for declared_m in (6e-5, 1e-6):
         folder = tmp_path_factory.mktemp("noise") / "made"
@@ -53,8 +53,10 @@ def test_noise_that_is_far_too_small_is_a_warning(diagnosed):
 
 
 @pytest.mark.parametrize("error_rad", [0.0, 3e-4])
-def test_an_error_that_all_readings_of_a_pose_share_is_noise_of_the_model_and_said(error_rad, kuka, config_folder, tmp_path):
-    """Joints that stand otherwise in each pose than they report, by the same in all of its readings."""
+def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_and_said(
+    error_rad, kuka, config_folder, tmp_path
+):
+    """Joints that stand otherwise in each pose than they report, by the same in all of its measurements."""
     table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
     drawn = error_rad * np.random.default_rng(3).standard_normal((max(table["pose"]) + 1, 6))
     table |= {f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1] for joint in range(1, 7)}

@@ -22,7 +22,7 @@ from elastocal.diagnosis.other import (
     competitors,
     law_of,
 )
-from elastocal.effects.circumstances import at_states
+from elastocal.effects.conditions import at_states
 from elastocal.mechanics.robot import Mass
 
 FEATURES = 40

@@ -45,8 +45,8 @@ def test_priors_arrive_in_the_fit(found):
         {"joint_offset@2": line.declared_size * plausible, "offset@3": best.scales[0] * plausible}, rel=1e-12
     )
     assert line.declared_size in SETTINGS.declared_sizes and best.scales[0] in SETTINGS.scales
-    # And do what a prior does: information of the readings and of the prior add up.
-    about = linearize(final.model, final.estimate, campaign.observations, final.circumstances)
+    # And do what a prior does: information of the measurements and of the prior add up.
+    about = linearize(final.model, final.estimate, campaign.observations, final.conditions)
     left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
     precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters])
     expected = np.linalg.inv(left.T @ left + np.diag(precision))
@@ -105,7 +105,7 @@ def test_mean_square_left_is_that_of_the_penalised_fit(found):
 
 @pytest.mark.parametrize("times", [0.5, 1.0, 4.0])
 def test_remaining_noise_does_not_depend_on_the_noise_by_which_the_problem_was_whitened(found, times):
-    """Where the readings leave more than the least noise, and else the least; readings scatter by 1.3 and 0.65 of it."""
+    """Where the residual exceeds the least noise, and else the least; measurements scatter by 1.3 and 0.65 of it."""
     _, declared, line, models = found
     problem, least = line.problem, declared.noise
     for spread in (1.3, 0.65):
@@ -133,4 +133,4 @@ def test_remaining_noise_is_at_least_the_noise(found, factor):
     assert left.position_m >= declared.noise.position_m
     assert left.pose_rad == pytest.approx(expected * model.pose_error_rad)
     np.testing.assert_allclose(left.joint_rad, expected * declared.noise.joint_rad)
-    assert left.of_readings.pose_rad == 0.0
+    assert left.of_measurements.pose_rad == 0.0

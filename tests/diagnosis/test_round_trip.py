@@ -14,7 +14,7 @@ from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.refit import fit_with_sizes, selected
-from elastocal.diagnosis.search import first_look, posterior
+from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -187,7 +187,7 @@ def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path
 def test_bayes_factors_of_the_table_are_those_of_single_units(found):
     diagnosis, _ = found
     columns, problem = tables.candidate_columns(diagnosis), diagnosis.evidence.linearized.problem
-    factors = first_look(problem)[1]
+    factors = initial_screening(problem)[1]
     number = next(n for n, unit in enumerate(problem.units) if unit.key == "joint_offset@2")
     place = columns["candidate"].index("joint_offset@2")
     assert columns["log_bayes_factor"][place] == factors[number]
@@ -210,7 +210,7 @@ def test_tables_of_a_faulty_campaign_have_no_rows_but_for_the_candidates(faulty,
     assert len(there_and_back(tmp_path / "m.parquet", tables.MODELS, [tables.model_columns(diagnosis)])["model"]) == 0
     assert len(there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])["one"]) == 0
     candidates = there_and_back(tmp_path / "c.parquet", tables.CANDIDATES, [tables.candidate_columns(diagnosis)])
-    assert set(candidates["note"]) == {"the readings are at fault"} and not candidates["chosen"].any()
+    assert set(candidates["note"]) == {"the measurements are at fault"} and not candidates["chosen"].any()
 
 
 def test_correlations_are_of_the_final_model(found, tmp_path):

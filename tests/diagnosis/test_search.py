@@ -10,7 +10,7 @@ from made_problems import made_problem, made_rows, made_unit
 
 from elastocal.diagnosis.evidence import evaluate, log_sum_exp
 from elastocal.diagnosis.hypotheses import OTHER
-from elastocal.diagnosis.search import _Searcher, first_look, pose_errors_within_reach, posterior
+from elastocal.diagnosis.search import _Searcher, initial_screening, pose_errors_within_reach, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import Statistics
 
@@ -69,7 +69,7 @@ def test_posterior_is_that_of_all_models(signal, seed):
 
 
 @pytest.mark.parametrize(("signal", "best"), [("nothing", ()), ("one", (0,)), ("one mechanism everywhere", (0, 1, 2))])
-def test_the_most_probable_model_is_the_one_that_made_the_readings(signal, best):
+def test_the_most_probable_model_is_the_one_that_made_the_measurements(signal, best):
     found = posterior(problem_of(signal))
     assert found.models[0].units == best
     assert (np.diff(found.probabilities) <= 0).all()
@@ -90,7 +90,7 @@ def test_a_mechanism_at_all_its_locations_is_found_where_no_single_one_of_them_s
 
 def test_nothing_is_always_among_the_models_however_improbable():
     problem = problem_of("two mechanisms")
-    found, (nothing, _) = posterior(problem), first_look(problem)
+    found, (nothing, _) = posterior(problem), initial_screening(problem)
     (empty,) = [model for model in found.models if not model.units]
     assert found.nothing is empty
     assert empty.log_odds == nothing.log_odds == pytest.approx(0.0, abs=1e-9)
@@ -114,7 +114,7 @@ def test_no_model_is_larger_than_the_settings_allow():
 def test_single_bayes_factors_are_those_of_the_models_with_one_unit(smallest):
     problem = problem_of("a faint one")
     problem = replace(problem, units=tuple(replace(unit, smallest=smallest) for unit in problem.units))
-    _, factors = first_look(problem)
+    _, factors = initial_screening(problem)
     empty = evaluate(problem.statistics, [], problem.grid, problem.log_pose, []).log_evidence
     for number, unit in enumerate(problem.units):
         one = evaluate(problem.statistics, [unit], problem.grid, problem.log_pose, [0.1])
@@ -135,11 +135,11 @@ def test_pose_errors_go_on_two_steps_beyond_the_most_likely_and_as_far_as_any_is
 
 
 @pytest.mark.parametrize("tau", TAU)
-def test_the_pose_error_of_a_model_is_the_one_of_the_readings(tau):
+def test_the_pose_error_of_a_model_is_the_one_of_the_measurements(tau):
     rows = made_rows(6, poses=100, candidates=10)
     noisy = rows.drawn(np.random.default_rng(8), tau)
     problem, _ = made_problem(noisy, UNITS, tau=TAU)
-    found, (nothing, _) = posterior(problem), first_look(problem)
+    found, (nothing, _) = posterior(problem), initial_screening(problem)
     assert nothing.pose_error_rad == found.models[0].pose_error_rad == tau
 
 
@@ -179,7 +179,7 @@ def test_what_is_known_starts_a_search_with_the_better_of_its_shapes():
     assert set(searcher.measured) == {(1,)}
 
 
-def test_no_unit_of_a_model_is_smaller_than_readings_can_show():
+def test_no_unit_of_a_model_is_smaller_than_measurements_can_show():
     """Where the most probable size of a faint signal is below that."""
     problem = problem_of("a faint one")
     free = next(model for model in posterior(problem).models if model.units == (0,))

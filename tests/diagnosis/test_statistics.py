@@ -1,4 +1,4 @@
-"""Sufficient statistics: dense generalized least squares with the covariance written out, and readings drawn one by one."""
+"""Sufficient statistics: dense generalized least squares with the covariance written out, and measurements drawn one by one."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ CASES = {
     "poses of unequal size": {},
     "joints that repeat badly": {"joint_rad": 0.4},
     "priors that matter": {"prior": 0.3},
-    "one reading a pose": {"size": (1, 3), "poses": 20},
+    "one measurement a pose": {"size": (1, 3), "poses": 20},
     "nothing but a prior on some": {"declared": 9, "prior": 1.0, "poses": 3},
 }
 
@@ -141,7 +141,7 @@ DRAWS, BEYOND = 4000, 5.0
 
 @pytest.mark.parametrize("tau", [0.0, 0.6])
 @pytest.mark.parametrize("case", ["poses of unequal size", "joints that repeat badly", "priors that matter"])
-def test_null_draws_have_the_moments_of_simulated_readings(case, tau):
+def test_null_draws_have_the_moments_of_simulated_measurements(case, tau):
     """W'My has covariance W'M Sigma M'W; y'My has mean tr(M Sigma) and variance 2 tr(M Sigma M Sigma)."""
     rows = made_rows(9, **CASES[case])
     along, squares = null_draws(rows.products, tau, TAU, DRAWS, np.random.default_rng(10))
@@ -159,7 +159,7 @@ def test_null_draws_have_the_moments_of_simulated_readings(case, tau):
         # Fourth cumulant of a quadratic form: 48 tr (M Sigma)^4.
         fourth = 2 + 48 * np.trace(spread @ spread @ spread @ spread) / variance**2
         assert abs(squares[number].var() - variance) < BEYOND * variance * np.sqrt(fourth / DRAWS)
-        # Odd moments of normal readings vanish: no correlation of a linear with a quadratic form.
+        # Odd moments of normal measurements vanish: no correlation of a linear with a quadratic form.
         mixed = (along[number] / deviation[:, None] * (squares[number] - mean)).mean(axis=1) / np.sqrt(variance)
         assert (np.abs(mixed) < BEYOND * np.sqrt(3 / DRAWS)).all()
 

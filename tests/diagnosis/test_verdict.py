@@ -72,13 +72,13 @@ def test_what_is_enough_is_a_setting(more, verdict):
 
 @pytest.mark.parametrize(("probability", "verdict"), [(0.7, CLASS), (0.8, NAMED)])
 def test_a_mechanism_that_only_its_prior_prefers_is_not_named(probability, verdict):
-    """A payload has one place, an offset two, each with a third of its prior: at odds of 7 to 3 readings prefer the offset."""
+    """A payload has one place, an offset two, each with a third of its prior: at odds of 7 to 3 the data prefer the offset."""
     found = conclusion(((PAYLOAD,), probability), ((OFFSET_2,), 1 - probability))
     assert found.verdict == verdict and found.best.mechanisms == ("payload",)
     assert found.alternatives == {"payload": ("offset",) if verdict == CLASS else ()}
 
 
-def test_what_the_readings_prefer_is_listed_however_improbable_it_was_before_them():
+def test_what_the_measurements_prefer_is_listed_however_improbable_it_was_before_them():
     units = tuple(replace(unit, log_prior=-4.0 * (unit.mechanism == "tilt")) for unit in UNITS)
     found = concluded(made_problem(made_rows(), units)[0], made_posterior(((PAYLOAD,), 0.97), ((TILT,), 0.03)), RAISED)
     assert found.verdict == CLASS and found.alternatives == {"payload": ("tilt",)}

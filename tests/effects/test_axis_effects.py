@@ -20,7 +20,7 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances, displaced_coordinates
+from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import Observations
 from elastocal.fitting.prediction import predict
@@ -41,7 +41,7 @@ def predicted(chain, candidate, values, states):
     estimate = replace(made_estimate(model), coefficients=(np.array(values, float),))
     count = len(states)
     seen = Observations(states, np.arange(count), np.zeros(count, int), np.zeros((count, 3)), None)
-    return predict(model, estimate, seen, circumstances(model, estimate, states))
+    return predict(model, estimate, seen, conditions(model, estimate, states))
 
 
 def with_moved_axis(chain, joint, kind):
@@ -137,7 +137,7 @@ def test_runout_of_a_joint_leaves_the_arm_before_it_alone(fanuc):
     candidate = candidate_on(fanuc.chain, "bearing_runout@3[radial]")
     model = made_model(fanuc.chain, effects=(candidate,), compliance=np.zeros(6))
     estimate, states = made_estimate(model, size=1.0), made_states(6, 4, seed=4)
-    coordinates = displaced_coordinates(model, estimate, circumstances(model, estimate, states))
+    coordinates = displaced_coordinates(model, estimate, conditions(model, estimate, states))
     elbow = model.sites.chain.point("2DoF")
     still = poses(fanuc.chain, states.joint_angles, fanuc.chain.point("2DoF"))[0]
     np.testing.assert_array_equal(poses(model.sites.chain, coordinates, elbow)[0], still)

@@ -23,7 +23,7 @@ import elastocal.effects
 from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.mechanics.kinematics import poses
 
@@ -147,7 +147,7 @@ def test_parameters_have_units_names_and_positive_plausible_sizes(chain):
 
 
 def test_a_law_that_needs_distinct_angles_says_of_which_joints(chain):
-    """Or readings at too few angles would pass for a test of it."""
+    """Or measurements at too few angles would pass for a test of it."""
     found = [c for c in candidates_on(equipped(chain)).values() if c.distinct_angles]
     assert {"nest_eccentricity", "bearing_runout"} <= {candidate.effect for candidate in found}
     assert all(candidate.joints or candidate.turning for candidate in found)
@@ -175,7 +175,7 @@ def test_sensitivities_of_every_candidate_are_central_differences(chain):
         if candidate.effect in ("joint_offset", "payload", "lost_motion"):
             model = made_model(chain, targets, 6, effects=(candidate,))
         estimate = made_estimate(model, seed=3)
-        around = circumstances(model, estimate, states)
+        around = conditions(model, estimate, states)
         seen = seen_exactly(model, estimate, states)
         steps = np.diag(small_steps(model, estimate))
         # Of a long law, steps of all parameters at once.
@@ -194,7 +194,7 @@ def test_positions_have_the_sensitivities_of_the_first_rows_of_poses(chain):
         target = Target("A", chain.end_effector.name, (0.1, 0.2, 0.3))
         model = made_model(chain, (target,), rows, effects=effects)
         estimate = made_estimate(model, seed=5)
-        around = circumstances(model, estimate, states)
+        around = conditions(model, estimate, states)
         found.append(linearize(model, estimate, seen_exactly(model, estimate, states), around).sensitivities)
     np.testing.assert_allclose(found[0], found[1][:, :3], rtol=1e-12, atol=1e-12)
 

@@ -20,10 +20,10 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.circumstances import offered, with_springs
+from elastocal.effects.conditions import offered, with_springs
 from elastocal.effects.declared_weight import candidate
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.fitting.displacement import circumstances, displaced_coordinates
+from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
@@ -87,7 +87,7 @@ def test_gravity_on_every_coordinate_where_the_robot_has_yielded_is_that_of_pino
     base = candidates_on(sites)["base_compliance"]
     model = made_model(robot, effects=(base,))
     estimate, states = made_estimate(model, seed=2, size=1.0), made_states(robot.joints, 3, seed=3, force=300.0)
-    around = circumstances(model, estimate, states)
+    around = conditions(model, estimate, states)
     at = displaced_coordinates(model, estimate, around)
     corrections = around.mass_corrections.reshape(-1, 4)
     assert corrections.any()
@@ -116,7 +116,7 @@ def test_arm_stretched_out_sags_by_its_declared_weight_as_calculated_by_hand():
     states = made_states(1, 1)
     states.joint_angles[:], states.wrench[:] = 0.0, 0.0
     estimate = made_estimate(model, size=0.0)
-    turned = displaced_coordinates(model, estimate, circumstances(model, estimate, states))[0, 0]
+    turned = displaced_coordinates(model, estimate, conditions(model, estimate, states))[0, 0]
     assert turned == pytest.approx(3e-6 * 20 * 9.80665 * 0.5, rel=1e-6)
 
 
@@ -130,7 +130,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
     if identified:
         estimate = replace(estimate, coefficients=(fanuc.compliance, *estimate.coefficients[1:]))
     seen = seen_exactly(model, estimate, states)
-    around = circumstances(model, estimate, states)
+    around = conditions(model, estimate, states)
     listed = parameters(model, estimate)
     sizes = [1e-3 * (fanuc.compliance.max() if owner == "joint_compliance" else p.plausible) for owner, p in listed]
     springs = [i for i, (owner, _) in enumerate(listed) if owner in ("joint_compliance", "declared_weight")]
@@ -254,9 +254,9 @@ def test_prediction_with_declared_weight_is_a_pure_function_of_the_estimate(fanu
     seen = seen_exactly(model, estimate, states)
     nominal = made_estimate(model, seed=13, size=0.0)
     # Loads where another estimate takes the robot to move the prediction by nanometres only.
-    found = residuals(model, estimate, seen, circumstances(model, nominal, states))
+    found = residuals(model, estimate, seen, conditions(model, nominal, states))
     np.testing.assert_allclose(found, 0.0, atol=1e-6)
-    again = linearize(model, estimate, seen, circumstances(model, nominal, states)).circumstances
+    again = linearize(model, estimate, seen, conditions(model, nominal, states)).conditions
     np.testing.assert_allclose(residuals(model, estimate, seen, again), 0.0, atol=1e-8)
 
 
@@ -282,7 +282,7 @@ def test_carriage_yields_to_the_force_along_its_track():
     robot = robot_of(ODD_CHAINS["track"], [1e-8, 1e-6, 1e-6, 1e-6])
     model = made_model(robot, (Target("A", "hand", (0, 0, 0)),), fitted_frames=False, compliance=robot.compliance)
     states = made_states(4, 3, seed=22)
-    shifted = displaced_coordinates(model, made_estimate(model), circumstances(model, made_estimate(model), states))[:, 0]
+    shifted = displaced_coordinates(model, made_estimate(model), conditions(model, made_estimate(model), states))[:, 0]
     # The carriage runs along -x.
     np.testing.assert_allclose(shifted - states.joint_angles[:, 0], -1e-8 * states.wrench[:, 0], rtol=1e-9)
     assert [p.unit for p in joint_compliance(model.sites).parameters] == ["m/N", *["rad/(N m)"] * 3]

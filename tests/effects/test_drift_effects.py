@@ -20,7 +20,7 @@ from synthetic import (
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import predict
 from elastocal.mechanics.kinematics import poses
@@ -33,7 +33,7 @@ def predicted(chain, key, values, states, shapes=()):
     effects = (candidate_on(chain, key),)
     model = made_model(chain, target, 6, fitted_frames=False, compliance=np.zeros(chain.coordinates), effects=effects)
     estimate = replace(made_estimate(model), coefficients=(np.array(values, float),), shapes=(np.array(shapes, float),))
-    return predict(model, estimate, seen_exactly(model, estimate, states), circumstances(model, estimate, states))
+    return predict(model, estimate, seen_exactly(model, estimate, states), conditions(model, estimate, states))
 
 
 def grown(chain, share):
@@ -164,7 +164,7 @@ def test_gradient_along_the_arm_makes_its_far_links_longer_and_not_the_arm():
     np.testing.assert_allclose(made[:, ends[2][0]], 1.5 * warmer * 1.0)
 
 
-def test_setup_that_is_moved_between_two_rows_moves_all_readings_from_there_on(fanuc):
+def test_setup_that_is_moved_between_two_rows_moves_all_measurements_from_there_on(fanuc):
     states = made_states(6, 11, seed=15)
     states.row[:] = 5 * np.arange(11) + 3
     step = np.array([1e-3, 0.0, -2e-3, 0.0, 1e-4, 0.0])
@@ -181,16 +181,16 @@ SPACING, WHEN = 1 / 12, 0.655
 
 
 def test_steps_are_tried_at_every_twelfth_of_a_campaign_but_its_ends(fanuc):
-    """None of them a shift of all readings but a few; the one nearest to a step has all but a 24th on the right side."""
+    """None of them a shift of all measurements but a few; the one nearest to a step has all but a 24th on the right side."""
     (when,) = candidate_on(fanuc.chain, "setup_step").shapes
     np.testing.assert_allclose(when.values(3), np.arange(1, 12) / 12)
     assert (when.lowest, when.highest) == pytest.approx((1 / 12, 11 / 12))
 
 
 def test_moved_setup_is_found_without_a_clock(fanuc):
-    """A step of 0.3 mm in the middle of 40 readings is fitted where it is, and leaves a misfit where it is not.
+    """A step of 0.3 mm in the middle of 40 measurements is fitted where it is, and leaves a misfit where it is not.
 
-    Of the values that are tried the nearest is as good as the true one but for the reading between them.
+    Of the values that are tried the nearest is as good as the true one but for the measurement between them.
     """
     candidate = candidate_on(fanuc.chain, "setup_step")
     model = made_model(fanuc.chain, compliance=fanuc.compliance, effects=(candidate,))

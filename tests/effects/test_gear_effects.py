@@ -12,7 +12,7 @@ COUNT = 6
 
 @pytest.fixture(params=["fanuc", "ur10", "fixed rotations"])
 def case(request, fanuc):
-    """Chain, circumstances and torques of the joints by pinocchio."""
+    """Chain, conditions and torques of the joints by pinocchio."""
     chain = fanuc.chain if request.param == "fanuc" else chain_of(OTHER_CHAINS[request.param])
     states = made_states(chain.coordinates, COUNT, seed=1, force=100.0)
     model = PinocchioPoint(chain, chain.end_effector)

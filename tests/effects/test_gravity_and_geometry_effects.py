@@ -10,7 +10,7 @@ from synthetic import candidate_on, circumstances_on, displacements, made_estima
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.prediction import predict
 from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.kinematics import poses
@@ -195,7 +195,7 @@ def predicted(chain, key, values, states):
     candidate = candidate_on(chain, key)
     model = made_model(chain, target, 6, fitted_frames=False, compliance=np.zeros(chain.coordinates), effects=(candidate,))
     estimate = replace(made_estimate(model), coefficients=(np.array(values, float),))
-    return predict(model, estimate, seen_exactly(model, estimate, states), circumstances(model, estimate, states))
+    return predict(model, estimate, seen_exactly(model, estimate, states), conditions(model, estimate, states))
 
 
 @pytest.mark.parametrize("joint", range(1, 7))

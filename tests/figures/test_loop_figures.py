@@ -103,7 +103,7 @@ def test_the_joint_behind_the_residual_is_said_to_explain_it():
     assert component == "vertical" and before > 90 and after < 10
 
 
-def test_held_out_readings_are_marked_apart():
+def test_held_out_measurements_are_marked_apart():
     table = residual_table()
     clouds = [artist for artist in residuals(table).axes[0].collections if isinstance(artist, PathCollection)]
     sizes = [len(cloud.get_offsets()) for cloud in clouds]
@@ -153,7 +153,7 @@ def test_no_line_crosses_a_gap():
     assert not np.isnan(running_quartiles(levels, levels, bins_of(levels))[1]).any()
 
 
-def test_arrows_stand_where_readings_were_taken():
+def test_arrows_stand_where_measurements_were_taken():
     table = residual_table(poses=20, repeats=3)
     figure = arrows(table)
     before = next(

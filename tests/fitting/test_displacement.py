@@ -8,7 +8,7 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances, displaced_coordinates, joint_compliances
+from elastocal.fitting.displacement import conditions, displaced_coordinates, joint_compliances
 from elastocal.fitting.prediction import predict, residuals
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques
 from elastocal.mechanics.kinematics import poses
@@ -31,7 +31,7 @@ def test_nominal_springs_deflect_as_equation_9_with_exact_kinematics(fanuc):
     model = made_model(fanuc.chain, targets, 6, fitted_frames=False, compliance=fanuc.compliance)
     estimate, states = made_estimate(model), made_states(6, 6, seed=4)
     seen = seen_exactly(model, estimate, states)
-    position, rotation = predict(model, estimate, seen, circumstances(model, estimate, states))
+    position, rotation = predict(model, estimate, seen, conditions(model, estimate, states))
     turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     for index, point in enumerate(fanuc.chain.points):
         target = replace(point, offset_m=(0.05, 0.1, -0.1))
@@ -46,7 +46,7 @@ def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_find
     model = made_model(fanuc.chain, fitted_frames=False, compliance=fanuc.compliance)
     estimate, states = made_estimate(model), made_states(6, 40, seed=12)
     states.wrench[:] *= (3000.0 / np.linalg.norm(states.wrench[:, :3], axis=1))[:, None]
-    found = displaced_coordinates(model, estimate, circumstances(model, estimate, states))[:, :6]
+    found = displaced_coordinates(model, estimate, conditions(model, estimate, states))[:, :6]
     turned = equilibrium(fanuc.chain, fanuc.compliance, states)
     end = fanuc.chain.end_effector
     ends = [poses(fanuc.chain, q, end)[0] for q in (found, states.joint_angles + turned)]
@@ -60,7 +60,7 @@ def test_load_is_taken_at_the_deflected_pose_as_a_solver_of_the_equilibrium_find
 def test_wrench_acts_at_the_last_measuring_point_and_not_at_a_target_on_it(fanuc):
     chain = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.3, 0.2, 0.1)) for p in fanuc.chain.points))
     states = made_states(6, 5, seed=5)
-    loads = [circumstances(model, made_estimate(model), states).load for model in (made_model(chain), made_model(fanuc.chain))]
+    loads = [conditions(model, made_estimate(model), states).load for model in (made_model(chain), made_model(fanuc.chain))]
     np.testing.assert_allclose(*loads, rtol=0, atol=1e-11)
 
 
@@ -72,7 +72,7 @@ def test_identified_compliances_replace_the_nominal_ones(fanuc):
     np.testing.assert_array_equal(joint_compliances(free, same), fanuc.compliance)
     np.testing.assert_array_equal(joint_compliances(fixed, estimate), fanuc.compliance)
     seen = seen_exactly(fixed, estimate, states)
-    np.testing.assert_allclose(residuals(free, same, seen, circumstances(free, same, states)), 0.0, atol=1e-14)
+    np.testing.assert_allclose(residuals(free, same, seen, conditions(free, same, states)), 0.0, atol=1e-14)
 
 
 def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
@@ -80,7 +80,7 @@ def test_effects_add_up_on_the_coordinates_of_the_sites(fanuc):
     offset, growth, frame = (known[key] for key in ("joint_offset@2", "stiffening@2", "base_compliance"))
     model = made_model(fanuc.chain, compliance=fanuc.compliance, effects=(offset, growth, frame))
     estimate, states = made_estimate(model, seed=10), made_states(6, 5, seed=11)
-    around = circumstances(model, estimate, states)
+    around = conditions(model, estimate, states)
     found = displaced_coordinates(model, estimate, around)
     torque = joint_torques(model.sites.chain, found, states.wrench, model.sites.chain.end_effector)[:, :6]
     expected = states.joint_angles + fanuc.compliance * torque

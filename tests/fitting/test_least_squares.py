@@ -12,10 +12,10 @@ from scipy.stats import chi2, kstest
 from support import OTHER_CHAINS, chain_of
 from synthetic import NOISE, made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import ON_THE_WAY, fit, fit_frames
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.noise import Noise, reading_covariances
+from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.normal_equations import Parts
 from elastocal.fitting.parameters import parameters
 
@@ -33,7 +33,7 @@ from elastocal.fitting.parameters import parameters
     ],
     ids=lambda keys: "+".join(keys) or "frames alone",
 )
-def test_noiseless_readings_give_back_every_parameter(fanuc, keys, rows):
+def test_noiseless_measurements_give_back_every_parameter(fanuc, keys, rows):
     model = model_of(fanuc, *keys, targets=TARGETS, rows=rows)
     true = made_estimate(model, (0, 1), seed=1)
     seen = seen_exactly(model, true, made_states(6, 40, seed=2, sessions=2))
@@ -54,7 +54,7 @@ def test_noiseless_readings_give_back_every_parameter(fanuc, keys, rows):
 
 
 @pytest.mark.parametrize("taper", [0.05, 0.3, 0.5])
-def test_the_taper_of_a_link_comes_back_where_the_readings_show_it(fanuc, taper):
+def test_the_taper_of_a_link_comes_back_where_the_measurements_show_it(fanuc, taper):
     """Turns and shifts of its far end go with it differently; close to its end, too."""
     model = model_of(fanuc, "link_elasticity@2", targets=TARGETS, rows=6)
     true = made_estimate(model, seed=1)
@@ -87,17 +87,17 @@ def test_frames_and_targets_are_fitted_on_other_chains(name):
 
 @pytest.fixture(scope="module")
 def noisy(fanuc):
-    """A model with springs, an offset and two targets, fitted to readings with joint noise, repeats and two sessions."""
+    """A model with springs, an offset and two targets, fitted to measurements with joint noise, repeats and two sessions."""
     model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
     true = made_estimate(model, (0, 1), seed=7)
     states = made_states(6, 40, seed=8, sessions=2)
     states.repeats[:] = np.random.default_rng(9).integers(1, 4, 40)
     noise = Noise("repeats", 60e-6, 60e-6, 1e-6 * np.array([20.0, 20, 20, 30, 30, 30]))
     seen = seen_exactly(model, true, states)
-    line = linearize(model, true, seen, circumstances(model, true, states))
-    covariance = reading_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
+    line = linearize(model, true, seen, conditions(model, true, states))
+    covariance = measurement_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
     covariance /= states.repeats[:, None, None]
-    # In base axes; the readings are in those of their session.
+    # In base axes; the measurements are in those of their session.
     factor = np.linalg.cholesky(covariance)
 
     def drawn(rng):
@@ -112,8 +112,8 @@ def test_estimate_and_covariance_are_those_of_statsmodels_gls(noisy):
     model, _, noise, _, drawn = noisy
     seen = drawn(np.random.default_rng(10))
     found = fit(model, seen, noise)
-    line = linearize(model, found.estimate, seen, circumstances(model, found.estimate, seen.states))
-    blocks = reading_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
+    line = linearize(model, found.estimate, seen, conditions(model, found.estimate, seen.states))
+    blocks = measurement_covariances(noise, line.coordinate_jacobian[..., :6].reshape(40, 2, 3, 6), 3)
     sigma = block_diag(*(blocks / seen.states.repeats[:, None, None]))
     root = np.repeat(1 / np.sqrt(found.weights), 3)
     sigma = root[:, None] * sigma * root
@@ -164,7 +164,7 @@ def test_series_with_a_prior_is_at_its_most_probable_values(fanuc):
     true = made_estimate(model, seed=42)
     seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=43)), np.random.default_rng(44))
     found = fit(model, seen, NOISE)
-    line = linearize(model, found.estimate, seen, circumstances(model, found.estimate, seen.states))
+    line = linearize(model, found.estimate, seen, conditions(model, found.estimate, seen.states))
     left = found.whitened(line.sensitivities).reshape(180, -1)
     precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in found.parameters])
     assert np.count_nonzero(precision) == 8
@@ -201,9 +201,9 @@ def test_a_fit_on_the_way_stops_within_a_tenth_of_a_standard_error_of_where_it_w
     seen = with_noise(seen_exactly(model, true, made_states(6, 60, seed=62)), np.random.default_rng(63))
     linearized, count = Parts.linearize, []
 
-    def counted(readings, estimate):
+    def counted(measurements, estimate):
         count.append(1)
-        return linearized(readings, estimate)
+        return linearized(measurements, estimate)
 
     monkeypatch.setattr(Parts, "linearize", counted)
     whole = fit(model, seen, NOISE)
@@ -216,14 +216,14 @@ def test_a_fit_on_the_way_stops_within_a_tenth_of_a_standard_error_of_where_it_w
     assert (np.abs(moved) <= ON_THE_WAY * deviation).all() and moved.any()
 
 
-def test_an_error_of_the_pose_counts_once_for_all_its_readings(fanuc):
+def test_an_error_of_the_pose_counts_once_for_all_its_measurements(fanuc):
     """Two loads and two targets a pose: estimate and covariance are those of statsmodels with the covariance written out."""
     model = model_of(fanuc, "joint_offset@3", targets=TARGETS, identified=True)
     states = two_loads_a_pose(6, 15, seed=60)
     seen = seen_exactly(model, made_estimate(model, seed=61), states)
     noise = replace(NOISE, joint_rad=1e-6 * np.array([20.0, 20, 20, 30, 30, 30]), pose_rad=1e-4)
     found = fit(model, with_noise(seen, np.random.default_rng(62)), noise)
-    line = linearize(model, found.estimate, seen, found.circumstances)
+    line = linearize(model, found.estimate, seen, found.conditions)
     jacobian = line.coordinate_jacobian[..., :6].reshape(-1, 6)
     state, pose = np.repeat(seen.state, 3), np.repeat(seen.cluster, 3)
     sigma = (jacobian * noise.joint_rad**2) @ jacobian.T * (state[:, None] == state)
@@ -238,6 +238,6 @@ def test_an_error_of_the_pose_counts_once_for_all_its_readings(fanuc):
         found.covariance / np.outer(deviation, deviation), expected / np.outer(deviation, deviation), atol=5e-3
     )
     assert found.converged and (np.abs(reference.params * scale) / deviation).max() < 5e-3
-    # The offset is known by the poses alone, so much worse than their many readings would tell.
+    # The offset is known by the poses alone, so much worse than their many measurements would tell.
     without = fit(model, replace(seen), replace(noise, pose_rad=0.0))
     assert found.covariance[-1, -1] > 2 * without.covariance[-1, -1]

@@ -5,14 +5,14 @@ from support import random_angles
 from synthetic import made_estimate, made_model, made_states, seen_exactly, slopes, small_steps, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 
 
 def test_sensitivities_are_central_differences_of_the_residuals(full_case):
     model, estimate, seen = full_case
-    around = circumstances(model, estimate, seen.states)
+    around = conditions(model, estimate, seen.states)
     steps = np.diag(small_steps(model, estimate))
     expected = slopes(model, estimate, seen, around, steps)
     found = linearize(model, estimate, seen, around).sensitivities @ steps
@@ -22,9 +22,9 @@ def test_sensitivities_are_central_differences_of_the_residuals(full_case):
     np.testing.assert_allclose(found / largest, expected / largest, rtol=0, atol=1e-5)
 
 
-def test_frame_of_one_session_moves_only_its_own_readings(full_case):
+def test_frame_of_one_session_moves_only_its_own_measurements(full_case):
     model, estimate, seen = full_case
-    columns = linearize(model, estimate, seen, circumstances(model, estimate, seen.states)).sensitivities
+    columns = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
     later = seen.states.session[seen.state] == 4
     assert not columns[later][..., :6].any() and not columns[~later][..., 6:12].any()
     assert columns[later][..., 6:12].any() and columns[~later][..., :6].any()
@@ -34,13 +34,13 @@ def test_known_frame_known_targets_and_no_effects_leave_no_parameters(fanuc):
     model = made_model(fanuc.chain, (Target("B", "3DoF", (0.1, 0.0, -0.2)),), fitted_frames=False)
     estimate, states = made_estimate(model), made_states(6, 5)
     seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(0))
-    line = linearize(model, estimate, seen, circumstances(model, estimate, states))
+    line = linearize(model, estimate, seen, conditions(model, estimate, states))
     assert parameters(model, estimate) == [] and line.sensitivities.shape == (5, 3, 0)
 
 
 def test_coordinate_jacobian_is_that_of_each_target(full_case):
     model, estimate, seen = full_case
-    around = circumstances(model, estimate, seen.states)
+    around = conditions(model, estimate, seen.states)
     line = linearize(model, estimate, seen, around)
     assert line.coordinate_jacobian.shape == (24, model.rows, model.sites.chain.coordinates)
     # Target B sits behind joint 3: what lies further out does not move it.

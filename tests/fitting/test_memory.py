@@ -23,7 +23,7 @@ def test_a_fit_of_more_states_than_are_kept_is_the_same_and_keeps_no_jacobian(fa
     monkeypatch.setattr("elastocal.fitting.memory._MOST_AT_ONCE", 16)
     monkeypatch.setattr("elastocal.fitting.memory._MOST_HELD", 16 * 180)
     found = fit(model, seen, noise)
-    assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.circumstances is None
+    assert kept.joint_jacobian is not None and found.joint_jacobian is None and found.conditions is None
     deviation = np.sqrt(np.diag(kept.covariance))
     values = [np.concatenate(each.estimate.coefficients) for each in (kept, found)]
     assert (np.abs(values[0] - values[1]) < 2e-3 * deviation[-len(values[0]) :]).all()

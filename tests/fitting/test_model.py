@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic import made_model, made_readings
+from synthetic import made_measurements, made_model
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.effects.catalogue import candidates_on
@@ -19,9 +19,9 @@ TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", (0.1, 0.0, -0.2))
 @pytest.mark.parametrize("compliance", ["nominal", "identify"])
 def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fitted, compliance):
     bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
-    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
-    readings = replace(readings, time_s=np.array([7.0, 5.0]), row=np.array([4, 9]))
-    campaign = Campaign("c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, readings)
+    measurements = made_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    measurements = replace(measurements, time_s=np.array([7.0, 5.0]), row=np.array([4, 9]))
+    campaign = Campaign("c", fanuc, measured, frame, TARGETS, compliance, (), None, {}, measurements)
     offset = candidates_on(made_model(fanuc.chain).sites)["joint_offset@2"]
     model = declared_model(campaign, (offset,))
     assert (model.rows, model.fitted_frames, model.targets) == (rows, fitted, TARGETS)
@@ -33,8 +33,8 @@ def test_declared_model_is_that_of_the_campaign(fanuc, measured, rows, frame, fi
 
 def test_declared_model_weighs_what_the_robot_file_weighs(fanuc):
     bare = made_model(fanuc.chain, (Target("A", "6DoF", (0, 0, 0)),))
-    readings = made_readings(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
+    measurements = made_measurements(bare, np.random.default_rng(0), 2, 1, 0.0, 0.0)
     robot = replace(fanuc, masses=(Mass(2, 100.0, (0.5, 0.0, 0.0), 0.1),), gravity_m_s2=(0.0, 0.0, 9.0), gear_ratio=(None,) * 6)
-    model = declared_model(Campaign("c", robot, "position", "base", TARGETS, "identify", (), None, {}, readings))
+    model = declared_model(Campaign("c", robot, "position", "base", TARGETS, "identify", (), None, {}, measurements))
     assert [effect.key for effect in model.effects] == ["joint_compliance", "declared_weight"]
     assert model.sites.masses == robot.masses and model.sites.gravity_m_s2 == (0.0, 0.0, 9.0)

@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Readings
-from elastocal.fitting.observations import averaged, each_approach, select_states, state_clusters, without_wild_repeats
+from elastocal.campaigns.campaign import Measurements
+from elastocal.fitting.observations import averaged, each_approach, select_states, state_clusters, without_outlying_repeats
 
 
-def readings(keys, position=None, **others):
-    """Readings from rows of (session, pose, load, repeat, target)."""
+def measurements(keys, position=None, **others):
+    """Measurements from rows of (session, pose, load, repeat, target)."""
     session, pose, load, repeat, target = np.array(keys).T
     count = len(pose)
     rng = np.random.default_rng(0)
@@ -26,22 +26,22 @@ def readings(keys, position=None, **others):
         "time_s": None,
         "temperature_c": None,
     }
-    return Readings(session, pose, load, repeat, target, **{**given_values, **others}, row=np.arange(1, count + 1))
+    return Measurements(session, pose, load, repeat, target, **{**given_values, **others}, row=np.arange(1, count + 1))
 
 
 FOUR = [(0, 0, 0, 0, 0), (0, 0, 0, 1, 0), (0, 1, 0, 0, 0), (0, 1, 0, 1, 0)]
 
 
 def test_repeats_of_a_pose_are_averaged():
-    found = averaged(readings(FOUR, [[0, 0, 0], [2, 4, 6], [5, 5, 5], [7, 5, 3]]))
+    found = averaged(measurements(FOUR, [[0, 0, 0], [2, 4, 6], [5, 5, 5], [7, 5, 3]]))
     np.testing.assert_array_equal(found.position, [[1, 2, 3], [6, 5, 4]])
     np.testing.assert_array_equal(found.states.repeats, [2, 2])
     assert found.rotation is None and found.rows == 3
 
 
-def test_joint_angles_wrench_time_and_temperature_are_averaged_with_their_readings():
+def test_joint_angles_wrench_time_and_temperature_are_averaged_with_their_measurements():
     time, warm = np.array([0.0, 2.0, 4.0, 8.0]), np.array([20.0, 21.0, 22.0, 25.0])
-    taken = readings(FOUR, time_s=time, temperature_c=warm)
+    taken = measurements(FOUR, time_s=time, temperature_c=warm)
     states = averaged(taken).states
     np.testing.assert_allclose(states.time_s, [1.0, 6.0])
     np.testing.assert_allclose(states.temperature_c, [20.5, 23.5])
@@ -51,7 +51,7 @@ def test_joint_angles_wrench_time_and_temperature_are_averaged_with_their_readin
 
 def test_sessions_poses_loads_and_targets_are_kept_apart():
     keys = [(s, p, load, r, t) for s in (0, 3) for p in (2, 7) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
-    found = averaged(readings(keys))
+    found = averaged(measurements(keys))
     assert len(found) == 16 and len(found.states) == 8
     expected = sorted({key[:3] for key in keys})
     assert list(zip(found.states.session, found.states.pose, found.states.load, strict=True)) == expected
@@ -62,19 +62,19 @@ def test_sessions_poses_loads_and_targets_are_kept_apart():
 
 def test_cluster_is_the_pose_with_all_its_loads_in_its_session():
     keys = [(s, p, load, 0, t) for s in (0, 1) for p in (4, 9) for load in (0, 1) for t in (0, 1)]
-    found = averaged(readings(keys))
+    found = averaged(measurements(keys))
     np.testing.assert_array_equal(state_clusters(found.states), [0, 0, 1, 1, 2, 2, 3, 3])
     np.testing.assert_array_equal(found.cluster, np.repeat([0, 1, 2, 3], 4))
 
 
-def test_clusters_of_readings_are_in_the_order_of_the_file():
+def test_clusters_of_measurements_are_in_the_order_of_the_file():
     keys = [(1, 4, 0, 0, 0), (0, 9, 1, 0, 0), (0, 4, 0, 0, 0), (1, 4, 1, 2, 1), (0, 9, 0, 1, 0)]
-    np.testing.assert_array_equal(state_clusters(readings(keys)), [2, 1, 0, 2, 1])
+    np.testing.assert_array_equal(state_clusters(measurements(keys)), [2, 1, 0, 2, 1])
 
 
 def test_approaches_from_different_sides_are_different_states():
     approach = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
-    found = averaged(readings(FOUR, [[0, 0, 0], [2, 4, 6], [5, 5, 5], [7, 5, 3]], approach=approach))
+    found = averaged(measurements(FOUR, [[0, 0, 0], [2, 4, 6], [5, 5, 5], [7, 5, 3]], approach=approach))
     np.testing.assert_array_equal(found.states.approach, [[-1, 1], [1, 1], [1, 1]])
     np.testing.assert_array_equal(found.position, [[2, 4, 6], [0, 0, 0], [6, 5, 4]])
     np.testing.assert_array_equal(found.states.repeats, [1, 1, 2])
@@ -83,7 +83,7 @@ def test_approaches_from_different_sides_are_different_states():
 
 def test_state_counts_the_repeats_of_the_target_seen_least_often():
     keys = [(0, 0, 0, 0, 0), (0, 0, 0, 1, 0), (0, 0, 0, 2, 0), (0, 0, 0, 0, 1)]
-    found = averaged(readings(keys))
+    found = averaged(measurements(keys))
     np.testing.assert_array_equal(found.states.repeats, [1])
 
 
@@ -94,7 +94,7 @@ def test_mean_rotation_is_that_of_scipy():
     centre = Rotation.concatenate([centre[0], Rotation.from_rotvec([np.pi, 0, 0])])
     keys = [(0, p, 0, r, 0) for p in (0, 1) for r in range(5)]
     turned = Rotation.from_rotvec(1e-4 * rng.standard_normal((10, 3))) * centre[np.repeat([0, 1], 5)]
-    found = averaged(readings(keys, rotation_vector=turned.as_rotvec()))
+    found = averaged(measurements(keys, rotation_vector=turned.as_rotvec()))
     assert found.rows == 6
     for pose in (0, 1):
         expected = turned[5 * pose : 5 * pose + 5].mean().as_matrix()
@@ -104,7 +104,7 @@ def test_mean_rotation_is_that_of_scipy():
 
 def test_each_approach_is_a_state_and_knows_the_averaged_one():
     keys = [(0, p, load, r, t) for p in (0, 1) for load in (0, 1) for r in (0, 1, 2) for t in (0, 1)]
-    taken = readings(keys)
+    taken = measurements(keys)
     found, repeated = each_approach(taken)
     together = averaged(taken)
     assert len(found.states) == 12 and len(found) == 24
@@ -120,17 +120,17 @@ def test_each_approach_is_a_state_and_knows_the_averaged_one():
 
 def test_each_approach_does_not_mix_approaches_from_different_sides():
     approach = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, 1.0], [1.0, 1.0]])
-    assert each_approach(readings(FOUR, approach=approach))[1].tolist() == [0, 1, 2, 2]
+    assert each_approach(measurements(FOUR, approach=approach))[1].tolist() == [0, 1, 2, 2]
 
 
-def full_readings(seed, loads=2):
+def full_measurements(seed, loads=2):
     rng = np.random.default_rng(seed)
     keys = [(s, p, load, r, t) for s in (0, 1) for p in range(3) for load in range(loads) for r in (0, 1) for t in (0, 1)]
     count = len(keys)
     pose_of = np.array([3 * s + p for s, p, *_ in keys])
     turned = Rotation.from_rotvec(1e-4 * rng.standard_normal((count, 3))) * Rotation.random(6, rng=rng)[pose_of]
     approach = rng.choice([-1.0, 1.0], (6, 2))[pose_of]
-    return readings(
+    return measurements(
         keys,
         rng.standard_normal((count, 3)),
         rotation_vector=turned.as_rotvec(),
@@ -142,7 +142,7 @@ def full_readings(seed, loads=2):
 
 @given(st.integers(0, 2**32 - 1))
 def test_order_of_the_rows_does_not_matter(seed):
-    taken = full_readings(0)
+    taken = full_measurements(0)
     kept = np.random.default_rng(seed).permutation(len(taken))[: len(taken) - 3]
     one, other = averaged(taken.select(np.sort(kept))), averaged(taken.select(kept))
     for name, value in vars(one.states).items():
@@ -153,8 +153,8 @@ def test_order_of_the_rows_does_not_matter(seed):
 
 
 @given(st.lists(st.booleans(), min_size=12, max_size=12).filter(any))
-def test_selected_states_are_those_of_the_selected_readings(kept):
-    taken, kept = full_readings(0), np.array(kept)
+def test_selected_states_are_those_of_the_selected_measurements(kept):
+    taken, kept = full_measurements(0), np.array(kept)
     whole = averaged(taken)
     chosen = {
         key
@@ -170,41 +170,41 @@ def test_selected_states_are_those_of_the_selected_readings(kept):
 
 
 def test_covariates_that_are_not_there_stay_absent():
-    taken = replace(full_readings(0), rotation_vector=None, approach=None, time_s=None, temperature_c=None)
+    taken = replace(full_measurements(0), rotation_vector=None, approach=None, time_s=None, temperature_c=None)
     for found in (averaged(taken), each_approach(taken)[0], select_states(averaged(taken), np.arange(12) < 5)):
         states = found.states
         assert found.rotation is None and states.approach is None and states.time_s is None and states.temperature_c is None
 
 
 def repeated(repeats, poses=30, seed=0, targets=2, single=0):
-    """Readings with unit noise of poses with so many repeats, and of further ones without."""
+    """Measurements with unit noise of poses with so many repeats, and of further ones without."""
     keys = [(0, p, 0, r, t) for p in range(poses + single) for r in range(repeats if p < poses else 1) for t in range(targets)]
     rng = np.random.default_rng((1, seed))
     place = 1e4 * rng.standard_normal((poses + single, targets, 3))
     at = np.array([place[p, t] for _, p, _, _, t in keys])
-    return readings(keys, at + rng.standard_normal(at.shape))
+    return measurements(keys, at + rng.standard_normal(at.shape))
 
 
 def rows_lost(taken):
-    return sorted(set(taken.row) - set(without_wild_repeats(taken).row))
+    return sorted(set(taken.row) - set(without_outlying_repeats(taken).row))
 
 
 @pytest.mark.parametrize("repeats", [3, 4, 5])
 @pytest.mark.parametrize("off", [[30.0, 0, 0], [0, -30.0, 0], [0, 0, 30.0]])
 def test_a_wild_repeat_leaves_and_all_others_stay(repeats, off):
     taken = repeated(repeats, seed=1, single=5)
-    for wild in (0, 7, 30 * repeats):
+    for outlying in (0, 7, 30 * repeats):
         moved = taken.position.copy()
-        moved[wild] += off
-        assert rows_lost(replace(taken, position=moved)) == [wild + 1]
+        moved[outlying] += off
+        assert rows_lost(replace(taken, position=moved)) == [outlying + 1]
 
 
 def test_wild_repeats_of_many_states_leave_together():
     taken = repeated(4, poses=60, seed=2)
-    wild = np.random.default_rng(2).permutation(60)[:10] * 8
+    outlying = np.random.default_rng(2).permutation(60)[:10] * 8
     moved = taken.position.copy()
-    moved[wild] += 40.0
-    assert rows_lost(replace(taken, position=moved)) == sorted(wild + 1)
+    moved[outlying] += 40.0
+    assert rows_lost(replace(taken, position=moved)) == sorted(outlying + 1)
 
 
 def test_of_two_repeats_neither_leaves():
@@ -234,7 +234,7 @@ def test_three_repeats_read_to_few_digits_lose_nothing():
 def test_states_without_repeats_are_left_as_they_are():
     single = repeated(1, seed=5)
     single.position[4] += 1e6
-    assert without_wild_repeats(single) is single
+    assert without_outlying_repeats(single) is single
     mixed = repeated(4, seed=6, single=200)
     alone = np.flatnonzero(mixed.pose >= 30)
     mixed.position[alone] += 1e6 * np.random.default_rng(7).standard_normal((len(alone), 3))
@@ -242,14 +242,14 @@ def test_states_without_repeats_are_left_as_they_are():
 
 
 def test_targets_loads_and_approaches_are_no_repeats_of_each_other():
-    """Nobody is wild for being elsewhere than another state, target or sense of approach."""
+    """Nobody is outlying for being elsewhere than another state, target or sense of approach."""
     keys = [(0, p, load, r, t) for p in range(5) for load in (0, 1) for r in range(8) for t in (0, 1)]
     _, pose, load, repeat, target = np.array(keys).T
     side = repeat % 2
     away = 1e3 * np.column_stack([load, target, side]) + 1e4 * pose[:, None]
     noise = np.random.default_rng(8).standard_normal((len(keys), 3))
     approach = np.column_stack([2.0 * side - 1, np.ones(len(keys))])
-    assert rows_lost(readings(keys, away + noise, approach=approach)) == []
+    assert rows_lost(measurements(keys, away + noise, approach=approach)) == []
 
 
 def test_wild_repeats_leave_in_any_order_of_the_rows():

@@ -1,4 +1,4 @@
-"""Predictions and residuals: what was added to exact readings comes back, in base axes."""
+"""Predictions and residuals: what was added to exact measurements comes back, in base axes."""
 
 from dataclasses import replace
 
@@ -9,14 +9,14 @@ from support import OTHER_CHAINS, chain_of
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.prediction import measured_in_base, predict, residuals
 
 
-def test_residual_is_what_was_added_to_the_readings_seen_in_base_axes(full_case):
+def test_residual_is_what_was_added_to_the_measurements_seen_in_base_axes(full_case):
     model, estimate, seen = full_case
-    around = circumstances(model, estimate, seen.states)
+    around = conditions(model, estimate, seen.states)
     np.testing.assert_allclose(residuals(model, estimate, seen, around), 0.0, atol=1e-14)
     rng = np.random.default_rng(3)
     shift, turn = 1e-3 * rng.standard_normal((2, len(seen), 3))
@@ -38,13 +38,13 @@ def test_effects_at_zero_leave_the_declared_model(name):
     effects = tuple(candidates_on(model.sites).values())
     more, same = model.with_effects(effects), estimate.with_effects(effects)
     seen = seen_exactly(model, estimate, states)
-    np.testing.assert_allclose(residuals(more, same, seen, circumstances(more, same, states)), 0.0, atol=1e-14)
+    np.testing.assert_allclose(residuals(more, same, seen, conditions(more, same, states)), 0.0, atol=1e-14)
 
 
-def test_readings_are_taken_into_base_axes_by_the_frame_of_their_session(full_case):
+def test_measurements_are_taken_into_base_axes_by_the_frame_of_their_session(full_case):
     model, estimate, seen = full_case
     position, rotation = measured_in_base(estimate, seen)
-    known = predict(model, estimate, seen, circumstances(model, estimate, seen.states))
+    known = predict(model, estimate, seen, conditions(model, estimate, seen.states))
     np.testing.assert_allclose(position, known[0], rtol=0, atol=1e-14)
     if model.rows == 6:
         np.testing.assert_allclose(rotation, known[1], rtol=0, atol=1e-14)

@@ -1,4 +1,4 @@
-"""Registration: frames and targets from nothing but readings."""
+"""Registration: frames and targets from nothing but measurements."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from synthetic import made_estimate, made_model, made_states, seen_exactly, with
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.registration import registered
 
@@ -50,7 +50,7 @@ def test_frames_and_targets_are_found_on_other_chains(name):
     states = unloaded(made_states(chain.coordinates, 40, seed=3, span=2.5))
     true = made_estimate(model, seed=4)
     found = registered(model, seen_exactly(model, true, states))
-    off = residuals(model, found, seen_exactly(model, true, states), circumstances(model, found, states))
+    off = residuals(model, found, seen_exactly(model, true, states), conditions(model, found, states))
     assert np.abs(off).max() < KNOWN_M
 
 
@@ -98,7 +98,7 @@ def test_noise_moves_the_frame_by_no_more_than_noise(fanuc):
     states, true = unloaded(made_states(6, 40, seed=11)), made_estimate(model, seed=12)
     seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(13), position_m=1e-4)
     found = registered(model, seen)
-    off = residuals(model, found, seen, circumstances(model, found, states))
+    off = residuals(model, found, seen, conditions(model, found, states))
     assert np.sqrt((off**2).mean()) < 1.1e-4
 
 
@@ -113,8 +113,8 @@ def test_effects_start_at_zero_and_compliances_at_their_nominal_values(fanuc):
     assert [values.tolist() for values in found.shapes] == [[], [], [effects[1].shapes[0].start]]
 
 
-def test_a_target_without_a_reading_stays_where_it_was(fanuc):
-    """All of its readings may be held out."""
+def test_a_target_without_a_measurement_stays_where_it_was(fanuc):
+    """All of its measurements may be held out."""
     model = made_model(fanuc.chain, TWO, 6)
     states = unloaded(made_states(6, 40, seed=1))
     true = made_estimate(model, seed=2)

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
@@ -39,7 +39,7 @@ def test_outliers_get_little_weight_and_do_little_harm(fanuc):
     shift = np.abs(found.estimate.coefficients[0] - before.estimate.coefficients[0])
     assert shift < 2 * deviation
     # Without weights the three would have moved it by far more.
-    line = linearize(model, before.estimate, clean, circumstances(model, before.estimate, clean.states))
+    line = linearize(model, before.estimate, clean, conditions(model, before.estimate, clean.states))
     pulled = before.covariance @ np.einsum("mrp,mr->p", line.sensitivities, moved - clean.position) / NOISE.position_m**2
     assert np.abs(pulled[-1]) > 3 * shift
 
@@ -62,7 +62,7 @@ def test_fit_that_converged_is_at_a_minimum_of_its_objective(fanuc):
     for number, size in enumerate(deviation):
         for sign in (-0.1, 0.1):
             moved = stepped(model, found.estimate, sign * size * np.eye(len(deviation))[number])
-            residual = residuals(model, moved, seen, circumstances(model, moved, seen.states))
+            residual = residuals(model, moved, seen, conditions(model, moved, seen.states))
             assert robust_objective(replace(found, residual=residual)) > robust_objective(found)
 
 
@@ -116,7 +116,7 @@ def test_ordinary_fits_converge(fanuc):
 
 @pytest.mark.parametrize("rows", [3, 6])
 @pytest.mark.parametrize("seed", range(6))
-def test_fit_converges_where_readings_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed, rows):
+def test_fit_converges_where_measurements_share_an_error_and_the_model_misses_far_more_than_the_noise(fanuc, seed, rows):
     """As on a real robot with a good tracker: three reflectors, joints that repeat badly, a law of gravity that is left out."""
     targets = tuple(Target(name, "6DoF", None) for name in "ABC")
     true = model_of(fanuc, "joint_offset@2", "joint_offset@3", "link_geometry@3", "link_weight@2", targets=targets, rows=rows)

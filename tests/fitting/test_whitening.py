@@ -7,7 +7,7 @@ import pytest
 from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations
@@ -28,7 +28,7 @@ def case(request, fanuc):
     rotation = None if whole.rotation is None else whole.rotation[kept]
     seen = Observations(states, whole.state[kept], whole.target[kept], whole.position[kept], rotation)
     estimate = made_estimate(model)
-    jacobian = linearize(model, estimate, seen, circumstances(model, estimate, states)).coordinate_jacobian[..., :6]
+    jacobian = linearize(model, estimate, seen, conditions(model, estimate, states)).coordinate_jacobian[..., :6]
     return seen, jacobian
 
 
@@ -69,13 +69,13 @@ def test_without_an_error_of_the_pose_rows_are_those_of_the_cholesky_factor_itse
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-8 * np.abs(expected).max())
 
 
-def test_noise_of_readings_is_the_noise_without_what_a_pose_has_in_common(case):
+def test_noise_of_measurements_is_the_noise_without_what_a_pose_has_in_common(case):
     seen, jacobian = case
     values = np.random.default_rng(6).standard_normal((len(seen), seen.rows))
     noise = replace(NOISE, pose_rad=1e-3)
-    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_readings, NOISE)]
+    found = [whitening(seen, jacobian, each).apply(values) for each in (noise.of_measurements, NOISE)]
     np.testing.assert_array_equal(*found)
-    # A factor on the noise of readings leaves what a pose has in common.
+    # A factor on the noise of measurements leaves what a pose has in common.
     assert (noise.scaled(2.0).pose_rad, noise.scaled(2.0).position_m) == (1e-3, 2 * NOISE.position_m)
 
 
@@ -114,7 +114,7 @@ def test_sensor_alone_only_divides(case):
 
 
 def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
-    """All of a pose moves together: as many times as it is read, its whitened size is that of one reading."""
+    """All of a pose moves together: as many times as it is read, its whitened size is that of one measurement."""
     seen, jacobian = case
     tiny = replace(NOISE, position_m=1e-9, orientation_rad=1e-9, joint_rad=np.zeros(6), pose_rad=1e-4)
     moved = jacobian @ np.array([1e-4, 0, 0, 0, 0, 0])

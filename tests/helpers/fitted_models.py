@@ -1,4 +1,4 @@
-"""Models of a robot with effects by their keys, readings of them, and what a fit could not tell."""
+"""Models of a robot with effects by their keys, measurements of them, and what a fit could not tell."""
 
 from dataclasses import replace
 
@@ -22,7 +22,7 @@ def names_held(found):
 
 
 def bent(fanuc, seed, shape, key="thermal_growth[time]"):
-    """Noisy readings of a law with a shape somewhere in its range, and the model that made them."""
+    """Noisy measurements of a law with a shape somewhere in its range, and the model that made them."""
     model = model_of(fanuc, key)
     true = made_estimate(model, seed=seed)
     true = replace(true, shapes=(np.array([shape]),))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Campaign, Readings, Target
+from elastocal.campaigns.campaign import Campaign, Measurements, Target
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 
@@ -88,7 +88,7 @@ def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, mo
         position, rotation = position @ frame.T + rng.uniform(-3, 3, 3), frame @ rotation
     position = position + plan.noise * rng.standard_normal(position.shape)
     turned = Rotation.from_rotvec(plan.noise * rng.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
-    readings = Readings(
+    measurements = Measurements(
         session=np.zeros(len(pose), np.int32),
         pose=pose.astype(np.int32),
         load=load.astype(np.int32),
@@ -113,7 +113,7 @@ def made(robot, seed, plan=Plan(), true_robot=None, true_offset=0.0, sag=0.0, mo
         declared=(),
         noise=None,
         holdout={"fraction": 0.3, "seed": 1},
-        readings=readings,
+        measurements=measurements,
     )
 
 

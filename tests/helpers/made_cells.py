@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
 
-from elastocal.campaigns.campaign import Readings
+from elastocal.campaigns.campaign import Measurements
 from elastocal.campaigns.reading import read_campaign
 
 ARM = {
@@ -39,8 +39,17 @@ def measured():
             for repeat in range(REPEATS):
                 for target in ("A", "B"):
                     servo = rng.uniform(-1e-4, 1e-4, 3)
-                    readings = rng.uniform(-1, 1, 6)
-                    cells = (pose, load, repeat, target, *(angles[pose] + servo), *wrench, *readings, *rng.choice([-1, 1], 3))
+                    measurements = rng.uniform(-1, 1, 6)
+                    cells = (
+                        pose,
+                        load,
+                        repeat,
+                        target,
+                        *(angles[pose] + servo),
+                        *wrench,
+                        *measurements,
+                        *rng.choice([-1, 1], 3),
+                    )
                     rows.append((*cells, 60.0 * len(rows), 20.0 + 0.01 * len(rows)))
     names = ["pose", "load", "repeat", "target", "q1", "q2", "q3", *WRENCH, *"xyz", "rx", "ry", "rz"]
     names += ["approach1", "approach2", "approach3", "time_s", "temperature_c"]
@@ -91,8 +100,8 @@ class Cell:
 
 
 def assert_same(one, other):
-    """The same readings, value for value."""
-    for field in fields(Readings):
+    """The same measurements, value for value."""
+    for field in fields(Measurements):
         left, right = getattr(one, field.name), getattr(other, field.name)
         assert (left is None) == (right is None), field.name
         if left is not None:

@@ -4,10 +4,10 @@ import numpy as np
 
 from elastocal.validation.held_out import Errors
 
-READINGS = 6
+INTERPRETATIONS = 6
 KINDS = {
-    "common": "half of the variance common to the readings of a pose",
-    "uneven": "the same, 2 to 10 readings a pose",
+    "common": "half of the variance common to the measurements of a pose",
+    "uneven": "the same, 2 to 10 measurements a pose",
     "skewed": "the same, and the error of a pose log-normal, with 0.5 in the logarithm",
     "far off": "the same, and one pose in twenty 4 times as far off",
 }
@@ -24,7 +24,7 @@ def made_errors(kind, campaigns, poses, rng):
     before, after, false : ndarray (campaigns, M)
     """
     # Sizes that go round have the same share in any number of poses divisible by three.
-    sizes = np.resize([2, 6, 10], poses) if kind == "uneven" else np.full(poses, READINGS)
+    sizes = np.resize([2, 6, 10], poses) if kind == "uneven" else np.full(poses, INTERPRETATIONS)
     cluster = np.repeat(np.arange(poses), sizes)
     scale = np.ones((campaigns, poses))
     if kind == "skewed":

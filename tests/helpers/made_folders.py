@@ -25,7 +25,7 @@ def made_document(name, **changes):
 
 
 def made_table(robot, name, seed=1, plan=PLAN, offset_of_joint_3=0.0):
-    """Readings of a robot whose third joint stands beyond what it reports, in no order."""
+    """Measurements of a robot whose third joint stands beyond what it reports, in no order."""
     table = simulated_measurements(robot, plan, seed, name)
     table["q3"] = table["q3"] - offset_of_joint_3
     order = np.random.default_rng(seed).permutation(len(table["pose"]))

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.campaign import Readings, Target
+from elastocal.campaigns.campaign import Measurements, Target
 from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.circumstances import circumstances_of
+from elastocal.effects.conditions import conditions_of
 from elastocal.effects.joint_compliance import candidate as joint_compliance
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.model import Estimate, Model
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, States
@@ -86,7 +86,7 @@ def seen_exactly(model, estimate, states):
     state = np.repeat(np.arange(len(states)), len(model.targets))
     target = np.tile(np.arange(len(model.targets)), len(states))
     blank = Observations(states, state, target, np.zeros((len(state), 3)), None)
-    position, rotation = predict(model, estimate, blank, circumstances(model, estimate, states))
+    position, rotation = predict(model, estimate, blank, conditions(model, estimate, states))
     session = np.searchsorted(estimate.sessions, states.session[state])
     turn, shift = estimate.frame_rotation[session], estimate.frame_position[session]
     position = (turn @ position[..., None])[..., 0] + shift
@@ -103,8 +103,8 @@ def with_noise(observations, rng, position_m=60e-6, orientation_rad=60e-6):
     return replace(observations, position=position, rotation=rotation)
 
 
-def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0):
-    """Repeats of poses in base axes: the joints come to rest anew at each approach, the sensor errs at each reading."""
+def made_measurements(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_rad=0.0):
+    """Repeats of poses in base axes: the joints come to rest anew at each approach, the sensor errs at each measurement."""
     joints, targets = model.sites.joints, len(model.targets)
     pose = np.repeat(np.arange(poses_count), repeats * targets)
     repeat = np.tile(np.repeat(np.arange(repeats), targets), poses_count)
@@ -119,7 +119,7 @@ def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_
         mask = target == index
         position[mask], rotation[mask] = poses(model.sites.chain, coordinates[mask], point)
     turned = Rotation.from_rotvec(sensor_rad * rng.standard_normal((len(pose), 3))) * Rotation.from_matrix(rotation)
-    return Readings(
+    return Measurements(
         session=np.zeros(len(pose), int),
         pose=pose,
         load=np.zeros(len(pose), int),
@@ -137,10 +137,10 @@ def made_readings(model, rng, poses_count, repeats, sensor_m, joint_rad, sensor_
 
 
 def circumstances_on(holder, states, compliance=None):
-    """Circumstances of some states on a chain or a robot."""
+    """Conditions of some states on a chain or a robot."""
     sites = equipped(holder)
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
-    return circumstances_of(sites, compliance, states)
+    return conditions_of(sites, compliance, states)
 
 
 def candidate_on(holder, key):
@@ -148,11 +148,11 @@ def candidate_on(holder, key):
     return candidates_on(equipped(holder))[key]
 
 
-def displacements(candidate, circumstances, *shapes):
+def displacements(candidate, conditions, *shapes):
     """What each parameter of a candidate makes, on every coordinate of the sites: ndarray (D, S, C)."""
-    laws = candidate.displacement(circumstances, *shapes)
+    laws = candidate.displacement(conditions, *shapes)
     assert len(laws) == len(candidate.parameters)
-    dense = np.zeros((len(laws), *circumstances.load.shape))
+    dense = np.zeros((len(laws), *conditions.load.shape))
     for number, law in enumerate(laws):
         for coordinate, values in law.items():
             dense[number, :, coordinate] = values
@@ -166,12 +166,10 @@ def small_steps(model, estimate):
     return np.array([(1e-4 if (owner, p.name) in shapes else 1e-3) * p.plausible for owner, p in listed])
 
 
-def slopes(model, estimate, observations, circumstances, steps):
+def slopes(model, estimate, observations, conditions, steps):
     """Changes of the prediction per step, by central differences of the residuals: ndarray (M, rows, number of steps)."""
     columns = []
     for step in steps:
-        ahead, behind = (
-            residuals(model, stepped(model, estimate, sign * step), observations, circumstances) for sign in (1, -1)
-        )
+        ahead, behind = (residuals(model, stepped(model, estimate, sign * step), observations, conditions) for sign in (1, -1))
         columns.append((behind - ahead) / 2)
     return np.stack(columns, axis=-1)

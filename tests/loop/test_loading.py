@@ -3,7 +3,7 @@
 import yaml
 from made_folders import made_folder
 
-from elastocal.loop.loading import taken_in
+from elastocal.loop.loading import load_campaign
 
 
 def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tmp_path):
@@ -13,7 +13,7 @@ def test_descriptions_hold_what_a_campaign_may_leave_out(kuka, config_folder, tm
     for key in ("declared", "compliance", "holdout"):
         document.pop(key, None)
     path.write_text(yaml.safe_dump(document), encoding="utf-8")
-    descriptions, _, held_out = taken_in(folder.as_posix(), config_folder / "robots")
+    descriptions, _, held_out = load_campaign(folder.as_posix(), config_folder / "robots")
     said = descriptions["campaign"]
     assert (said["declared"], said["compliance"], said["holdout"]) == ([], "nominal", {"fraction": 0.3, "seed": 1})
     assert len(held_out)

@@ -1,4 +1,4 @@
-"""Readings and estimates to tables and back: what a later step reads is what an earlier one had."""
+"""Measurements and estimates to tables and back: what a later step reads is what an earlier one had."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from support import chain_of
 from synthetic import NOISE, made_estimate, made_model
 
 from elastocal.campaigns.campaign import Target
-from elastocal.campaigns.columns import reading_columns, readings_from
+from elastocal.campaigns.columns import columns_of, measurements_from
 from elastocal.campaigns.reading import read_campaign
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.case import case_from, noise_facts, noise_from
@@ -19,8 +19,8 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.parameters import parameters
 from elastocal.io.storage import TableSchema, read_table, write_table
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
-from elastocal.loop.loading import taken_in
-from elastocal.loop.schemas import CORRELATIONS, PARAMETER_COLUMNS, readings
+from elastocal.loop.loading import load_campaign
+from elastocal.loop.schemas import CORRELATIONS, PARAMETER_COLUMNS, measurements
 
 PARAMETERS = TableSchema("parameters", PARAMETER_COLUMNS)
 COVARIATES = {
@@ -36,17 +36,17 @@ def there_and_back(path, schema, columns):
 
 @pytest.mark.parametrize("measured", ["position", "pose"])
 @pytest.mark.parametrize("covariates", COVARIATES)
-def test_readings_come_back_as_they_were(measured, covariates, kuka, config_folder, tmp_path):
+def test_measurements_come_back_as_they_were(measured, covariates, kuka, config_folder, tmp_path):
     table = made_table(kuka, "c")
     count = len(table["pose"])
     table |= {name: np.resize(values, count) for name, values in COVARIATES[covariates].items()}
     table |= {f"approach{joint}": np.zeros(count) for joint in range(1, 7) if joint != 3 and covariates == "all"}
     table["session"] = table["pose"] % 2
     folder = made_folder(tmp_path / "c", kuka, table=table, measured=measured)
-    before = read_campaign(folder, config_folder / "robots").readings
+    before = read_campaign(folder, config_folder / "robots").measurements
     assert (before.rotation_vector is None) == (measured == "position")
     assert (before.approach is None) == (before.time_s is None) == (covariates == "none")
-    after = readings_from(there_and_back(tmp_path / "r.parquet", readings(6), reading_columns(before)))
+    after = measurements_from(there_and_back(tmp_path / "r.parquet", measurements(6), columns_of(before)))
     for name, values in vars(before).items():
         if values is None:
             assert getattr(after, name) is None, name
@@ -94,8 +94,8 @@ def declared(kuka, config_folder, tmp_path_factory):
     """The declared model fitted to a campaign."""
     folder = tmp_path_factory.mktemp("loop") / "made"
     made_folder(folder, kuka, table=made_table(kuka, "made"), frame="tracker", measured="pose")
-    descriptions, training, _ = taken_in(folder, config_folder / "robots")
-    case = case_from(descriptions, reading_columns(training))
+    descriptions, training, _ = load_campaign(folder, config_folder / "robots")
+    case = case_from(descriptions, columns_of(training))
     return fit(case.model, case.observations, Noise("declared", 6e-5, 6e-5, np.zeros(6)))
 
 

@@ -1,4 +1,4 @@
-"""Whatever is wrong with the readings, the loop ends with a verdict that says so and with a report."""
+"""Whatever is wrong with the measurements, the loop ends with a verdict that says so and with a report."""
 
 import json
 from pathlib import Path
@@ -44,7 +44,7 @@ FAULTS = {
         in_tracker_frame,
         {},
         "wrong_frame",
-        "readings do not lie in the base frame: the robot would stand 2.1 m away",
+        "measurements do not lie in the base frame: the robot would stand 2.1 m away",
     ),
     "tracker's frame, poses": (in_tracker_frame, POSE, "wrong_frame", "the robot would stand 2.1 m away"),
     "x and y exchanged": (lambda t: t | {"x": t["y"], "y": t["x"]}, {}, "swapped_axes", "x = y, y = x"),
@@ -59,7 +59,7 @@ FAULTS = {
     "nonsense": (
         lambda t: t | {axis: np.random.default_rng(5).normal(size=len(t["x"])) for axis in "xyz"},
         {},
-        "implausible_readings",
+        "implausible_measurements",
         "from where the robot file puts them",
     ),
 }
@@ -80,7 +80,7 @@ def check(verdict, name, words):
     (effect,) = verdict["effects"]
     assert (effect["name"], effect["family"], verdict["verdict"]) == (name, "data", "named")
     assert words in effect["detail"] and verdict["candidates_tested"] == 0
-    # What is left of readings that are wrong in themselves is no statement on the model.
+    # What is left of measurements that are wrong in themselves is no statement on the model.
     assert not [warning for warning in verdict["warnings"] if "times the noise" in warning]
 
 
@@ -103,19 +103,19 @@ def test_a_decisive_fault_ends_in_a_verdict_and_in_a_report(fault, kuka, config_
 
 
 def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder, tmp_path):
-    """Translation to the 60 µm of the readings over their root, and deflections; rotation likewise."""
+    """Translation to the 60 µm of the measurements over their root, and deflections; rotation likewise."""
     folder = folder_of(tmp_path / "made", kuka, in_tracker_frame, POSE)
     verdict = diagnosed(folder.as_posix(), (config_folder / "robots").as_posix(), 1)
     told = {value["name"]: (value["value"], value["unit"]) for value in verdict["effects"][0]["parameters"]}
     for axis, place, turn in zip("xyz", PLACE, TURN, strict=True):
-        value, unit = told[f"{axis} of the base in the frame of the readings"]
+        value, unit = told[f"{axis} of the base in the frame of the measurements"]
         assert unit == "m" and abs(value - place) < 5e-4
-        value, unit = told[f"rotation vector {axis} of the base in the frame of the readings"]
+        value, unit = told[f"rotation vector {axis} of the base in the frame of the measurements"]
         assert unit == "rad" and abs(value - turn) < 5e-4
 
 
 def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
-    """Offsets of 0.12 m along z in the file of the readings, 120 where metres are asked for."""
+    """Offsets of 0.12 m along z in the file of the measurements, 120 where metres are asked for."""
     table = made_table(kuka, "made")
     vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
     moved = Rotation.from_rotvec(vectors).apply(OFFSET)
@@ -131,7 +131,7 @@ def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
 
 
 def test_nothing_testable_ends_in_a_verdict_and_a_report(kuka, config_folder, tmp_path):
-    """All poses are one, and the readings are of that one: there is no fault and nothing to be told."""
+    """All poses are one, and the measurements are of that one: there is no fault and nothing to be told."""
     table = made_table(kuka, "made")
     first = (table["pose"] == table["pose"][0]) & (table["load"] == 0) & (table["repeat"] == 0)
     rng = np.random.default_rng(1)

@@ -46,7 +46,7 @@ def foreign(table):
 
 
 def one_pose(table):
-    """All poses are one, unloaded, and the readings are of that one."""
+    """All poses are one, unloaded, and the measurements are of that one."""
     first = (table["pose"] == table["pose"][0]) & (table["load"] == 0) & (table["repeat"] == 0)
     table, rng = {name: values.copy() for name, values in table.items()}, np.random.default_rng(1)
     for point in np.unique(table["target"]):
@@ -147,11 +147,11 @@ def test_the_verdict_is_the_same_for_one_seed(kuka, tmp_path):
     assert diagnosed(folder, ROBOTS.as_posix(), 8)["probabilities"]["alarm_p_value"] != one["probabilities"]["alarm_p_value"]
 
 
-def test_no_step_before_the_judgement_depends_on_held_out_readings(kuka, tmp_path):
-    """Held-out readings a metre off, or at other loads and angles, change nothing of the diagnosis, to the last digit."""
+def test_no_step_before_the_judgement_depends_on_held_out_measurements(kuka, tmp_path):
+    """Held-out measurements a metre off, or at other loads and angles, change nothing of the diagnosis, to the last digit."""
     folder = folder_of(tmp_path, kuka, "named")
     case, held_out = cases_in(folder, ROBOTS)
-    unseen = set(zip(held_out.campaign.readings.session, held_out.campaign.readings.pose, strict=True))
+    unseen = set(zip(held_out.campaign.measurements.session, held_out.campaign.measurements.pose, strict=True))
     table = offset(made_table(kuka, "made", seed=3, plan=USUAL))
     order = np.lexsort((table["repeat"], table["load"], table["pose"]))
     table = {name: table[name][order] for name in table}
@@ -161,7 +161,7 @@ def test_no_step_before_the_judgement_depends_on_held_out_readings(kuka, tmp_pat
         table[name] = table[name] + change * mine
     spoilt_folder = made_folder(tmp_path / "spoilt" / "made", kuka, table=table)
     spoilt, spoilt_held_out = cases_in(spoilt_folder, ROBOTS)
-    assert np.abs(spoilt_held_out.campaign.readings.position - held_out.campaign.readings.position).max() > 0.9
+    assert np.abs(spoilt_held_out.campaign.measurements.position - held_out.campaign.measurements.position).max() > 0.9
     one, other = (diagnose(each, Settings(), 1) for each in (case, spoilt))
     assert one.document == other.document
     for mine, theirs in zip(one.steps, other.steps, strict=True):

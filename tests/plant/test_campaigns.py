@@ -50,18 +50,18 @@ def test_the_analysis_reads_the_folder_and_holds_out_the_designed_poses(tmp_path
     schedule = schedule_of(fanuc_specimen.arm, small, 2)
     assert set(training.pose) == set(schedule.pose[schedule.training])
     assert set(held_out.pose) == set(schedule.pose[~schedule.training])
-    assert len(campaign.readings.pose) == 4 * len(schedule.pose)
+    assert len(campaign.measurements.pose) == 4 * len(schedule.pose)
 
 
 @pytest.mark.parametrize("name", ["kuka", "fanuc", "abb", "fanuc_cpa"])
 def test_angles_stand_in_the_folder_as_the_controller_shows_them(tmp_path, small, name):
     robot = specimen(arm_from_file(ROBOTS / f"{name}.yaml"), 1)
     write_blind_campaign(tmp_path / "c", "c", ROBOTS / f"{name}.yaml", robot, small, schedule_of(robot.arm, small, 2))
-    readings = read_campaign(tmp_path / "c", ROBOTS).readings
-    np.testing.assert_allclose(readings.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
+    measurements = read_campaign(tmp_path / "c", ROBOTS).measurements
+    np.testing.assert_allclose(measurements.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
 
 
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_readings(tmp_path, fanuc_specimen, small):
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_measurements(tmp_path, fanuc_specimen, small):
     for folder, seed in (("a", 2), ("b", 2), ("c", 3)):
         made(tmp_path / folder, fanuc_specimen, small, seed)
     bytes_of = [(tmp_path / folder / "measurements.parquet").read_bytes() for folder in "abc"]
@@ -69,7 +69,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_readings(tmp_
     assert bytes_of[0] != bytes_of[2]
 
 
-def test_a_defect_changes_the_readings_and_neither_the_schedule_nor_the_noise(fanuc_specimen, small):
+def test_a_defect_changes_the_measurements_and_neither_the_schedule_nor_the_noise(fanuc_specimen, small):
     schedule = schedule_of(fanuc_specimen.arm, small, 2)
     bad = with_defects(fanuc_specimen, [Defect("joint_offset", (2,), 1e-4, 1)])
     good_table, bad_table = (measured_table(robot, small, schedule)[0] for robot in (fanuc_specimen, bad))
@@ -79,7 +79,7 @@ def test_a_defect_changes_the_readings_and_neither_the_schedule_nor_the_noise(fa
     assert at_shoulder.max() < 1e-4 * 4.0
 
 
-def test_noise_of_the_readings_is_the_trackers(fanuc_specimen, small):
+def test_noise_of_the_measurements_is_the_trackers(fanuc_specimen, small):
     design = replace(small, poses=40)
     schedule = schedule_of(fanuc_specimen.arm, design, 2)
     noisy = measured_table(fanuc_specimen, design, schedule)[0]
@@ -123,14 +123,14 @@ def test_covariates_may_be_left_out_and_declared_noise_may_be_wrong(tmp_path, fa
     campaign = read_campaign(tmp_path / "case0", ROBOTS)
     assert campaign.noise == {"position_m": 3e-5, "orientation_rad": 3e-5}
     assert campaign.declared == ("joint_offset",)
-    assert campaign.readings.approach is None
-    assert campaign.readings.temperature_c is None
-    assert campaign.readings.time_s is not None
-    assert campaign.readings.rotation_vector is None
+    assert campaign.measurements.approach is None
+    assert campaign.measurements.temperature_c is None
+    assert campaign.measurements.time_s is not None
+    assert campaign.measurements.rotation_vector is None
     assert [target.point for target in campaign.targets] == ["6DoF"]
 
 
-def test_in_the_trackers_frame_all_readings_are_moved_as_one_body(fanuc_specimen, small):
+def test_in_the_trackers_frame_all_measurements_are_moved_as_one_body(fanuc_specimen, small):
     tracker = Tracker(sigma_m=0.0, sigma_rad=0.0, frame_turn=(0.2, 0.1, -0.7))
     robot, schedule = replace(fanuc_specimen, tracker=tracker), schedule_of(fanuc_specimen.arm, small, 2)
     here, there = (measured_table(robot, replace(small, frame=frame), schedule)[0] for frame in ("base", "tracker"))
@@ -145,14 +145,14 @@ def test_outliers_are_named_in_the_truth_and_nowhere_else(tmp_path, fanuc_specim
     truth = made(tmp_path / "bad", robot, small)
     made(tmp_path / "good", fanuc_specimen, small)
     bad, good = (read_campaign(tmp_path / folder, ROBOTS) for folder in ("bad", "good"))
-    off = np.abs(bad.readings.position - good.readings.position).max(axis=1) > 0
+    off = np.abs(bad.measurements.position - good.measurements.position).max(axis=1) > 0
     names = [target.name for target in bad.targets]
-    found = {(int(row) // 4, names[bad.readings.target[row]]) for row in np.flatnonzero(off)}
+    found = {(int(row) // 4, names[bad.measurements.target[row]]) for row in np.flatnonzero(off)}
     assert found == {tuple(entry) for entry in truth["outliers"]}
     assert found
 
 
-def test_the_folder_is_the_same_whatever_the_truth_but_for_the_readings(tmp_path, fanuc_specimen, small):
+def test_the_folder_is_the_same_whatever_the_truth_but_for_the_measurements(tmp_path, fanuc_specimen, small):
     defect = Defect("lost_motion", (2,), 1e-4, 1)
     made(tmp_path / "good", fanuc_specimen, small)
     made(tmp_path / "bad", with_defects(fanuc_specimen, [defect]), small)
@@ -207,7 +207,7 @@ def test_links_grow_in_proportion_to_their_castings_warmth(weightless, small):
 
 
 @pytest.mark.parametrize("kind", ["frame_drift", "outside:slipping_zero", "hysteresis"])
-def test_a_further_experiment_changes_no_reading_that_is_there(fanuc_specimen, small, kind):
+def test_a_further_experiment_changes_no_measurement_that_is_there(fanuc_specimen, small, kind):
     robot = with_defects(fanuc_specimen, [drawn_defect(kind, fanuc_specimen.arm, 1)])
     robot = replace(robot, tracker=replace(robot.tracker, outliers=0.05))
     schedule = schedule_of(robot.arm, small, 2)

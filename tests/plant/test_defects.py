@@ -1,4 +1,4 @@
-"""Defects as a whole: each kind changes the readings as its size says, by its seed, where it is put and nowhere else."""
+"""Defects as a whole: each kind changes the measurements as its size says, by its seed, where it is put and nowhere else."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import pytest
 from analysed_robots import analysed
 
 from elastocal.effects.catalogue import effects
-from elastocal.effects.circumstances import circumstances_of
+from elastocal.effects.conditions import conditions_of
 from elastocal.errors import InputError
 from elastocal.fitting.observations import States
 from elastocal.mechanics.kinematics import poses_and_jacobians
@@ -82,7 +82,7 @@ def test_a_defect_of_no_size_leaves_the_robot_as_it_was_and_a_plausible_one_does
 
 
 @pytest.mark.parametrize("kind", sorted(KINDS))
-def test_a_defects_readings_depend_on_its_seed_and_on_nothing_else(fanuc_specimen, schedule, kind):
+def test_a_defects_measurements_depend_on_its_seed_and_on_nothing_else(fanuc_specimen, schedule, kind):
     defect = drawn_defect(kind, fanuc_specimen.arm, 8)
     first, second = (seen_poses(with_defects(fanuc_specimen, [defect]), schedule) for _ in range(2))
     np.testing.assert_array_equal(first[0], second[0])
@@ -114,7 +114,7 @@ def test_the_parameters_of_the_truth_are_those_of_the_catalogues_law(weightless,
     parameters = truth_of(weightless, defect)["parameters"]
     states = states_of(schedule)
     sites = sites_of(analysed("fanuc").chain)
-    given = circumstances_of(sites, weightless.compliance, states)
+    given = conditions_of(sites, weightless.compliance, states)
     change = seen_poses(with_defects(weightless, [defect]), schedule)
     nominal = seen_poses(weightless, schedule)
     found = np.concatenate([change[0] - nominal[0], rotation_vector(change[1] @ np.swapaxes(nominal[1], -1, -2))], axis=-1)
@@ -154,7 +154,7 @@ def test_two_defects_add_up(yardstick, fanuc_specimen):
 @pytest.mark.parametrize("kind", ["joint_offset", "stiffening", "link_elasticity", "outside:foot_slip"])
 def test_a_defect_is_sized_to_its_non_centrality(yardstick, fanuc_specimen, kind, quantity, target):
     defect = replace(drawn_defect(kind, fanuc_specimen.arm, 3), joints={"stiffening": (2,)}.get(kind, (2,)))
-    defect = replace(defect, joints=defect.joints if defect.joints in KINDS[kind].places(fanuc_specimen.arm) else ())
+    defect = replace(defect, joints=defect.joints if defect.joints in KINDS[kind].locations(fanuc_specimen.arm) else ())
 
     def robot_of_size(size):
         return with_defects(fanuc_specimen, [replace(defect, size=size)])
@@ -194,7 +194,7 @@ def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc
 
 
 def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_specimen, schedule):
-    """By a least-squares fit of the plant's own compliances to the defective readings."""
+    """By a least-squares fit of the plant's own compliances to the defective measurements."""
     defect = Defect("lost_motion", (2,), 7e-5, 3)
     yardstick = Yardstick(fanuc_specimen, schedule)
     bad = with_defects(fanuc_specimen, [defect])
@@ -250,7 +250,7 @@ def test_an_eccentric_nest_is_the_catalogues_law_on_every_arm(name, arm, small):
     # Where the loaded arm has yielded to the target's frame is turned a little.
     bare = schedule.load == 0
     (candidate,) = effects()["nest_eccentricity"].candidates(sites)
-    given = circumstances_of(sites, robot.compliance, states)
+    given = conditions_of(sites, robot.compliance, states)
     coordinates = np.zeros((len(schedule.pose), sites.chain.coordinates))
     coordinates[:, : sites.joints] = schedule.angle
     jacobian = poses_and_jacobians(sites.chain, coordinates, sites.chain.end_effector)[2][:, :3]

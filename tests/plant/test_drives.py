@@ -62,7 +62,7 @@ def test_the_same_seed_gives_the_same_draws_and_another_seed_others(visits):
     assert (law(visits) != law(other)).all()
 
 
-def test_an_error_of_the_pose_is_the_same_in_all_its_readings(visits):
+def test_an_error_of_the_pose_is_the_same_in_all_its_measurements(visits):
     poses = np.arange(200) // 8
     turn = PoseError((1e-5, 0.0, 1e-5, 1e-5))(Visits(visits.angle, visits.approach, poses, visits.time_s, 5))
     assert not turn[:, 1].any()

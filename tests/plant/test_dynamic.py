@@ -26,7 +26,7 @@ def test_the_path_is_slow_within_the_limits_and_uses_most_of_them(arm):
     assert np.abs(np.diff(angle, 2, axis=0)).max() / 0.1**2 < 0.3
 
 
-def test_readings_are_those_of_the_arm_at_rest_at_each_angle(fanuc_specimen):
+def test_measurements_are_those_of_the_arm_at_rest_at_each_angle(fanuc_specimen):
     """Of gears with play and errors of their teeth too, to far below a tracker's noise."""
     defects = [Defect("lost_motion", (3,), 1e-4, 1), Defect("transmission_harmonic", (2,), 1e-4, 1)]
     robot = replace(with_defects(fanuc_specimen, defects), tracker=SILENT)
@@ -45,5 +45,5 @@ def test_the_analysis_reads_the_folder(tmp_path, fanuc_specimen):
     declared = declared_masses(fanuc_specimen.arm)
     write_dynamic_campaign(tmp_path / "c", "c", ROBOTS / "fanuc.yaml", fanuc_specimen, 2000, 4, declared)
     campaign = read_campaign(tmp_path / "c", ROBOTS)
-    assert len(campaign.readings) == 2000 and np.unique(campaign.readings.pose).size == 2000
+    assert len(campaign.measurements) == 2000 and np.unique(campaign.measurements.pose).size == 2000
     assert campaign.compliance == "nominal" and len(campaign.robot.masses) == 7

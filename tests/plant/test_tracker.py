@@ -64,7 +64,7 @@ def test_bent_light_errs_along_the_line_of_sight_and_a_wrong_wavelength_from_the
     np.testing.assert_allclose(tracker.seen(*targets)[0] - targets[0], wanted, atol=1e-14)
 
 
-def test_a_stand_that_is_knocked_turns_all_later_readings_about_itself(targets):
+def test_a_stand_that_is_knocked_turns_all_later_measurements_about_itself(targets):
     move = Move(2.0, (1e-3, 0.0, -2e-3), (0.0, 0.0, 1e-4))
     tracker, (position, rotation, time_s) = Tracker(move=move), targets
     found = tracker.seen(position, rotation, time_s)[0]

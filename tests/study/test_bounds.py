@@ -7,7 +7,7 @@ from support import random_loads
 from elastocal.mechanics.elastostatics import joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.study.bounds import squared_error_bounds
-from elastocal.study.identification import Readings, identify, prefix_information
+from elastocal.study.identification import Measurements, identify, prefix_information
 from elastocal.study.metrics import error_moment, make_judge, position_errors
 from elastocal.study.simulation import true_deflections
 
@@ -37,13 +37,13 @@ def test_bound_is_the_trace_with_the_explicit_inverse():
 
 
 def test_bound_is_infinite_where_the_information_is_singular_and_nowhere_else():
-    rows = np.random.default_rng(2).standard_normal((2, 1, 4, 6))  # four readings of six unknowns
+    rows = np.random.default_rng(2).standard_normal((2, 1, 4, 6))  # four measurements of six unknowns
     information = np.swapaxes(rows, -1, -2) @ rows
     information[1, 0] = np.eye(6)
     np.testing.assert_allclose(squared_error_bounds(np.moveaxis(information, 1, -1), np.eye(6))[:, 0], [np.inf, 6.0])
 
 
-def test_bound_without_any_reading_is_infinite():
+def test_bound_without_any_measurement_is_infinite():
     assert squared_error_bounds(np.zeros((1, 6, 6, 1)), np.eye(6))[0, 0] == np.inf
 
 
@@ -55,7 +55,7 @@ def test_bound_falls_with_every_configuration_and_every_point(robot):
     assert (np.diff(bounds) < 0).all() and (both < bounds).all()
 
 
-def test_repeating_every_reading_halves_the_bound(kuka):
+def test_repeating_every_measurement_halves_the_bound(kuka):
     moment, matrix = error_moment(judge_of(kuka)), regressors(kuka, 4)["6DoF"]
     one, two = (squared_error_bounds(prefix_information(m), moment)[-1, 0] for m in (matrix, np.concatenate([matrix, matrix])))
     assert two == pytest.approx(one / 2, rel=1e-9)
@@ -65,14 +65,14 @@ def test_joint_least_squares_reaches_the_bound_at_small_noise(kuka, strategies):
     # 3000 data sets of the same configurations, with other noise: their mean squared error over the bound is the efficiency.
     draws, noise, configurations = 3000, 1e-6, 6
     judge, matrices, rng = judge_of(kuka), regressors(kuka, configurations), np.random.default_rng(4)
-    readings = {}
+    measurements = {}
     for name, matrix in matrices.items():
         exact = np.einsum("rnks,n->rks", matrix, kuka.compliance)
         measured = exact + noise * rng.standard_normal((6, configurations, draws))
-        readings[name] = Readings(np.broadcast_to(matrix, (*matrix.shape[:3], draws)), measured)
+        measurements[name] = Measurements(np.broadcast_to(matrix, (*matrix.shape[:3], draws)), measured)
     bound = squared_error_bounds(sum(prefix_information(m) for m in matrices.values()), error_moment(judge))[-1, 0]
     for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF", "4-6DoF-after-3DoF"):
-        found = identify(strategies[name], readings, 6).compliance[-1].T
+        found = identify(strategies[name], measurements, 6).compliance[-1].T
         efficiency = bound * noise**2 / (position_errors(judge, found) ** 2).mean()
         if name == "4-6DoF-after-3DoF":
             assert efficiency < 0.95  # it forgets what the end-effector says of joints 1-3

@@ -22,7 +22,7 @@ def test_rows_read_are_those_of_poses_or_positions():
 
 FAULTS = {
     "typo": (("data_set",), 10, "data_set", ["unknown key", "'data_sets'?"]),
-    "typo inside": (("readings", "wrench"), "end_effector", "readings.wrench", ["unknown key", "'wrench_at'?"]),
+    "typo inside": (("interpretations", "wrench"), "end_effector", "interpretations.wrench", ["unknown key", "'wrench_at'?"]),
     "unknown strategy": (("strategies", 0), "6DOF", "strategies", ["'6DOF'", "'6DoF'?", "3+6DoF-comb"]),
     "unknown robot": (("robots", 0), "kukka", "robots", ["'kukka'", "'kuka'?", "fanuc"]),
     "quite unknown robot": (("robots", 0), "zzz", "robots", ["'zzz'", "fanuc, ", "kuka, "]),
@@ -39,8 +39,13 @@ FAULTS = {
     "no configuration": (("configurations",), 0, "configurations", ["found 0", "1 or more"]),
     "yes": (("data_sets",), True, "data_sets", ["True", "integer"]),
     "no seed": (("seed",), None, "seed", ["nothing", "random streams"]),
-    "no reading": (("readings", "average"), None, "readings.average", ["nothing", "R7"]),
-    "unknown reading": (("readings", "average"), "mean", "readings.average", ["'mean'", "stiffness | compliance | median"]),
+    "no interpretation": (("interpretations", "average"), None, "interpretations.average", ["nothing", "R7"]),
+    "unknown interpretation": (
+        ("interpretations", "average"),
+        "mean",
+        "interpretations.average",
+        ["'mean'", "stiffness | compliance | median"],
+    ),
     "unknown solver": (("identification", "solver"), "newton", "identification.solver", ["equation_11 | gauss_newton"]),
     "flat offset": (("loading", "offset_m"), [0, 0.5], "loading.offset_m", ["[0, 0.5]", "3 or more entries"]),
     "no force": (("loading", "force_N"), 0, "loading.force_N", ["found 0", "more than 0"]),
@@ -60,7 +65,7 @@ def test_fault_is_one_line_that_names_file_key_and_what_is_allowed(config, confi
 
 def test_data_sets_too_short_for_a_strategy_are_refused(config, config_folder):
     short = deepcopy(config)
-    short["readings"]["measured"], short["configurations"] = "position", 1
+    short["interpretations"]["measured"], short["configurations"] = "position", 1
     short["evaluation"]["lengths"], short["tables"]["length"] = [1], 1
     with refused("study.yaml", "configurations:", "found 1", "2 or more", "6DoF"):
         check_study(short, config_folder, "study.yaml")

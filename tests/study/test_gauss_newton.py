@@ -10,7 +10,7 @@ from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study import gauss_newton
 from elastocal.study.gauss_newton import identify_exactly
-from elastocal.study.identification import Readings, first_solvable_length, identify
+from elastocal.study.identification import Measurements, first_solvable_length, identify
 from elastocal.study.simulation import true_deflections
 from elastocal.study.strategies import Stage, Strategy
 
@@ -38,13 +38,13 @@ class Data:
         return identify_exactly(strategy, self.chain, self.joint_angles, self.torques, self.deflections, start, lengths)
 
     def linear(self, strategy):
-        readings = {}
+        measurements = {}
         for point in self.chain.points:
             jacobian = poses_and_jacobians(self.chain, self.joint_angles, point)[2]
             matrix = np.moveaxis(regressor(jacobian, self.torques[point.name]), (-2, -1), (0, 1))
             deflection = np.moveaxis(self.deflections[point.name], -1, 0)
-            readings[point.name] = Readings(matrix[: len(deflection)], deflection)
-        return identify(strategy, readings, self.robot.joints).compliance[-1]
+            measurements[point.name] = Measurements(matrix[: len(deflection)], deflection)
+        return identify(strategy, measurements, self.robot.joints).compliance[-1]
 
 
 def off(found, robot):

@@ -12,7 +12,7 @@ from elastocal.mechanics.elastostatics import joint_torques, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.identification import (
-    Readings,
+    Measurements,
     cholesky_triangles,
     estimate_compliance,
     first_solvable_length,
@@ -66,9 +66,9 @@ class Data:
                 deflection = self.matrix[point.name] @ robot.compliance
             self.measured[point.name] = deflection + noise * rng.standard_normal(deflection.shape)
 
-    def readings(self, sets=slice(None)):
+    def measurements(self, sets=slice(None)):
         return {
-            name: Readings(
+            name: Measurements(
                 np.moveaxis(self.matrix[name][sets], (2, 3, 1, 0), (0, 1, 2, 3)),
                 np.moveaxis(self.measured[name][sets], (2, 1, 0), (0, 1, 2)),
             )
@@ -122,7 +122,7 @@ def strategy_called(strategies):
 @pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
 def test_estimates_of_every_prefix_are_those_of_a_plain_loop(data, strategy_called, name):
     strategy = strategy_called(name)
-    found = identify(strategy, data.readings(), 6).compliance
+    found = identify(strategy, data.measurements(), 6).compliance
     for k, s in prefixes(strategy, 6):
         expected = plain(strategy, *first(data, s, k))
         np.testing.assert_allclose(found[k - 1, :, s], expected, rtol=0, atol=1e-9 * np.abs(expected).max())
@@ -131,7 +131,7 @@ def test_estimates_of_every_prefix_are_those_of_a_plain_loop(data, strategy_call
 @pytest.mark.parametrize("name", ["6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "4-6DoF-after-6+3DoF"])
 def test_estimates_from_positions_are_those_of_a_plain_loop(strategies, robots, name):
     strategy, data = strategies[name], data_of("kuka", 3, robots)
-    found = identify(strategy, data.readings(), 6)
+    found = identify(strategy, data.measurements(), 6)
     # One position says two things about three joints that meet in a wrist, so one configuration is not enough.
     for k, s in [(k, s) for k, s in prefixes(strategy, 3) if k > 1]:
         expected = plain(strategy, *first(data, s, k))
@@ -139,7 +139,7 @@ def test_estimates_from_positions_are_those_of_a_plain_loop(strategies, robots, 
 
 
 def explicit_covariance(strategy, matrix, measured):
-    """The estimator is linear in the readings: its matrix, column by column, times its own transpose."""
+    """The estimator is linear in the measurements: its matrix, column by column, times its own transpose."""
     columns = []
     for name in dict.fromkeys(name for stage in strategy.stages for name in stage.points):
         for index in np.ndindex(measured[name].shape):
@@ -159,7 +159,7 @@ def assert_same_covariance(found, expected):
 @pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
 def test_covariance_is_that_of_the_estimator_written_as_one_matrix(robots, strategy_called, name):
     strategy, data = strategy_called(name), data_of("kuka", 6, robots)
-    found = identify(strategy, data.readings(), 6).covariance
+    found = identify(strategy, data.measurements(), 6).covariance
     assert found.shape == (CONFIGURATIONS, SETS, 6, 6)
     for k, s in [(1, 0), (2, 1), (CONFIGURATIONS, 2)]:
         assert_same_covariance(found[k - 1, s], explicit_covariance(strategy, *first(data, s, k)))
@@ -168,19 +168,19 @@ def test_covariance_is_that_of_the_estimator_written_as_one_matrix(robots, strat
 @pytest.mark.parametrize("name", ["6DoF", "4-6DoF-after-3DoF", "4-6DoF-after-6+3DoF"])
 def test_covariance_from_positions_is_that_of_the_estimator_written_as_one_matrix(robots, strategies, name):
     strategy, data = strategies[name], data_of("kuka", 3, robots)
-    found = identify(strategy, data.readings(), 6).covariance
+    found = identify(strategy, data.measurements(), 6).covariance
     assert_same_covariance(found[-1, 0], explicit_covariance(strategy, *first(data, 0, CONFIGURATIONS)))
 
 
-def test_covariance_of_a_shared_reading_strategy_is_what_noise_does(kuka, strategies):
+def test_covariance_of_a_shared_measurement_strategy_is_what_noise_does(kuka, strategies):
     # Monte Carlo: one configuration set, 4000 draws of unit noise as data sets.
     strategy, draws, rng = strategies["4-6DoF-after-6+3DoF"], 4000, np.random.default_rng(1)
-    data, readings = data_of("kuka", 6, {"kuka": kuka}.__getitem__), {}
+    data, measurements = data_of("kuka", 6, {"kuka": kuka}.__getitem__), {}
     for name, matrix in data.matrix.items():
         one = np.repeat(np.moveaxis(matrix[0], 0, -1)[..., None], draws, axis=-1)
-        readings[name] = Readings(one, rng.standard_normal((6, CONFIGURATIONS, draws)))
-    expected = identify(strategy, data.readings(), 6).covariance[-1, 0]
-    found = np.cov(estimate_compliance(strategy, readings, 6)[0][-1])
+        measurements[name] = Measurements(one, rng.standard_normal((6, CONFIGURATIONS, draws)))
+    expected = identify(strategy, data.measurements(), 6).covariance[-1, 0]
+    found = np.cov(estimate_compliance(strategy, measurements, 6)[0][-1])
     scale = np.sqrt(np.diag(expected))
     # A sample covariance of unit variances has a standard deviation of at most sqrt(2 / draws) = 0.022.
     np.testing.assert_allclose(found / np.outer(scale, scale), expected / np.outer(scale, scale), rtol=0, atol=0.11)
@@ -189,7 +189,7 @@ def test_covariance_of_a_shared_reading_strategy_is_what_noise_does(kuka, strate
 @pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
 def test_condition_is_that_of_the_stacked_regressor_of_the_worst_stage(data, strategy_called, name):
     strategy = strategy_called(name)
-    found = identify(strategy, data.readings(), 6).condition
+    found = identify(strategy, data.measurements(), 6).condition
     for k, s in prefixes(strategy, 6):
         matrix, _ = first(data, s, k)
         stacked = [
@@ -203,7 +203,7 @@ def test_condition_is_that_of_the_stacked_regressor_of_the_worst_stage(data, str
 
 def test_strategies_that_differ_by_their_start_alone_agree_exactly(data, strategies):
     plainly, *others = (
-        identify(strategies[name], data.readings(), 6) for name in ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
+        identify(strategies[name], data.measurements(), 6) for name in ("6DoF", "6DoF-after-3DoF", "6DoF-after-3+3DoF")
     )
     for other in others:
         np.testing.assert_array_equal(other.compliance, plainly.compliance)
@@ -211,43 +211,43 @@ def test_strategies_that_differ_by_their_start_alone_agree_exactly(data, strateg
 
 
 def test_comb_and_its_staged_twin_are_one_estimator(data, strategies):
-    comb, twin = (identify(strategies[name], data.readings(), 6) for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF"))
+    comb, twin = (identify(strategies[name], data.measurements(), 6) for name in ("3+6DoF-comb", "4-6DoF-after-6+3DoF"))
     np.testing.assert_allclose(twin.compliance, comb.compliance, rtol=0, atol=1e-9 * np.abs(comb.compliance).max())
     np.testing.assert_allclose(twin.covariance, comb.covariance, rtol=0, atol=1e-9 * np.abs(comb.covariance).max())
 
 
 @pytest.mark.parametrize("name", [*NAMES, *UNUSUAL])
-def test_noise_free_readings_of_the_linear_model_give_the_exact_compliances(robot, strategy_called, name):
+def test_noise_free_measurements_of_the_linear_model_give_the_exact_compliances(robot, strategy_called, name):
     data = Data(robot, noise=0.0, linear=True)
-    found = identify(strategy_called(name), data.readings(), 6).compliance
+    found = identify(strategy_called(name), data.measurements(), 6).compliance
     # Rounding of 1e-16 times condition numbers up to 1e4, stage after stage.
     np.testing.assert_allclose(found, np.broadcast_to(robot.compliance[:, None], found.shape), rtol=1e-9)
 
 
-def test_all_readings_together_are_never_worse_than_some_of_them(data, strategies):
-    some, more = (identify(strategies[name], data.readings(), 6).covariance for name in ("6DoF", "3+6DoF-comb"))
+def test_all_measurements_together_are_never_worse_than_some_of_them(data, strategies):
+    some, more = (identify(strategies[name], data.measurements(), 6).covariance for name in ("6DoF", "3+6DoF-comb"))
     assert (np.linalg.eigvalsh(some - more).min(axis=-1) > -1e-9 * np.abs(some).max(axis=(-1, -2))).all()
 
 
 def test_a_data_set_does_not_depend_on_the_others(data, strategies):
-    together = identify(strategies["4-6DoF-after-6+3DoF"], data.readings(), 6)
+    together = identify(strategies["4-6DoF-after-6+3DoF"], data.measurements(), 6)
     for s in range(SETS):
-        alone = identify(strategies["4-6DoF-after-6+3DoF"], data.readings([s]), 6)
+        alone = identify(strategies["4-6DoF-after-6+3DoF"], data.measurements([s]), 6)
         np.testing.assert_allclose(alone.compliance[..., 0], together.compliance[..., s], rtol=1e-10)
         np.testing.assert_allclose(alone.condition[:, 0], together.condition[:, s], rtol=1e-8)
 
 
-def test_readings_are_left_as_they_were(data, strategies):
-    readings = data.readings()
-    before = {name: (r.regressor.copy(), r.deflection.copy()) for name, r in readings.items()}
-    identify(strategies["4-6DoF-after-6+3DoF"], readings, 6)
+def test_measurements_are_left_as_they_were(data, strategies):
+    measurements = data.measurements()
+    before = {name: (r.regressor.copy(), r.deflection.copy()) for name, r in measurements.items()}
+    identify(strategies["4-6DoF-after-6+3DoF"], measurements, 6)
     for name, (matrix, deflection) in before.items():
-        np.testing.assert_array_equal(readings[name].regressor, matrix)
-        np.testing.assert_array_equal(readings[name].deflection, deflection)
+        np.testing.assert_array_equal(measurements[name].regressor, matrix)
+        np.testing.assert_array_equal(measurements[name].deflection, deflection)
 
 
 @pytest.mark.parametrize(("name", "poses", "positions"), [("6DoF", 1, 2), ("3+6DoF-comb", 1, 1), ("5-6DoF-after-4DoF", 1, 2)])
-def test_first_solvable_length_counts_readings_against_unknowns(strategies, name, poses, positions):
+def test_first_solvable_length_counts_measurements_against_unknowns(strategies, name, poses, positions):
     assert first_solvable_length(strategies[name], 6) == poses
     assert first_solvable_length(strategies[name], 3) == positions
 
@@ -258,14 +258,14 @@ def test_first_solvable_length_is_that_of_the_hardest_stage():
 
 
 def test_prefixes_that_are_too_short_are_not_a_number(robots, strategies):
-    found = identify(strategies["6DoF"], data_of("kuka", 3, robots).readings(), 6)
+    found = identify(strategies["6DoF"], data_of("kuka", 3, robots).measurements(), 6)
     for array in (found.compliance, found.covariance, found.condition):
         assert np.isnan(array[0]).all() and np.isfinite(array[1:]).all()
 
 
-def test_condition_tells_a_prefix_that_has_readings_enough_but_not_the_right_ones(robots, strategies):
+def test_condition_tells_a_prefix_that_has_measurements_enough_but_not_the_right_ones(robots, strategies):
     # One position of the end-effector cannot tell three joints that meet in a wrist apart.
-    found = identify(strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).readings(), 6).condition
+    found = identify(strategies["4-6DoF-after-3DoF"], data_of("kuka", 3, robots).measurements(), 6).condition
     assert np.isnan(found[0]).all() and (found[1:] < 1e5).all()
 
 
@@ -315,7 +315,7 @@ def test_prefix_information_is_the_sum_over_the_first_configurations():
 
 @pytest.mark.parametrize("name", ["6DoF-after-3DoF", "6DoF-after-3+3DoF"])
 def test_stages_before_one_that_identifies_every_joint_leave_no_trace(name, kuka, strategies):
-    readings = Data(kuka).readings()
+    measurements = Data(kuka).measurements()
     lasting = without_forgotten_stages(strategies[name], kuka.joints)
-    whole, short = (estimate_compliance(s, readings, kuka.joints)[0] for s in (strategies[name], lasting))
+    whole, short = (estimate_compliance(s, measurements, kuka.joints)[0] for s in (strategies[name], lasting))
     np.testing.assert_array_equal(short, whole)

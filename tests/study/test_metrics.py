@@ -63,7 +63,7 @@ def test_true_joint_compliances_leave_what_the_links_bend(kuka_extended):
 
 
 def test_true_compliances_have_no_error_at_a_target_off_the_flange(kuka):
-    # The target is shifted, the load stays at the end-effector (readings R5 and R6).
+    # The target is shifted, the load stays at the end-effector (interpretations R5 and R6).
     found = position_errors(judge_of(with_target_offset(kuka, (0.1, 0.2, 0.3))), kuka.compliance[None])
     np.testing.assert_allclose(found, 0, atol=1e-10)
 

@@ -112,7 +112,7 @@ def test_untransported_wrench_acts_at_the_measuring_point(kuka):
     assert np.abs(true_deflections(kuka, loads, point, "end_effector") - expected).max() > 1e-5
 
 
-def test_at_the_end_effector_both_readings_of_the_load_are_one(kuka):
+def test_at_the_end_effector_both_measurements_of_the_load_are_one(kuka):
     loads = random_loads(kuka, 2, 3)
     one, other = (true_deflections(kuka, loads, kuka.chain.end_effector, at) for at in ("end_effector", "measuring_point"))
     np.testing.assert_array_equal(one, other)

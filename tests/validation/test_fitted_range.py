@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from planted import planted
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import select_states
@@ -25,17 +25,17 @@ def fitted_part(robot, seed, fitted, unseen):
     return fit(declared.model.with_effects(added), own, declared.noise, declared.estimate.with_effects(added)), own, other
 
 
-def test_variances_are_those_without_the_readings_of_the_pose(fanuc):
+def test_variances_are_those_without_the_measurements_of_the_pose(fanuc):
     fitted, own, other = fitted_part(fanuc, 1, 9, 4)
     found, there = predictive_variances(fitted, own, fitted.model, fitted.estimate, other)
-    line = linearize(fitted.model, fitted.estimate, own, fitted.circumstances)
+    line = linearize(fitted.model, fitted.estimate, own, fitted.conditions)
     white, prior = fitted.whitened(line.sensitivities), [p.plausible**-2.0 for _, p in fitted.parameters]
     for pose in range(9):
         rest, here = white[own.cluster != pose], line.sensitivities[own.cluster == pose, :3]
         covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", rest, rest) + np.diag(prior))
         assert found[pose] == pytest.approx(np.einsum("mrp,pq,mrq->m", here, covariance, here).max(), rel=1e-6)
     covariance = np.linalg.inv(np.einsum("mrp,mrq->pq", white, white) + np.diag(prior))
-    around = circumstances(fitted.model, fitted.estimate, other.states)
+    around = conditions(fitted.model, fitted.estimate, other.states)
     away = linearize(fitted.model, fitted.estimate, other, around).sensitivities[:, :3]
     variance = np.einsum("mrp,pq,mrq->m", away, covariance, away)
     np.testing.assert_allclose(there, [variance[other.state == state].max() for state in range(8)], rtol=1e-6)

@@ -9,7 +9,7 @@ from planted import ELBOW_AND_HAND, planted
 from scipy.stats import t as student
 from synthetic import made_estimate, made_model, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit, fit_frames
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
@@ -59,13 +59,13 @@ def test_errors_are_distances_between_measured_and_predicted_positions(fanuc):
         np.testing.assert_allclose(found.distance, np.linalg.norm(moved.position - seen.position, axis=1), rtol=1e-9)
         assert found.cluster.tolist() == np.repeat(np.arange(4), 4).tolist()
         assert found.poses == 4
-        position = predict(model, estimate, moved, circumstances(model, estimate, states))[0]
+        position = predict(model, estimate, moved, conditions(model, estimate, states))[0]
         assert position.shape == (16, 3)
 
 
 @pytest.fixture
 def errors():
-    """Two models on poses of different numbers of readings, not in order."""
+    """Two models on poses of different numbers of measurements, not in order."""
     rng = np.random.default_rng(4)
     cluster = rng.permutation(np.repeat(np.arange(7), [1, 2, 3, 4, 5, 6, 7]))
     first = rng.random(len(cluster)) * (1 + cluster)
@@ -162,7 +162,7 @@ def test_nine_to_some_dozens_of_poses_have_intervals_that_hold(kind, poses):
 
 @pytest.mark.parametrize(("rows", "repeats"), [(3, 3), (6, 1)])
 def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
-    """Readings of the true model: joints that come to rest anew, and a sensor; repeats are averaged."""
+    """Measurements of the true model: joints that come to rest anew, and a sensor; repeats are averaged."""
     noise = Noise("repeats", 40e-6, 80e-6, np.array([30, 20, 25, 0, 10, 40]) * 1e-6, 1000)
     model = made_model(fanuc.chain, ELBOW_AND_HAND, rows, fitted_frames=False, compliance=fanuc.compliance)
     states = made_states(6, 20, seed=8, repeats=repeats)

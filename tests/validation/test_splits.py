@@ -53,8 +53,8 @@ def test_errors_are_those_of_a_fit_to_the_rest(fanuc):
     np.testing.assert_array_equal(found.cluster, seen.cluster)
 
 
-def test_readings_of_a_part_do_not_reach_its_prediction(fanuc):
-    """All readings of one block a metre off move the errors of that block, and its prediction by nothing."""
+def test_measurements_of_a_part_do_not_reach_its_prediction(fanuc):
+    """All measurements of one block a metre off move the errors of that block, and its prediction by nothing."""
     campaign = planted(fanuc, {}, poses=16)
     seen, fitted = campaign.observations, campaign.declared
     part = np.arange(16).repeat(2) // 4

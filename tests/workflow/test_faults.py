@@ -24,11 +24,11 @@ FAULTS = {
     ),
     "typo in a key of a section": (
         lambda study: study.replace("config.yaml", "wrench_at:", "wrench:"),
-        ["config.yaml: readings.wrench: ", "allowed: 'wrench_at'?"],
+        ["config.yaml: interpretations.wrench: ", "allowed: 'wrench_at'?"],
     ),
     "value outside its range": (
-        lambda study: study.configure({"readings": {"joint_range": "half_turn"}}),
-        ["config.yaml: readings.joint_range: ", "'half_turn'", "allowed: full_turn | limits"],
+        lambda study: study.configure({"interpretations": {"joint_range": "half_turn"}}),
+        ["config.yaml: interpretations.joint_range: ", "'half_turn'", "allowed: full_turn | limits"],
     ),
     "unknown strategy": (
         lambda study: study.configure({"strategies": ["6DoF", "3+6DoF-com"]}),
@@ -56,7 +56,12 @@ FAULTS = {
     ),
     "data set too short to solve": (
         lambda study: study.configure(
-            {"configurations": 1, "readings": {"measured": "position"}, "evaluation": {"lengths": [1]}, "tables": {"length": 1}}
+            {
+                "configurations": 1,
+                "interpretations": {"measured": "position"},
+                "evaluation": {"lengths": [1]},
+                "tables": {"length": 1},
+            }
         ),
         ["config.yaml: configurations: ", "found 1", "allowed: 2 or more"],
     ),

@@ -107,7 +107,7 @@ def test_every_file_of_the_contract_is_there(diagnosed, kuka):
 
 
 def test_residuals_and_figures_agree(diagnosed):
-    """Held-out figures are those of the residuals of the single readings, but for the repeats that they average."""
+    """Held-out figures are those of the residuals of the single measurements, but for the repeats that they average."""
     residuals = pq.ParquetFile(report(diagnosed, "residuals.parquet")).read().to_pandas().query("held_out")
     steps = pd.read_csv(report(diagnosed, "before_after.csv")).set_index("kind")
     for stage, kind in (("before", "declared"), ("after", "effect")):
@@ -252,8 +252,8 @@ def candidates(sites):
     return [Candidate(NAME, FAMILY, (2,), "", (Parameter("sag", "rad", 1e-3),), _displacement)]
 
 
-def _displacement(circumstances):
-    return [{1: np.cos(5 * circumstances.joint_angles[:, 1])}]
+def _displacement(conditions):
+    return [{1: np.cos(5 * conditions.joint_angles[:, 1])}]
 '''
 TINY = {
     "source": "simulated",
@@ -290,7 +290,7 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_is_a_file(cell):
     candidates, training = "reports/loop/made/candidates.parquet", "results/loop/tiny/training.parquet"
     cell.run(candidates, training, *OWN[1:])
     assert "sag@2" in pq.ParquetFile(cell.path(candidates)).read().column("candidate").to_pylist()
-    readings = pq.ParquetFile(cell.path(training)).read()
-    assert set(readings.column("pose").to_pylist()) < set(range(8))
+    measurements = pq.ParquetFile(cell.path(training)).read()
+    assert set(measurements.column("pose").to_pylist()) < set(range(8))
     planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")
     assert {job for job in planned if job[0] in STEPS} == {(step, "tiny") for step in STEPS[1:]}

@@ -71,17 +71,17 @@ def test_an_added_strategy_runs_no_job_of_the_others(finished):
 
 # Beside each switch, the first step whose results it changes: the steps before it have nothing to do.
 SWITCHES = {
-    "joint_range limits": ({"readings": {"joint_range": "limits"}}, "draw_experiments"),
-    "offset_frame tool": ({"readings": {"offset_frame": "tool"}}, "draw_experiments"),
-    "tool offset": ({"readings": {"tool_offset_m": [0.1, 0.05, 0.02]}}, "simulate"),
-    "wrench_at measuring_point": ({"readings": {"wrench_at": "measuring_point"}}, "simulate"),
+    "joint_range limits": ({"interpretations": {"joint_range": "limits"}}, "draw_experiments"),
+    "offset_frame tool": ({"interpretations": {"offset_frame": "tool"}}, "draw_experiments"),
+    "tool offset": ({"interpretations": {"tool_offset_m": [0.1, 0.05, 0.02]}}, "simulate"),
+    "wrench_at measuring_point": ({"interpretations": {"wrench_at": "measuring_point"}}, "simulate"),
     "position with tool offset": (
-        {"readings": {"measured": "position", "tool_offset_m": [0.1, 0.05, 0.02]}},
+        {"interpretations": {"measured": "position", "tool_offset_m": [0.1, 0.05, 0.02]}},
         "simulate",
     ),
-    "average compliance": ({"readings": {"average": "compliance"}}, "evaluate"),
-    "average median": ({"readings": {"average": "median"}}, "evaluate"),
-    "deviation_of each_data_set": ({"readings": {"deviation_of": "each_data_set"}}, "evaluate"),
+    "average compliance": ({"interpretations": {"average": "compliance"}}, "evaluate"),
+    "average median": ({"interpretations": {"average": "median"}}, "evaluate"),
+    "deviation_of each_data_set": ({"interpretations": {"deviation_of": "each_data_set"}}, "evaluate"),
     "solver gauss_newton": ({"identification": {"solver": "gauss_newton"}}, "identify"),
 }
 STEPS = ["draw_experiments", "simulate", "measure", "identify", "evaluate", "tabulate_strategies"]

@@ -10,7 +10,7 @@ from pathlib import Path
 from elastocal.campaigns.measurements import CSV, write_measurements
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.campaigns.simulation import Plan, simulated_measurements
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 
@@ -28,6 +28,6 @@ if __name__ == "__main__":
     names = {target["point"]: name for name, target in document["targets"].items()}
     table["target"] = [names[point] for point in table["target"]]
     path = given.folder / CSV
-    with appearing_whole(path) as partial:
+    with atomic_write(path) as partial:
         write_measurements(partial, table, robot.joints)
-    print(f"{len(table['pose'])} readings in {path}")
+    print(f"{len(table['pose'])} measurements in {path}")

@@ -30,7 +30,7 @@ except InputError as error:
 NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"
 CLASSICAL = config["tables"]["classical_strategy"]
-READINGS = config["readings"]
+INTERPRETATIONS = config["interpretations"]
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -87,7 +87,7 @@ def loop_reports(campaigns):
 
 
 def folds_of_one(campaigns):
-    """Campaigns that hold out the folds of the same readings, by the importer of these."""
+    """Campaigns that hold out the folds of the same measurements, by the importer of these."""
     folds = {}
     for name in campaigns:
         if "fold" in SOURCES[name]:

@@ -42,10 +42,10 @@ rule evaluate:
         robot=robot_document,
         strategy=strategy_document,
         seed=config["seed"],
-        tool_offset_m=READINGS["tool_offset_m"],
-        wrench_at=READINGS["wrench_at"],
-        average=READINGS["average"],
-        deviation_of=READINGS["deviation_of"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
+        average=INTERPRETATIONS["average"],
+        deviation_of=INTERPRETATIONS["deviation_of"],
         lengths=config["evaluation"]["lengths"],
     script:
         "../scripts/evaluate.py"
@@ -67,8 +67,8 @@ rule bound:
         robot=robot_document,
         point_sets=list(STUDY.points.values()),
         seed=config["seed"],
-        rows=rows_read(READINGS["measured"]),
-        tool_offset_m=READINGS["tool_offset_m"],
-        wrench_at=READINGS["wrench_at"],
+        rows=rows_read(INTERPRETATIONS["measured"]),
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
     script:
         "../scripts/bound.py"

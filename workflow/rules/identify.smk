@@ -20,9 +20,9 @@ rule judge_design:
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategy=strategy_document,
         seed=config["seed"],
-        rows=rows_read(READINGS["measured"]),
-        tool_offset_m=READINGS["tool_offset_m"],
-        wrench_at=READINGS["wrench_at"],
+        rows=rows_read(INTERPRETATIONS["measured"]),
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
     script:
         "../scripts/judge_design.py"
 
@@ -44,9 +44,9 @@ rule identify:
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategy=strategy_document,
         seed=config["seed"],
-        rows=rows_read(READINGS["measured"]),
-        tool_offset_m=READINGS["tool_offset_m"],
-        wrench_at=READINGS["wrench_at"],
+        rows=rows_read(INTERPRETATIONS["measured"]),
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
         start=(
             1e-6 * config["identification"]["start_urad_per_Nm"]
             if config["identification"]["solver"] == "gauss_newton"

@@ -37,9 +37,9 @@ rule compare_solvers:
         lengths_m=lambda wildcards: robot_document(wildcards).get("lengths_m", {}),
         strategies=list(STUDY.strategies.values()),
         seed=config["seed"],
-        rows=rows_read(READINGS["measured"]),
-        tool_offset_m=READINGS["tool_offset_m"],
-        wrench_at=READINGS["wrench_at"],
+        rows=rows_read(INTERPRETATIONS["measured"]),
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
         length=config["tables"]["length"],
         start=1e-6 * config["identification"]["start_urad_per_Nm"],
     script:

@@ -1,20 +1,20 @@
-"""A campaign's folder, checked, as tables: readings to fit and readings to test."""
+"""A campaign's folder, checked, as tables: measurements to fit and measurements to test."""
 
-from elastocal.campaigns.columns import reading_columns
+from elastocal.campaigns.columns import columns_of
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-from elastocal.loop.loading import taken_in
-from elastocal.loop.schemas import readings
+from elastocal.loop.loading import load_campaign
+from elastocal.loop.schemas import measurements
 
 from job import run
 
 
 def read_campaign(job):
-    descriptions, training, held_out = taken_in(job.params.folder, job.params.robots)
+    descriptions, training, held_out = load_campaign(job.params.folder, job.params.robots)
     for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
-        schema = readings(part.joint_angles.shape[1])
-        write_table(path, schema, [reading_columns(part)], provenance(descriptions, **job.wildcards))
+        schema = measurements(part.joint_angles.shape[1])
+        write_table(path, schema, [columns_of(part)], provenance(descriptions, **job.wildcards))
     write_json(job.output.descriptions, descriptions)
 
 

@@ -14,13 +14,13 @@ TABLE_2_MEAN_M = 1.749e-3
 if __name__ == "__main__":
     config = read_document("config.yaml")
     robot = robot_from_document(read_document("config/robots/kuka_extended.yaml"))
-    readings = {key: config["readings"][key] for key in ("offset_frame", "joint_range")}
+    measurements = {key: config["interpretations"][key] for key in ("offset_frame", "joint_range")}
     experiments = random_experiments(
         robot.chain,
         robot.joint_limits,
         config["seed"],
         "kuka_extended",
-        Loading(**config["loading"], **readings),
+        Loading(**config["loading"], **measurements),
         "identification",
         range(config["data_sets"]),
         config["configurations"],

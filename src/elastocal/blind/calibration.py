@@ -2,7 +2,7 @@
 
 A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". What is true of a case is the set of
 its mechanisms. Of a mechanism that the catalogue does not have every set that holds "other" is true; one that the joint
-compliances absorb at any size is as good as nothing, and no reading could tell the two apart.
+compliances absorb at any size is as good as nothing, and no measurement could tell the two apart.
 """
 
 import numpy as np

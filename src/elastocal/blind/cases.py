@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from elastocal.blind.folders import write_blind_campaign, write_truth
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import FLANGE, Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
@@ -136,7 +136,7 @@ class Case:
     setting : str
         Key of `SETTINGS`, or of `SWEEP_DESIGNS` in a sweep.
     seed : int
-    rival : str
+    alternative : str
         In a sweep the near relative of the effect; otherwise empty.
     """
 
@@ -147,7 +147,7 @@ class Case:
     levels: tuple
     setting: str
     seed: int
-    rival: str = ""
+    alternative: str = ""
 
     @property
     def name(self):
@@ -293,13 +293,21 @@ def cases_of(counts, seed):
     """
     found = []
 
-    def add(group, effects, levels, setting, number, rival=""):
-        if set((*effects, rival)) & set(impossible_on(robot)):
+    def add(group, effects, levels, setting, number, alternative=""):
+        if set((*effects, alternative)) & set(impossible_on(robot)):
             return
-        words = [group, robot, *effects, *(f"{level:g}" for level in levels), setting, str(number), *([rival] if rival else [])]
+        words = [
+            group,
+            robot,
+            *effects,
+            *(f"{level:g}" for level in levels),
+            setting,
+            str(number),
+            *([alternative] if alternative else []),
+        ]
         key = "/".join(words)
         digest = hashlib.sha256(f"{counts.purpose or 'blind'}/{seed}/{key}".encode()).digest()
-        found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little"), rival))
+        found.append(Case(key, group, robot, effects, levels, setting, int.from_bytes(digest[:6], "little"), alternative))
 
     for share, robot in [(part, robot) for part in (counts, *counts.also) for robot in part.robots]:
         for number in range(share.none):
@@ -328,10 +336,10 @@ def cases_of(counts, seed):
             for setting, effects in _UNSEEN.items():
                 for effect in effects:
                     add("setting", (effect,), (_HIGH,), setting, number)
-        for effect, rival in (*SWEEP_PAIRS, *(pair[::-1] for pair in SWEEP_PAIRS)):
+        for effect, alternative in (*SWEEP_PAIRS, *(pair[::-1] for pair in SWEEP_PAIRS)):
             for design in SWEEP_DESIGNS:
                 for number in range(share.sweep):
-                    add("sweep", (effect,), (SWEEP_LEVEL,), design, number, rival)
+                    add("sweep", (effect,), (SWEEP_LEVEL,), design, number, alternative)
     return sorted(found, key=lambda case: case.name)
 
 
@@ -416,9 +424,9 @@ def defects_of(case, robot, design):
 
     Notes
     -----
-    Where a place has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is drawn; of
-    eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the raw
-    non-centrality is taken instead, and the truth says so: nothing can find that.
+    Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
+    drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
+    raw non-centrality is taken instead, and the ground truth says so: nothing can find that.
     """
     if not case.effects:
         return []
@@ -439,22 +447,24 @@ def _drawn(case, robot, effect, seed):
     """Defects of plausible size that belong together: one, or one mechanism at several joints."""
     arm, draws = robot.arm, stream(seed, f"joints of {effect}")
     if case.group == SEVERAL_JOINTS:
-        places = KINDS[effect].places(arm)
-        count = draws.integers(min(_FEWEST_JOINTS, len(places)), len(places) + 1)
-        chosen, plausible = sorted(draws.choice(len(places), count, replace=False)), KINDS[effect].plausible_on(arm)
-        return [Defect(effect, places[place], plausible * draws.uniform(0.5, 1.5), seed + place) for place in chosen]
+        locations = KINDS[effect].locations(arm)
+        count = draws.integers(min(_FEWEST_JOINTS, len(locations)), len(locations) + 1)
+        chosen, plausible = sorted(draws.choice(len(locations), count, replace=False)), KINDS[effect].plausible_on(arm)
+        return [
+            Defect(effect, locations[location], plausible * draws.uniform(0.5, 1.5), seed + location) for location in chosen
+        ]
     defect = drawn_defect(effect, arm, seed)
     if case.group == UNDECLARED:
-        # The last of its places: of all links.
-        return [replace(defect, joints=KINDS[effect].places(arm)[-1])]
+        # The last of its locations: of all links.
+        return [replace(defect, joints=KINDS[effect].locations(arm)[-1])]
     if case.group == GEAR_GRAVITY:
         torque = usual_gravity_torque(arm, on_stretches(declared_masses(arm), arm), arm.gravity_m_s2)
         defect = replace(defect, joints=(int(draws.choice(np.flatnonzero(torque > _CARRIES * torque.max()))) + 1,))
     return [defect]
 
 
-def angle_to_rival(case, robot, design, bad):
-    """Smallest angle between what a case's defects and its rival, wherever that may sit, make off the compliances, degrees.
+def angle_to_alternative(case, robot, design, bad):
+    """Smallest angle between the contributions of a case's defects and of its alternative at any location, degrees.
 
     Parameters
     ----------
@@ -468,14 +478,14 @@ def angle_to_rival(case, robot, design, bad):
     -------
     float
     """
-    kind, yardstick = KINDS[case.rival], _yardstick(case, robot, design)
+    kind, yardstick = KINDS[case.alternative], _yardstick(case, robot, design)
 
-    def at(place):
-        """Rivals whose details differ and which together span what there is at a place."""
-        defects = [Defect(case.rival, place, kind.plausible_on(robot.arm), case.seed + draw) for draw in range(_DRAWS)]
+    def at(location):
+        """Alternatives whose details differ and which together span what there is at a location."""
+        defects = [Defect(case.alternative, location, kind.plausible_on(robot.arm), case.seed + draw) for draw in range(_DRAWS)]
         return [with_defects(robot, [defect]) for defect in defects]
 
-    return min(yardstick.angle_deg(bad, at(place)) for place in kind.places(robot.arm))
+    return min(yardstick.angle_deg(bad, at(location)) for location in kind.locations(robot.arm))
 
 
 def _yardstick(case, robot, design):
@@ -544,8 +554,8 @@ def make_case(case, blind_folder, sealed_folder, robots_folder):
     schedule, declared = schedule_of(robot.arm, design, case.seed), declared_of(case, robot.arm)
     made = write_blind_campaign(folder, case.name, robot_file(case, robots_folder), bad, design, schedule, declared)
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | told for defect, told in sized]}
-    if case.rival:
-        truth["rival"] = {"effect": case.rival, "angle_deg": angle_to_rival(case, robot, design, bad)}
+    if case.alternative:
+        truth["alternative"] = {"effect": case.alternative, "angle_deg": angle_to_alternative(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
 
 
@@ -558,7 +568,7 @@ def write_manifest(path, digests):
     digests : dict of str to str
         By the name of the case.
     """
-    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
         file.writelines(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items()))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 import yaml
 
 from elastocal.campaigns.writing import write_campaign
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 from elastocal.plant.campaigns import measured_table
 from elastocal.plant.dynamic import DYNAMIC, dynamic_table
 
@@ -99,19 +99,19 @@ def write_blind_campaign(folder, name, robot_file, robot, design, schedule, decl
         "declared_masses": [asdict(mass) for mass in declared],
         "noise": {name: getattr(robot.tracker, name) for name in ("sigma_m", "sigma_m_per_m", "sigma_rad")},
         "outliers": [list(outlier) for outlier in outliers],
-        "readings": len(table["pose"]),
+        "measurements": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
     }
 
 
-def write_dynamic_campaign(folder, name, robot_file, robot, readings, seed, declared=()):
-    """Measure a moving arm, and write what the analyst gets: for benchmarks of many readings.
+def write_dynamic_campaign(folder, name, robot_file, robot, measurements, seed, declared=()):
+    """Measure a moving arm, and write what the analyst gets: for benchmarks of many measurements.
 
     Parameters
     ----------
     folder, name, robot_file, robot, declared
         As in `write_blind_campaign`.
-    readings : int
+    measurements : int
         At 1,000 a second, without a load.
     seed : int
     """
@@ -121,14 +121,14 @@ def write_dynamic_campaign(folder, name, robot_file, robot, readings, seed, decl
         "noise": {"position_m": robot.tracker.sigma_m},
         "holdout": {"fraction": 0.3, "seed": 1},
     }
-    write_campaign(folder, document, dynamic_table(robot, readings, seed), robot.arm.joints, "parquet")
+    write_campaign(folder, document, dynamic_table(robot, measurements, seed), robot.arm.joints, "parquet")
     _write_robot(folder, robot_file, robot, declared)
 
 
 def _write_robot(folder, robot_file, robot, declared):
     described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
-    with appearing_whole(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
+    with atomic_write(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
         yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
 
 
@@ -156,6 +156,6 @@ def write_truth(path, truth, campaign_folder):
         raise ValueError(f"{path}: the truth must not lie in the campaign's folder {folder}")
     text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
-    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
         file.write(text)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -10,7 +10,7 @@ from elastocal.blind.rates import rate
 from elastocal.blind.scores import outcome
 from elastocal.diagnosis.verdict import CLASS
 
-_CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "foreseen", "arm", "poses_added"]
+_CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "promised", "arm", "poses_added"]
 _CASE_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
 _COLUMNS = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high", "still_class", "wrong_name", "other_verdict"]
 _PROMISE_COLUMNS = ["robots", "quantity", "hits", "cases", "rate", "low", "high", "target", "holds"]
@@ -19,7 +19,7 @@ PROMISE = 16.0
 _POSES_COLUMNS = ["robots", "arm", "cases", "reached", "median_poses"]
 
 
-def followed(truths, first, anew, foreseen):
+def followed(truths, first, anew, promised):
     """What was said of each case followed up, after each number of poses.
 
     Parameters
@@ -30,8 +30,8 @@ def followed(truths, first, anew, foreseen):
         Verdicts on the campaigns as they were.
     anew : sequence of dict
         ``campaign, arm, poses, verdict``: verdicts on the campaigns with further poses.
-    foreseen : dict of str to float
-        Separation that the proposal promises from the nearest rival with all its poses.
+    promised : dict of str to float
+        Separation that the proposal promises from the nearest alternative with all its poses.
 
     Returns
     -------
@@ -45,7 +45,7 @@ def followed(truths, first, anew, foreseen):
             verdict = first[name]
             for poses in (0, *POSES):
                 verdict = said.get((name, arm, poses), verdict)
-                rows.append({"arm": arm, "poses_added": poses, "foreseen": foreseen[name]} | outcome(truths[name], verdict))
+                rows.append({"arm": arm, "poses_added": poses, "promised": promised[name]} | outcome(truths[name], verdict))
     return pd.DataFrame(rows, columns=_CASE_COLUMNS)
 
 
@@ -61,7 +61,7 @@ def promised(proposals):
 
 
 def with_one_effect(cases):
-    """Which rows are of cases that a single name can be right for: one effect of the catalogue that readings can show."""
+    """Which rows are of cases that a single name can be right for: one effect of the catalogue that measurements can show."""
     groups = ("single", "setting", "sweep", SEVERAL_JOINTS, GEAR_GRAVITY, UNDECLARED)
     return cases["group"].isin(groups) & ~cases["truth"].isin(("none", "force_scale"))
 
@@ -71,7 +71,7 @@ def with_prospects(cases):
 
     The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
     """
-    return cases["foreseen"] >= PROMISE
+    return cases["promised"] >= PROMISE
 
 
 def promises_kept(cases):
@@ -88,7 +88,7 @@ def promises_kept(cases):
         One row for each kind of robots and quantity, with its target: the right name alone after all poses, of the cases whose
         proposal promises a separation of at least `PROMISE`; and the ratio of proposed to random poses in that.
     """
-    last = cases[(cases["poses_added"] == max(POSES)) & (cases["foreseen"] >= PROMISE)]
+    last = cases[(cases["poses_added"] == max(POSES)) & (cases["promised"] >= PROMISE)]
     rows = []
     for robots, part in last.groupby("robots"):
         kept = {arm: rate(part.loc[part["arm"] == arm, "named_right"]) for arm in ARMS}

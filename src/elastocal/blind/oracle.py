@@ -1,8 +1,8 @@
 """The oracle: what the same fit does when it is told which effects there are and at which joints.
 
-It has the readings, the noise and the held-out poses of the diagnosis, so that what it does better is worth what the search for
-the effect has cost. It is told the effect by its name in the catalogue, not the plant's law; nor which variant of it (axes, by
-time or by temperature): of these it takes the one that the residual of the declared model speaks for.
+It has the measurements, the noise and the held-out poses of the diagnosis, so that what it does better is worth what the search
+for the effect has cost. It is told the effect by its name in the catalogue, not the plant's law; nor which variant of it (axes,
+by time or by temperature): of these it takes the one that the residual of the declared model speaks for.
 """
 
 from dataclasses import replace
@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from elastocal.diagnosis.diagnose import Step
 from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.search import first_look
+from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import noise_from
 from elastocal.fitting.least_squares import fit
@@ -52,7 +52,7 @@ def oracle(truth, verdict, folder, robots_folder, seed):
         # Without an effect the declared model is the right one, and has been judged already.
         return _told((), 1.0, verdict["heldout"]["before"])
     case, unseen = cases_in(folder, robots_folder)
-    declared = fit(case.model, case.observations, noise_from(verdict).of_readings)
+    declared = fit(case.model, case.observations, noise_from(verdict).of_measurements)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
     _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)
@@ -87,7 +87,7 @@ def _with_effects(declared, case, effects):
     for effect, joints in effects:
         listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
         problem = linearized(declared, case.observations, listed, settings).problem
-        factors = first_look(problem)[1]
+        factors = initial_screening(problem)[1]
         # Each at the shape that fits best.
         best = {}
         for number, unit in enumerate(problem.units):

@@ -23,19 +23,26 @@ def swept(truths, verdicts):
     Returns
     -------
     pandas.DataFrame
-        One row a case: pair, truth, design, angle_deg of the rival on the plant, verdict_angle_deg of the nearest that the
-        analysis saw, verdict, found, outcome.
+        One row a case: pair, truth, design, angle_deg of the alternative on the plant, verdict_angle_deg of the nearest that
+        the analysis saw, verdict, found, outcome.
     """
     columns = ["case", "robot", "pair", "truth", "design", "angle_deg", "verdict_angle_deg", "verdict", "found", "outcome"]
     rows = []
     for name, truth in truths.items():
         if truth["case"]["group"] != "sweep":
             continue
-        row, rival, angles = outcome(truth, verdicts[name]), truth["rival"], _angles(verdicts[name])
-        pair = " / ".join(sorted((row["truth"], rival["effect"])))
+        row, alternative, angles = outcome(truth, verdicts[name]), truth["alternative"], _angles(verdicts[name])
+        pair = " / ".join(sorted((row["truth"], alternative["effect"])))
         said = "right" if row["named_right"] else "wrong" if row["wrong_name"] else "other"
         said = "class" if row["verdict"] == "class" and row["holds_truth"] else said
-        shown = row["truth"], row["setting"], rival["angle_deg"], min(angles, default=np.nan), row["verdict"], row["found"]
+        shown = (
+            row["truth"],
+            row["setting"],
+            alternative["angle_deg"],
+            min(angles, default=np.nan),
+            row["verdict"],
+            row["found"],
+        )
         rows.append((name, row["robot"], pair, *shown, said))
     return pd.DataFrame(rows, columns=columns)
 

@@ -1,4 +1,4 @@
-"""What a measured campaign is: its targets, its readings and what it declares of itself."""
+"""What a measured campaign is: its targets, its measurements and what it declares of itself."""
 
 from dataclasses import dataclass, fields
 
@@ -31,8 +31,8 @@ class Target:
 
 
 @dataclass(frozen=True)
-class Readings:
-    """One entry for each reading of one target; arrays of N.
+class Measurements:
+    """One entry for each measurement of one target; arrays of N.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Readings:
         return len(self.pose)
 
     def select(self, mask_or_index):
-        """The readings of a mask or of an index array, in its order.
+        """The measurements of a mask or of an index array, in its order.
 
         Parameters
         ----------
@@ -81,10 +81,10 @@ class Readings:
 
         Returns
         -------
-        Readings
+        Measurements
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Readings(**{name: None if array is None else array[mask_or_index] for name, array in arrays.items()})
+        return Measurements(**{name: None if array is None else array[mask_or_index] for name, array in arrays.items()})
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ class Campaign:
         ``position_m`` and maybe ``orientation_rad``, where the campaign declares them.
     holdout : dict
         ``fraction`` and ``seed``, ``blocks`` and ``seed``, ``session``, ``poses`` or ``campaign``.
-    readings : Readings
+    measurements : Measurements
     """
 
     name: str
@@ -118,10 +118,10 @@ class Campaign:
     declared: tuple
     noise: dict | None
     holdout: dict
-    readings: Readings
+    measurements: Measurements
 
 
-def described_campaign(document, robot, readings, source):
+def described_campaign(document, robot, measurements, source):
     """A campaign from its parts, which have been checked before.
 
     Parameters
@@ -129,7 +129,7 @@ def described_campaign(document, robot, readings, source):
     document : dict
         Contents of ``campaign.yaml``.
     robot : Robot
-    readings : Readings
+    measurements : Measurements
     source : str
         Named in errors.
 
@@ -147,7 +147,7 @@ def described_campaign(document, robot, readings, source):
         declared=tuple(document.get("declared", ())),
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
-        readings=readings,
+        measurements=measurements,
     )
 
 

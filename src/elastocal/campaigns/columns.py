@@ -1,30 +1,30 @@
-"""Readings to columns of tables and back."""
+"""Measurements to columns of tables and back."""
 
 import numpy as np
 
-from elastocal.campaigns.campaign import Readings
+from elastocal.campaigns.campaign import Measurements
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 
 IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 
 
-def reading_columns(readings):
-    """Columns of the readings table."""
-    count, joints = readings.joint_angles.shape
-    columns = {name: getattr(readings, name) for name in IDENTITY}
-    columns |= {f"q{j + 1}": readings.joint_angles[:, j] for j in range(joints)}
-    columns |= dict(zip(WRENCH_NAMES, readings.wrench.T, strict=True))
-    columns |= dict(zip("xyz", readings.position.T, strict=True))
-    columns |= dict(zip(("rx", "ry", "rz"), _or_missing(readings.rotation_vector, (count, 3)).T, strict=True))
-    approach = _or_missing(readings.approach, (count, joints))
+def columns_of(measurements):
+    """Columns of the measurements table."""
+    count, joints = measurements.joint_angles.shape
+    columns = {name: getattr(measurements, name) for name in IDENTITY}
+    columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
+    columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
+    columns |= dict(zip("xyz", measurements.position.T, strict=True))
+    columns |= dict(zip(("rx", "ry", "rz"), _or_missing(measurements.rotation_vector, (count, 3)).T, strict=True))
+    approach = _or_missing(measurements.approach, (count, joints))
     columns |= {f"approach{j + 1}": approach[:, j] for j in range(joints)}
-    return columns | {name: _or_missing(getattr(readings, name), (count,)) for name in ("time_s", "temperature_c")}
+    return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c")}
 
 
-def readings_from(columns):
-    """Readings from the columns of their table."""
+def measurements_from(columns):
+    """Measurements from the columns of their table."""
     joints = sum(name.startswith("approach") for name in columns)
-    return Readings(
+    return Measurements(
         **{name: columns[name] for name in IDENTITY},
         joint_angles=np.column_stack([columns[f"q{j}"] for j in range(1, joints + 1)]),
         wrench=np.column_stack([columns[name] for name in WRENCH_NAMES]),
@@ -36,14 +36,14 @@ def readings_from(columns):
     )
 
 
-def residual_columns(readings, held_out, outside, position, before, after):
+def residual_columns(measurements, held_out, outside, position, before, after):
     """Columns of the residuals table."""
-    count, joints = readings.joint_angles.shape
-    columns = {name: getattr(readings, name) for name in IDENTITY}
+    count, joints = measurements.joint_angles.shape
+    columns = {name: getattr(measurements, name) for name in IDENTITY}
     columns |= {"held_out": np.full(count, held_out), "outside_range": outside}
-    columns |= {"time_s": _or_missing(readings.time_s, (count,))}
-    columns |= {f"q{j + 1}": readings.joint_angles[:, j] for j in range(joints)}
-    columns |= dict(zip(WRENCH_NAMES, readings.wrench.T, strict=True))
+    columns |= {"time_s": _or_missing(measurements.time_s, (count,))}
+    columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
+    columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
     columns |= dict(zip("xyz", position.T, strict=True))
     for stage, residual in (("before", before), ("after", after)):
         whole = np.full((count, 6), np.nan)

@@ -13,7 +13,7 @@ FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 
 
 def split(campaign):
-    """Readings to fit and readings to test, parted by whole poses.
+    """Measurements to fit and measurements to test, parted by whole poses.
 
     Parameters
     ----------
@@ -21,21 +21,21 @@ def split(campaign):
 
     Returns
     -------
-    training, held_out : Readings
-        In the order of the file, on which the choice of poses does not depend. Where another campaign is the test, all readings
-        are training and `held_out` is empty: see `reading.held_out_campaign`.
+    training, held_out : Measurements
+        In the order of the file, on which the choice of poses does not depend. Where another campaign is the test, all
+        measurements are training and `held_out` is empty: see `reading.held_out_campaign`.
 
     Raises
     ------
     InputError
         Too few poses, or poses that are not there.
     """
-    held_out = held_out_mask(campaign.holdout, campaign.readings, campaign.name)
-    return campaign.readings.select(~held_out), campaign.readings.select(held_out)
+    held_out = held_out_mask(campaign.holdout, campaign.measurements, campaign.name)
+    return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
 
 
 def holdout_from(described, folder, source):
-    """How a campaign parts its readings, in one way and with a seed where the poses are drawn.
+    """How a campaign parts its measurements, in one way and with a seed where the poses are drawn.
 
     Parameters
     ----------
@@ -67,14 +67,14 @@ def holdout_from(described, folder, source):
     return {"seed": 1} | described if drawn else dict(described)
 
 
-def held_out_mask(holdout, readings, source):
-    """Which readings are held out.
+def held_out_mask(holdout, measurements, source):
+    """Which measurements are held out.
 
     Parameters
     ----------
     holdout : dict
         As from `holdout_from`.
-    readings : Readings
+    measurements : Measurements
     source : str
         Named in errors.
 
@@ -87,13 +87,13 @@ def held_out_mask(holdout, readings, source):
     InputError
         Too few poses, or poses that are not there.
     """
-    pairs, index = measured_poses(readings)
+    pairs, index = measured_poses(measurements)
     total = len(pairs)
     if "campaign" in holdout:
         if total < FEWEST_TRAINING_POSES:
             raise InputError(source, "holdout", f"{total} poses to fit", f"{FEWEST_TRAINING_POSES} or more poses")
         return np.zeros(len(index), bool)
-    chosen = _chosen_poses(holdout, readings, pairs, index, source)
+    chosen = _chosen_poses(holdout, measurements, pairs, index, source)
     held_out = int(chosen.sum())
     if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
         found = f"{total - held_out} poses to fit and {held_out} held out"
@@ -103,26 +103,26 @@ def held_out_mask(holdout, readings, source):
     return chosen[index]
 
 
-def measured_poses(readings):
+def measured_poses(measurements):
     """The poses that were measured, each once.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     pairs : ndarray of int32 (P, 2)
         Session and pose, sorted.
     index : ndarray of int (N,)
-        Of each reading's pair.
+        Of each measurement's pair.
     """
-    pairs = np.column_stack([readings.session, readings.pose])
+    pairs = np.column_stack([measurements.session, measurements.pose])
     first, index = groups_of(pairs)
     return pairs[first], index
 
 
-def _chosen_poses(holdout, readings, pairs, index, source):
+def _chosen_poses(holdout, measurements, pairs, index, source):
     """Mask (P,) of the poses that are held out; `pairs` and `index` as of `measured_poses`."""
     total, chosen = len(pairs), np.zeros(len(pairs), bool)
     if "poses" in holdout:
@@ -146,8 +146,8 @@ def _chosen_poses(holdout, readings, pairs, index, source):
     if "blocks" in holdout:
         if holdout["blocks"] > total:
             raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as poses, {total}")
-        middle = np.zeros((total, readings.joint_angles.shape[1]))
-        np.add.at(middle, index, readings.joint_angles)
+        middle = np.zeros((total, measurements.joint_angles.shape[1]))
+        np.add.at(middle, index, measurements.joint_angles)
         return blocks(middle / np.bincount(index)[:, None], holdout["blocks"]) == draws.integers(holdout["blocks"])
     chosen[draws.permutation(total)[: round(holdout["fraction"] * total)]] = True
     return chosen

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-# A joint that moves less than readings of one pose may differ tells no poses apart.
+# A joint that moves less than measurements of one pose may differ tells no poses apart.
 _STILL_RAD = 0.02
 _ROUNDS = 100
 # How often a pose drawn like the others, from a box, is called beyond their range.
@@ -60,8 +60,8 @@ def beyond_range(fitted_angles, joint_angles):
 
     Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
     range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics (David and
-    Nagaraja 2003, section 6.4). The margin is the t that makes this 5 %, or what readings of one pose may differ: without one,
-    half of the random poses beside 20 others would be called outside.
+    Nagaraja 2003, section 6.4). The margin is the t that makes this 5 %, or what measurements of one pose may differ: without
+    one, half of the random poses beside 20 others would be called outside.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from elastocal.mechanics.components import WRENCH
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 
 
-def measurement_columns(joints):
+def file_columns(joints):
     """Every column that a file of measurements may have.
 
     Parameters
@@ -56,7 +56,7 @@ def read_measurements(folder, joints, measured):
 
     Returns
     -------
-    Measurements
+    MeasurementFile
 
     Raises
     ------
@@ -70,8 +70,8 @@ def read_measurements(folder, joints, measured):
     path = there[0].as_posix()
     columns, rows = (_read_csv if there[0].name == CSV else _read_parquet)(path)
     if len(rows) == 0:
-        raise InputError(path, "", "no row of data", "one row for each reading of one target")
-    return Measurements(path, columns, rows, joints, measured)
+        raise InputError(path, "", "no row of data", "one row for each measurement of one target")
+    return MeasurementFile(path, columns, rows, joints, measured)
 
 
 def check_column_names(names, joints, path):
@@ -89,7 +89,7 @@ def check_column_names(names, joints, path):
     InputError
         The first such column.
     """
-    known = measurement_columns(joints)
+    known = file_columns(joints)
     for name in names:
         if name not in known:
             # That q7 is unknown tells little where nobody says of how many joints the robot is.
@@ -106,10 +106,10 @@ def write_measurements(path, table, joints):
     path : str
         Holds CSV where the name of the file that it stands for begins with that of `CSV`, else Parquet.
     table : dict of str to sequence
-        Columns of one length, named as in `measurement_columns`.
+        Columns of one length, named as in `file_columns`.
     joints : int
     """
-    columns = [column for name, column in measurement_columns(joints).items() if name in table]
+    columns = [column for name, column in file_columns(joints).items() if name in table]
     (_write_csv if Path(path).name.startswith(CSV) else _write_parquet)(path, columns, table)
 
 
@@ -123,7 +123,7 @@ def _read_csv(path):
     except csv.Error as error:
         raise InputError(path, "", str(error), "comma-separated values") from None
     if not lines:
-        raise InputError(path, "", "an empty file", "a header and one row for each reading of one target")
+        raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
     header = [cell.strip() for cell in lines[0]]
     if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
         raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
@@ -158,7 +158,7 @@ def _check_header(path, names):
             raise InputError(path, "header", f"column {name!r} twice", "each column once")
 
 
-class Measurements:
+class MeasurementFile:
     """A file of measurements, whose columns are checked as they are asked for.
 
     Attributes
@@ -174,7 +174,7 @@ class Measurements:
 
     def __init__(self, path, columns, rows, joints, measured):
         self.path, self.columns, self.rows = path, columns, rows
-        known = measurement_columns(joints)
+        known = file_columns(joints)
         self.angles = [f"q{j}" for j in range(1, joints + 1)]
         self.approach = [f"approach{j}" for j in range(1, joints + 1)]
         self.wrench = [name for name, _, _ in WRENCH]
@@ -193,7 +193,7 @@ class Measurements:
         return InputError(self.path, key, found, allowed)
 
     def cell_fault(self, index, name, found, allowed):
-        """InputError of one cell; `index` counts the readings."""
+        """InputError of one cell; `index` counts the measurements."""
         return self.fault(f"row {self.rows[index]}, column {name}", found, allowed)
 
     def has(self, names):

@@ -1,7 +1,7 @@
 """A campaign's folder, read and checked before anything is fitted to it.
 
-A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or ``measurements.parquet``, one row for each reading of
-one target. All that can be told wrong without fitting anything is refused here, in one line; a unit that only a fit can tell
+A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or ``measurements.parquet``, one row for each measurement
+of one target. All that can be told wrong without fitting anything is refused here, in one line; a unit that only a fit can tell
 wrong is left for the diagnosis to trace.
 """
 
@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Readings, described_campaign, targets_from
+from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Measurements, described_campaign, targets_from
 from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses
+from elastocal.campaigns.measurement_checks import check_angles, check_measurements
 from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_measurements, shown
-from elastocal.campaigns.reading_checks import check_angles, check_readings
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
@@ -49,10 +49,10 @@ def read_campaign(folder, robots_folder, effects=None):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
     table = read_measurements(folder, robot.joints, document["measured"])
-    readings = _readings(table, robot, targets)
-    check_readings(readings, table, robot, targets, source)
-    held_out_mask(holdout, readings, source)
-    return described_campaign(document | {"holdout": holdout}, robot, readings, source)
+    measurements = _measurements(table, robot, targets)
+    check_measurements(measurements, table, robot, targets, source)
+    held_out_mask(holdout, measurements, source)
+    return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
 
 
 def read_descriptions(folder, robots_folder):
@@ -141,7 +141,7 @@ def held_out_campaign(campaign, folder, robots_folder, effects=None):
     Returns
     -------
     Campaign or None
-        With its own targets and frame; all of its readings are for the test. None where this campaign holds out its own.
+        With its own targets and frame; all of its measurements are for the test. None where this campaign holds out its own.
 
     Raises
     ------
@@ -157,7 +157,7 @@ def held_out_campaign(campaign, folder, robots_folder, effects=None):
         raise InputError(
             source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
         )
-    poses = len(measured_poses(other.readings)[0])
+    poses = len(measured_poses(other.measurements)[0])
     if poses < FEWEST_HELD_OUT_POSES:
         raise InputError(source, key, f"{poses} poses there", f"{FEWEST_HELD_OUT_POSES} or more")
     return other
@@ -179,7 +179,7 @@ def folds_of(folder, robots_folder, number, of):
     -------
     dict
     """
-    pairs = measured_poses(read_campaign(folder, robots_folder).readings)[0]
+    pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}
 
 
@@ -194,7 +194,7 @@ def _robot_path(name, folder, robots_folder, source):
     return path
 
 
-def _readings(table, robot, targets):
+def _measurements(table, robot, targets):
     reported = table.numbers(table.angles)
     check_angles(reported, table, robot)
     names = {target.name: index for index, target in enumerate(targets)}
@@ -213,7 +213,7 @@ def _readings(table, robot, targets):
             raise table.cell_fault(index, table.approach[joint], f"{senses[index, joint]:g}", "-1, 0 or 1")
         # Where a joint of the model follows two reported ones that came from opposite sides, its own sense is not known.
         approach = np.sign(senses @ robot.reported_matrix.T)
-    return Readings(
+    return Measurements(
         session=table.integers("session") if table.has(["session"]) else np.zeros(len(table.rows), np.int32),
         pose=table.integers("pose"),
         load=table.integers("load"),

@@ -30,7 +30,7 @@ class Plan:
     repeats, repeated_poses : int
         How often the loads 0 and 1 of the first poses are approached.
     noise_m, noise_rad : float
-        Standard deviation of each component of a reading.
+        Standard deviation of each component of a measurement.
     """
 
     points: tuple
@@ -45,7 +45,7 @@ class Plan:
 
 
 def simulated_measurements(robot, plan, seed, name):
-    """Readings of a robot with elastic joints and, where it has them, elastic links.
+    """Measurements of a robot with elastic joints and, where it has them, elastic links.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def simulated_measurements(robot, plan, seed, name):
     coordinates = np.zeros((len(pose), chain.coordinates))
     coordinates[:, : robot.joints] = angles[pose]
     jacobian = poses_and_jacobians(chain, coordinates, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-    bent = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(robot)
+    deflected = coordinates + generalized_forces(jacobian, wrench) @ spring_compliance(robot)
     parts = []
     for point in plan.points:
-        position, rotation = poses(chain, bent, chain.point(point))
+        position, rotation = poses(chain, deflected, chain.point(point))
         position = position + plan.noise_m * draws.standard_normal(position.shape)
         turned = Rotation.from_rotvec(plan.noise_rad * draws.standard_normal(position.shape)) * Rotation.from_matrix(rotation)
         part = {"pose": pose, "load": load, "repeat": repeat, "target": np.full(len(pose), point)}

@@ -6,7 +6,7 @@ import yaml
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, write_measurements
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.documents import check_document
 
 
@@ -20,7 +20,7 @@ def write_campaign(folder, document, table, joints, kind="parquet"):
     document : dict
         Contents of ``campaign.yaml``.
     table : dict of str to sequence
-        Columns of one length, named as in `measurement_columns`.
+        Columns of one length, named as in `file_columns`.
     joints : int
     kind : {"parquet", "csv"}
 
@@ -34,10 +34,10 @@ def write_campaign(folder, document, table, joints, kind="parquet"):
     path = folder / (PARQUET if kind == "parquet" else CSV)
     check_column_names(table, joints, path.as_posix())
     folder.mkdir(parents=True, exist_ok=True)
-    with appearing_whole(path) as partial:
+    with atomic_write(path) as partial:
         write_measurements(partial, table, joints)
         # From here to its document the folder is no campaign; nor may it hold measurements of both kinds.
         for name in (DOCUMENT, CSV, PARQUET):
             (folder / name).unlink(missing_ok=True)
-    with appearing_whole(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
+    with atomic_write(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
         yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)

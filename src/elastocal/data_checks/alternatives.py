@@ -1,7 +1,7 @@
-"""Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the readings then fit.
+"""Other ways to read the file: senses of joints, axes, units, frames and targets, compared by how well the data then fit.
 
-One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the readings as written are
-absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
+One scan over a short list of hypotheses, nearly all of them discrete. They are only compared where the measurements as written
+are absurdly far from the nominal robot, and the simplest that mends them is named: one discrete change first, then a base or
 targets that stand elsewhere, then two changes together. Senses, axes and units are facts, not parameters: each is tried, none
 is fitted.
 """
@@ -76,7 +76,7 @@ class Change:
     detail : str
         One sentence in plain words.
     correct : callable
-        ``(campaign, readings)`` to those read otherwise.
+        ``(campaign, measurements)`` to those read otherwise.
     joints : tuple of int
         From 1.
     parameters : tuple of Value
@@ -110,20 +110,20 @@ class Misfit:
         return self.position_m > IMPLAUSIBLE_M or self.orientation_rad > IMPLAUSIBLE_RAD
 
 
-def find(campaign, readings):
-    """The simplest ways to read the file otherwise that let absurd readings fit.
+def find(campaign, measurements):
+    """The simplest ways to read the file otherwise that let absurd measurements fit.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     list of Fault
         Each beside the alternatives that fit as well.
     """
-    some = spread(readings, _POSES)
+    some = spread(measurements, _POSES)
     found = _one_after_the_other(campaign, some)
     if found or campaign.measured == "position":
         return found
@@ -133,7 +133,7 @@ def find(campaign, readings):
 
 
 def _one_after_the_other(campaign, some):
-    campaign, found = replace(campaign, readings=some), []
+    campaign, found = replace(campaign, measurements=some), []
     for _ in range(_ROUNDS):
         new, campaign, some = _mended(campaign, some)
         known = {(fault.name, fault.detail) for fault in found}
@@ -179,17 +179,17 @@ def placements(campaign):
         found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
     if any(target.offset_m is not None for target in campaign.targets):
 
-        def unknown(campaign, readings):
-            seen = set(readings.target.tolist())
+        def unknown(campaign, measurements):
+            seen = set(measurements.target.tolist())
             targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
-            return replace(campaign, targets=tuple(targets)), readings
+            return replace(campaign, targets=tuple(targets)), measurements
 
         found.append(Change("wrong_target", "", unknown, placement="targets"))
     return found
 
 
 def pairs(campaign):
-    """Two changes at once, where neither alone lets the readings fit.
+    """Two changes at once, where neither alone lets the measurements fit.
 
     Parameters
     ----------
@@ -210,16 +210,16 @@ def pairs(campaign):
     return [*found, *combinations(_single_senses(campaign.robot.joints), 2)]
 
 
-def _mended(campaign, readings):
-    """Faults of the simplest alternative that mends the readings, and campaign and readings as they are then read."""
-    written = robustly_placed(campaign, readings)
-    # All readings but a few, or all: a joint may move in a few poses only.
+def _mended(campaign, measurements):
+    """Faults of the simplest alternative that mends the measurements, and campaign and measurements as they are then read."""
+    written = robustly_placed(campaign, measurements)
+    # All measurements but a few, or all: a joint may move in a few poses only.
     measures = [measure for measure in (trimmed_rms, rms) if _misfit(written, measure).implausible]
     if not measures:
-        return [], campaign, readings
+        return [], campaign, measurements
     one, fitted = [(change,) for change in single_changes(campaign)], [(change,) for change in placements(campaign)]
     for stages in ((one, fitted), (pairs(campaign),)):
-        tried = [[_tried(campaign, readings, changes) for changes in stage] for stage in stages]
+        tried = [[_tried(campaign, measurements, changes) for changes in stage] for stage in stages]
         for measure in measures:
             before = _misfit(written, measure)
             winners = [winner for stage in tried if (winner := _winner(stage, before, measure))]
@@ -229,22 +229,22 @@ def _mended(campaign, readings):
                 if other.after.together < winner.after.together / FAR_BETTER:
                     winner = other
             if winner:
-                return winner.faults(written, before, readings), winner.tried.campaign, winner.tried.readings
-    return [], campaign, readings
+                return winner.faults(written, before, measurements), winner.tried.campaign, winner.tried.measurements
+    return [], campaign, measurements
 
 
 @dataclass(frozen=True)
 class _Tried:
     changes: tuple
     campaign: object
-    readings: object
+    measurements: object
     placement: object
 
 
-def _tried(campaign, readings, changes):
+def _tried(campaign, measurements, changes):
     for change in changes:
-        campaign, readings = change.correct(campaign, readings)
-    return _Tried(changes, campaign, readings, placed(campaign, readings))
+        campaign, measurements = change.correct(campaign, measurements)
+    return _Tried(changes, campaign, measurements, placed(campaign, measurements))
 
 
 @dataclass(frozen=True)
@@ -255,7 +255,7 @@ class _Winner:
     evidence: tuple
     alike: tuple
 
-    def faults(self, written, before, readings):
+    def faults(self, written, before, measurements):
         """One fault for each change."""
         found = []
         for change in self.tried.changes:
@@ -264,7 +264,7 @@ class _Winner:
                 detail, parameters, decisive = _frame_told(self.placement.estimate, before, self.after)
             if change.placement == "targets":
                 detail, parameters = _targets_told(self.tried.campaign.targets, written.estimate, self.placement.estimate)
-            parameters = (*parameters, Value("poses compared", float(len(np.unique(readings.pose))), "–"))
+            parameters = (*parameters, Value("poses compared", float(len(np.unique(measurements.pose))), "–"))
             alike = self.alike if len(self.tried.changes) == 1 else ()
             found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
         return found
@@ -287,9 +287,9 @@ def _winner(tried, before, measure):
     for key in keys:
         alike = np.flatnonzero(key <= max(_ALIKE * key.min(), key.min() + _ALIKE_M))
         best = tried[alike[0]]
-        placement = robustly_placed(best.campaign, best.readings)
+        placement = robustly_placed(best.campaign, best.measurements)
         after = _misfit(placement, measure)
-        evidence = _evidence(before, after, _extent(placement, best.readings))
+        evidence = _evidence(before, after, _extent(placement, best.measurements))
         if evidence:
             others = [
                 tried[number].changes[0].detail for number in alike[1 : 1 + _MOST_ALIKE] if len(tried[number].changes) == 1
@@ -302,11 +302,11 @@ def _misfit(placement, measure):
     return Misfit(measure(placement.distance), 0.0 if placement.turn is None else measure(placement.turn))
 
 
-def _extent(placement, readings):
+def _extent(placement, measurements):
     """RMS distance of the predicted places of a target from their middle, m."""
     largest = 0.0
-    for group in np.unique(np.column_stack([readings.session, readings.target]), axis=0):
-        points = placement.predicted[(readings.session == group[0]) & (readings.target == group[1])]
+    for group in np.unique(np.column_stack([measurements.session, measurements.target]), axis=0):
+        points = placement.predicted[(measurements.session == group[0]) & (measurements.target == group[1])]
         largest = max(largest, rms(np.linalg.norm(points - points.mean(axis=0), axis=1)))
     return largest
 
@@ -315,7 +315,7 @@ def _evidence(written, corrected, extent_m):
     """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
     positions = written.position_m, corrected.position_m
     orientations = written.orientation_rad, corrected.orientation_rad
-    # Where the robot hardly moves, anything that gathers the readings in one place would fit.
+    # Where the robot hardly moves, anything that gathers the measurements in one place would fit.
     limit = min(IMPLAUSIBLE_M, extent_m / FAR_BETTER)
     for (before, after), (other_before, other_after), implausible, needed, plausible in (
         (positions, orientations, IMPLAUSIBLE_M, limit, IMPLAUSIBLE_RAD),
@@ -332,7 +332,7 @@ def _senses(joints):
     unit, found = np.eye(joints), _single_senses(joints)
     for j in range(joints - 1):
         for sign, word in ((1.0, "added to"), (-1.0, "taken from")):
-            detail = f"joint {j + 2} is counted from joint {j + 1}: readings fit with the angle of joint {j + 1} {word} it"
+            detail = f"joint {j + 2} is counted from joint {j + 1}: measurements fit with the angle of joint {j + 1} {word} it"
             matrix = unit + sign * np.outer(unit[j + 1], unit[j])
             found.append(Change("wrong_sign", detail, _with_angles(matrix), (j + 1, j + 2)))
     return found
@@ -342,7 +342,7 @@ def _single_senses(joints):
     return [
         Change(
             "wrong_sign",
-            f"joint {j + 1} has the wrong sense: readings fit with its sign turned",
+            f"joint {j + 1} has the wrong sense: measurements fit with its sign turned",
             _with_angles(np.diag(1.0 - 2.0 * np.eye(joints)[j])),
             (j + 1,),
         )
@@ -353,7 +353,7 @@ def _single_senses(joints):
 def _lengths_of_positions():
     found = []
     for unit, metres in _LENGTHS.items():
-        detail = f"the positions look like {unit}: readings fit {metres:g} times the written positions"
+        detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
         factor = Value("metres for each unit of position written", metres, "m")
         found.append(Change("wrong_unit", detail, _with_positions(metres * np.eye(3)), (), (factor,)))
     return found
@@ -369,7 +369,7 @@ def _lengths_of_targets(campaign):
             "the target offset" if len(known) == 1 else "the target offsets" if names == known else f"the offset of {names[0]}"
         )
         looks = "looks" if len(names) == 1 else "look"
-        detail = f"{which} {looks} like {unit}: readings fit {metres:g} times what is written for {', '.join(names)}"
+        detail = f"{which} {looks} like {unit}: measurements fit {metres:g} times what is written for {', '.join(names)}"
         factor = Value("metres for each unit of target offset written", metres, "m")
         found.append(Change("wrong_unit", detail, _with_offsets(names, metres), (), (factor,)))
     return found
@@ -379,7 +379,7 @@ def _rotations():
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
     found = [Change("wrong_sign", detail, _with_rotations(np.negative))]
     for factor, words in _TURNS.items():
-        detail = f"the rotation vectors look like {words}: readings fit {1 / factor:.4g} times the written rotation vectors"
+        detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
         value = Value("radians for each unit of rotation vector written", 1 / factor, "rad")
         found.append(Change("wrong_unit", detail, _with_rotations(lambda turned, factor=factor: turned / factor), (), (value,)))
     for letters, words in _EULER.items():
@@ -395,7 +395,7 @@ def _rotations():
 def _axes(mirrored_only, oriented):
     """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
     if mirrored_only:
-        detail = "the readings are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
+        detail = "the measurements are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
         return [Change("swapped_axes", detail, _with_positions(np.diag([1.0, 1.0, -1.0])))]
     ways = [
         np.array(signs)[:, None] * np.eye(3)[list(order)]
@@ -405,7 +405,7 @@ def _axes(mirrored_only, oriented):
     ways.sort(key=lambda matrix: np.abs(matrix - np.eye(3)).sum())
     found = []
     for matrix in ways[1:]:
-        detail = f"the axes are exchanged: readings fit with {_axes_told(matrix)}"
+        detail = f"the axes are exchanged: measurements fit with {_axes_told(matrix)}"
         found.append(Change("swapped_axes", detail, _with_positions(matrix)))
         handed = np.linalg.det(matrix)
         for sign in sorted({1.0, handed}) if oriented else ():
@@ -427,10 +427,10 @@ def _axes_told(matrix):
 
 
 def _with_angles(matrix):
-    def correct(campaign, readings):
+    def correct(campaign, measurements):
         # The sign of a column of the file, which counts from where the controller counts.
-        reported = campaign.robot.reported_angles(readings.joint_angles)
-        return campaign, replace(readings, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
+        reported = campaign.robot.reported_angles(measurements.joint_angles)
+        return campaign, replace(measurements, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
 
     return correct
 
@@ -440,28 +440,28 @@ def _with_positions(matrix):
 
 
 def _with_positions_and_rotations(matrix, turning):
-    def correct(campaign, readings):
-        vectors = readings.rotation_vector
+    def correct(campaign, measurements):
+        vectors = measurements.rotation_vector
         vectors = vectors if turning is None or vectors is None else vectors @ turning.T
-        return campaign, replace(readings, position=readings.position @ matrix.T, rotation_vector=vectors)
+        return campaign, replace(measurements, position=measurements.position @ matrix.T, rotation_vector=vectors)
 
     return correct
 
 
 def _with_rotations(function):
-    def correct(campaign, readings):
-        return campaign, replace(readings, rotation_vector=function(readings.rotation_vector))
+    def correct(campaign, measurements):
+        return campaign, replace(measurements, rotation_vector=function(measurements.rotation_vector))
 
     return correct
 
 
 def _with_offsets(names, factor):
-    def correct(campaign, readings):
+    def correct(campaign, measurements):
         targets = [
             replace(target, offset_m=tuple(factor * value for value in target.offset_m)) if target.name in names else target
             for target in campaign.targets
         ]
-        return replace(campaign, targets=tuple(targets)), readings
+        return replace(campaign, targets=tuple(targets)), measurements
 
     return correct
 
@@ -471,7 +471,7 @@ def _frame_told(estimate, before, after):
     parameters, away, turned = [], 0.0, 0.0
     for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
         vector = Rotation.from_matrix(rotation).as_rotvec()
-        of = f"of the base in the frame of {f'session {session}' if len(estimate.sessions) > 1 else 'the readings'}"
+        of = f"of the base in the frame of {f'session {session}' if len(estimate.sessions) > 1 else 'the measurements'}"
         parameters += [Value(f"{axis} {of}", float(value), "m") for axis, value in zip("xyz", position, strict=True)]
         parameters += [
             Value(f"rotation vector {axis} {of}", float(value), "rad") for axis, value in zip("xyz", vector, strict=True)
@@ -480,9 +480,9 @@ def _frame_told(estimate, before, after):
     distance = f"{away:.3g} m" if away >= 0.1 else f"{1e3 * away:.2g} mm"
     where = f"{distance} away, turned by {np.degrees(turned):.3g}°"
     if away > _NEAR_M or turned > _NEAR_RAD:
-        return f"readings do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
+        return f"measurements do not lie in the base frame: the robot would stand {where}", tuple(parameters), True
     better = before.together / max(after.together, 1e-12)
-    return f"readings would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
+    return f"measurements would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
 def _targets_told(targets, written, fitted):

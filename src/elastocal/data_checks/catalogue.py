@@ -37,13 +37,13 @@ def known_faults():
     return {name for module in fault_modules().values() for name in module.NAMES}
 
 
-def faults(campaign, readings):
-    """Every fault that some readings show.
+def faults(campaign, measurements):
+    """Every fault that some measurements show.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
@@ -54,7 +54,7 @@ def faults(campaign, readings):
     for name, module in fault_modules().items():
         if decisive & set(module.AFTER):
             continue
-        new = module.find(campaign, readings)
+        new = module.find(campaign, measurements)
         found += new
         if any(fault.decisive for fault in new):
             decisive.add(name)

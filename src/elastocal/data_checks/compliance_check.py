@@ -22,7 +22,7 @@ def fitted_compliance_warnings(fitted):
     Returns
     -------
     list of str
-        None where compliances are not identified, nor where readings are wrong by centimetres: they mean nothing there.
+        None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
     """
     model = fitted.model
     off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())

@@ -1,4 +1,4 @@
-"""Positions that stay where they are while the robot moves, or joint angles that do not move while the readings do."""
+"""Positions that stay where they are while the robot moves, or joint angles that do not move while the measurements do."""
 
 import numpy as np
 
@@ -12,20 +12,20 @@ _SAME_M, _SAME_RAD = 1e-6, 1e-6
 _FEWEST_POSES = 3
 
 
-def find(campaign, readings):
+def find(campaign, measurements):
     """Columns that are the same in all poses and cannot be.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     list of Fault
         One for each kind, of the first target that shows it.
     """
-    some = spread(readings)
+    some = spread(measurements)
     predicted = placed(campaign, some).predicted
     found = []
     for group in np.unique(np.column_stack([some.session, some.target]), axis=0):
@@ -47,7 +47,9 @@ def find(campaign, readings):
             found.append(Fault(NAMES[0], (), detail, (count,), (float(needed[-1]), 0.0), (), True))
         moved = _extents(measured)[-1]
         if np.ptp(angles, axis=0).max() < _SAME_RAD and moved > IMPLAUSIBLE_M:
-            detail = f"the joint angles are the same in all {poses} poses, though the readings of {who} lie {moved:.2g} m apart"
+            detail = (
+                f"the joint angles are the same in all {poses} poses, though the measurements of {who} lie {moved:.2g} m apart"
+            )
             found.append(Fault(NAMES[0], (), detail, (count,), (float(moved), 0.0), (), True))
     # One of each kind speaks for all targets.
     return list({fault.detail.split(" of ")[0]: fault for fault in reversed(found)}.values())

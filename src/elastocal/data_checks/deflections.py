@@ -49,21 +49,21 @@ class Unit:
 
 UNITS = (
     Unit(1.0, 1.0, ""),
-    Unit(_GRAVITY, _GRAVITY, "the loads look like kilogram-force: readings fit 9.81 times the written loads"),
-    Unit(1 / _GRAVITY, 1 / _GRAVITY, "readings fit the written loads over 9.81, as if they had been converted twice"),
-    Unit(1e3, 1e3, "the loads look like kilonewtons: readings fit 1000 times the written loads"),
-    Unit(1e-3, 1e-3, "the loads look like millinewtons: readings fit a thousandth of the written loads"),
-    Unit(_POUND, _POUND, "the loads look like pounds-force: readings fit 4.45 times the written loads"),
-    Unit(1 / _POUND, 1 / _POUND, "readings fit the written loads over 4.45, as if they had been converted twice"),
-    Unit(1.0, 1e-3, "the moments look like newton millimetres: readings fit a thousandth of the written moments"),
-    Unit(1e3, 1.0, "the forces look like kilonewtons: readings fit 1000 times the written forces"),
-    Unit(_GRAVITY, 1.0, "the forces look like kilogram-force: readings fit 9.81 times the written forces"),
+    Unit(_GRAVITY, _GRAVITY, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),
+    Unit(1 / _GRAVITY, 1 / _GRAVITY, "measurements fit the written loads over 9.81, as if they had been converted twice"),
+    Unit(1e3, 1e3, "the loads look like kilonewtons: measurements fit 1000 times the written loads"),
+    Unit(1e-3, 1e-3, "the loads look like millinewtons: measurements fit a thousandth of the written loads"),
+    Unit(_POUND, _POUND, "the loads look like pounds-force: measurements fit 4.45 times the written loads"),
+    Unit(1 / _POUND, 1 / _POUND, "measurements fit the written loads over 4.45, as if they had been converted twice"),
+    Unit(1.0, 1e-3, "the moments look like newton millimetres: measurements fit a thousandth of the written moments"),
+    Unit(1e3, 1.0, "the forces look like kilonewtons: measurements fit 1000 times the written forces"),
+    Unit(_GRAVITY, 1.0, "the forces look like kilogram-force: measurements fit 9.81 times the written forces"),
 )
 
 
 @dataclass(frozen=True)
 class Deflections:
-    """Deflections, and what each joint should have made of them; rows are the coordinates of the readings.
+    """Deflections, and what each joint should have made of them; rows are the coordinates of the measurements.
 
     Attributes
     ----------
@@ -103,61 +103,61 @@ class UnitFound:
     rms_corrected: float
 
 
-def deflections(campaign, readings):
+def deflections(campaign, measurements):
     """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     Deflections or None
         None without loads, or with too few poses.
     """
-    if not readings.wrench.any():
+    if not measurements.wrench.any():
         return None
-    readings = _some_poses(readings)
+    measurements = _some_poses(measurements)
     # Frames and targets from the lowest loads: those of a wrong unit must not enter.
-    estimate = robustly_placed(campaign, spread(readings)).estimate
-    residual, jacobian, end, rotation, origin = _linearized(campaign, readings, estimate)
-    at_rest = readings.wrench.copy()
+    estimate = robustly_placed(campaign, spread(measurements)).estimate
+    residual, jacobian, end, rotation, origin = _linearized(campaign, measurements, estimate)
+    at_rest = measurements.wrench.copy()
     parts = []
     for part in (slice(0, 3), slice(3, 6)):
         wrench = np.zeros_like(at_rest)
-        wrench[:, part] = readings.wrench[:, part]
+        wrench[:, part] = measurements.wrench[:, part]
         parts.append(regressor(jacobian, generalized_forces(end, wrench)) * campaign.robot.compliance)
-    pose = state_clusters(readings)
+    pose = state_clusters(measurements)
     count = int(pose.max()) + 1
     if count < _FEWEST_POSES:
         return None
-    group = pose * len(campaign.targets) + readings.target
+    group = pose * len(campaign.targets) + measurements.target
     centred = [_centred(values, group) for values in (residual[..., None], *parts)]
     whole = sum((part**2).sum() for part in parts)
     if sum((part**2).sum() for part in centred[1:]) <= _DIFFERING * whole:
-        centred = _off_geometry(campaign, readings, residual, parts, jacobian, rotation, origin)
-    flat = [values.reshape(3 * len(readings), -1) for values in centred]
+        centred = _off_geometry(campaign, measurements, residual, parts, jacobian, rotation, origin)
+    flat = [values.reshape(3 * len(measurements), -1) for values in centred]
     return Deflections(flat[0][:, 0], flat[1], flat[2], count)
 
 
-def unit_of_loads(bent):
+def unit_of_loads(deflected):
     """The sign and unit that explain the deflections far better than the loads as written.
 
     Parameters
     ----------
-    bent : Deflections
+    deflected : Deflections
 
     Returns
     -------
     UnitFound or None
         None where the loads as written do, or where nothing does.
     """
-    as_written = bent.by_force + bent.by_moment
+    as_written = deflected.by_force + deflected.by_moment
     best = None
     for unit in UNITS:
-        corrected = unit.force * bent.by_force + unit.moment * bent.by_moment
-        fitted = _ratios(bent, corrected)
+        corrected = unit.force * deflected.by_force + unit.moment * deflected.by_moment
+        fitted = _ratios(deflected, corrected)
         if fitted is None:
             continue
         ratios, kept, rms_free = fitted
@@ -166,13 +166,13 @@ def unit_of_loads(bent):
         scaled = np.abs(np.log(ratios / sign / mean)) if (ratios * sign > 0).all() else np.array([np.inf])
         if scaled.max() > np.log(_RATIO) or abs(np.log(mean)) > np.log(_MEAN_RATIO):
             continue
-        before = rms((bent.seen - as_written.sum(axis=1))[kept])
-        after = rms((bent.seen - sign * corrected.sum(axis=1))[kept])
-        if rms_free > _UNEXPLAINED * rms(bent.seen[kept]) or before < _FAR_WORSE * after:
+        before = rms((deflected.seen - as_written.sum(axis=1))[kept])
+        after = rms((deflected.seen - sign * corrected.sum(axis=1))[kept])
+        if rms_free > _UNEXPLAINED * rms(deflected.seen[kept]) or before < _FAR_WORSE * after:
             continue
         if best is None or after < 0.9 * best.rms_corrected:
             along = as_written[kept].sum(axis=1)
-            slope = float(along @ bent.seen[kept] / (along @ along))
+            slope = float(along @ deflected.seen[kept] / (along @ along))
             best = UnitFound(sign, unit, slope, before, after)
     return best
 
@@ -248,30 +248,30 @@ class StateDeflections:
         return nominal * np.clip(ratios, *_RATIOS_OF_ROBOTS)
 
 
-def state_deflections(campaign, readings):
+def state_deflections(campaign, measurements):
     """Deflections of every loaded state that has an unloaded one of its pose beside it.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     StateDeflections or None
         None where there is none.
     """
-    pose = state_clusters(readings)
-    compared = np.isin(pose, pose[readings.load == 0]) & np.isin(pose, pose[readings.wrench.any(axis=1)])
+    pose = state_clusters(measurements)
+    compared = np.isin(pose, pose[measurements.load == 0]) & np.isin(pose, pose[measurements.wrench.any(axis=1)])
     if not compared.any():
         return None
-    readings = readings.select(compared)
-    estimate = robustly_placed(campaign, spread(readings)).estimate
-    residual, jacobian, end, _, _ = _linearized(campaign, readings, estimate)
-    keys = np.column_stack([readings.session, readings.pose, readings.load])
+    measurements = measurements.select(compared)
+    estimate = robustly_placed(campaign, spread(measurements)).estimate
+    residual, jacobian, end, _, _ = _linearized(campaign, measurements, estimate)
+    keys = np.column_stack([measurements.session, measurements.pose, measurements.load])
     states, first, state = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     state, targets = state.ravel(), len(campaign.targets)
-    cell = state * targets + readings.target
+    cell = state * targets + measurements.target
     count = np.bincount(cell, minlength=len(states) * targets).reshape(len(states), targets)
     seen = np.zeros((len(states) * targets, 3))
     np.add.at(seen, cell, residual)
@@ -283,12 +283,12 @@ def state_deflections(campaign, readings):
     pose_of = np.unique(states[:, :2], axis=0, return_index=True, return_inverse=True)
     unloaded = pose_of[1][pose_of[2].ravel()]
     both = (count > 0) & (count[unloaded] > 0)
-    loaded = readings.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
+    loaded = measurements.wrench[first].any(axis=1) & (states[unloaded, 2] == 0) & both.any(axis=1)
     if not loaded.any():
         return None
-    rows = tuple(tuple(readings.row[state == number].tolist()) for number in np.flatnonzero(loaded))
+    rows = tuple(tuple(measurements.row[state == number].tolist()) for number in np.flatnonzero(loaded))
     return StateDeflections(
-        readings.wrench[first][loaded],
+        measurements.wrench[first][loaded],
         ((seen - seen[unloaded]) * both[..., None])[loaded],
         (at_target * both[..., None, None])[loaded],
         end[first][loaded],
@@ -297,47 +297,47 @@ def state_deflections(campaign, readings):
     )
 
 
-def _ratios(bent, expected):
+def _ratios(deflected, expected):
     """Compliance over nominal of the joints that are well known, the rows that agree, and their RMS residual."""
     joints = expected.shape[1]
-    kept = np.ones(len(bent.seen), bool)
+    kept = np.ones(len(deflected.seen), bool)
     for _ in range(_REJECTIONS):
-        left, right = expected[kept], bent.seen[kept]
+        left, right = expected[kept], deflected.seen[kept]
         solution = np.linalg.lstsq(left, right, rcond=1e-10)[0]
-        residual = bent.seen - expected @ solution
+        residual = deflected.seen - expected @ solution
         kept = np.abs(residual) <= _APART * max(robust_sigma(np.abs(residual), 1), _ROUNDING_M)
         if kept.sum() < 4 * joints:
             return None
     level = max(rms(residual[kept]), _ROUNDING_M)
-    step, covariance, held = solve_identifiable(expected[kept] / level, bent.seen[kept] / level, np.ones(joints))
-    # Readings of one pose have their errors in common: poses count, not readings.
-    deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * bent.poses), 1.0))
+    step, covariance, held = solve_identifiable(expected[kept] / level, deflected.seen[kept] / level, np.ones(joints))
+    # Measurements of one pose have their errors in common: poses count, not measurements.
+    deviation = np.sqrt(np.diag(covariance) * max(kept.sum() / (3 * deflected.poses), 1.0))
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
     if well.sum() < min(_FEWEST_JOINTS, joints):
         return None
     return step[well], kept, level
 
 
-def _some_poses(readings):
-    pose = state_clusters(readings)
+def _some_poses(measurements):
+    pose = state_clusters(measurements)
     chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
-    return readings.select(np.isin(pose, chosen))
+    return measurements.select(np.isin(pose, chosen))
 
 
-def _linearized(campaign, readings, estimate):
+def _linearized(campaign, measurements, estimate):
     """Measured less predicted without load (N, 3), Jacobians of target and end, rotation of the target's point, positions."""
-    chain, angles = campaign.robot.chain, readings.joint_angles
-    position, rotation = np.empty((len(readings), 3)), np.empty((len(readings), 3, 3))
-    jacobian = np.empty((len(readings), 3, chain.coordinates))
+    chain, angles = campaign.robot.chain, measurements.joint_angles
+    position, rotation = np.empty((len(measurements), 3)), np.empty((len(measurements), 3, 3))
+    jacobian = np.empty((len(measurements), 3, chain.coordinates))
     for index, target in enumerate(campaign.targets):
-        mask = readings.target == index
+        mask = measurements.target == index
         point = replace(chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
         position[mask], rotation[mask], at_target = poses_and_jacobians(chain, angles[mask], point)
         jacobian[mask] = at_target[:, :3]
     end = poses_and_jacobians(chain, angles, replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)))[2]
-    session = np.searchsorted(estimate.sessions, readings.session)
+    session = np.searchsorted(estimate.sessions, measurements.session)
     into_base = estimate.frame_rotation[session].transpose(0, 2, 1)
-    measured = (into_base @ (readings.position - estimate.frame_position[session])[..., None])[..., 0]
+    measured = (into_base @ (measurements.position - estimate.frame_position[session])[..., None])[..., 0]
     return measured - position, jacobian, end, rotation, position
 
 
@@ -348,16 +348,16 @@ def _centred(values, group):
     return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
 
 
-def _off_geometry(campaign, readings, residual, parts, jacobian, rotation, position):
+def _off_geometry(campaign, measurements, residual, parts, jacobian, rotation, position):
     """Residual and parts less what frames, targets and joint offsets can explain of them."""
     columns = [jacobian]
     if campaign.frame == "tracker":
         turns = np.stack([np.cross(axis, position) for axis in np.eye(3)], axis=-1)
         rigid = np.concatenate([np.broadcast_to(np.eye(3), turns.shape), turns], axis=-1)
-        columns += [rigid * (readings.session == session)[:, None, None] for session in np.unique(readings.session)]
+        columns += [rigid * (measurements.session == session)[:, None, None] for session in np.unique(measurements.session)]
     for index, target in enumerate(campaign.targets):
         if target.offset_m is None:
-            columns.append(rotation * (readings.target == index)[:, None, None])
+            columns.append(rotation * (measurements.target == index)[:, None, None])
     flat = np.concatenate(columns, axis=-1).reshape(residual.size, -1)
     left, sizes, _ = np.linalg.svd(flat, full_matrices=False)
     basis = left[:, sizes > 1e-9 * sizes[0]]

@@ -1,28 +1,28 @@
-"""Readings that this robot cannot have made, however the file is read: nothing can be traced in them, somebody must look."""
+"""Measurements that this robot cannot have made, however the file is read: nothing can be traced in them."""
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, rms, robustly_placed, spread, trimmed_rms
 from elastocal.data_checks.protocol import Fault, Value
 
-NAMES, FAMILY, AFTER = ("implausible_readings",), "data", ("constant_columns", "alternatives", "shuffled_rows")
+NAMES, FAMILY, AFTER = ("implausible_measurements",), "data", ("constant_columns", "alternatives", "shuffled_rows")
 
 # Five times what no geometric error and no deflection makes.
 _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 
 
-def find(campaign, readings):
-    """Readings absurdly far from the nominal robot, for a reason that no other fault names.
+def find(campaign, measurements):
+    """Measurements absurdly far from the nominal robot, for a reason that no other fault names.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     list of Fault
         One, or none.
     """
-    some = spread(readings)
+    some = spread(measurements)
     # Nearly all campaigns are done with the first, which takes a sixth of the time.
     for place in (placed, robustly_placed):
         placement = place(campaign, some)

@@ -10,20 +10,20 @@ from elastocal.data_checks.protocol import Fault, Value
 NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns", "alternatives")
 
 
-def find(campaign, readings):
-    """Sign and unit in which the loads explain the readings, where they are not those that they must have.
+def find(campaign, measurements):
+    """Sign and unit in which the loads explain the measurements, where they are not those that they must have.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     list of Fault
     """
-    bent = deflections(campaign, readings)
-    found = unit_of_loads(bent) if bent else None
+    deflected = deflections(campaign, measurements)
+    found = unit_of_loads(deflected) if deflected else None
     if found is None:
         return []
     evidence, faults = (found.rms_as_written, found.rms_corrected), []

@@ -1,4 +1,4 @@
-"""Where the nominal robot puts each reading, without loads, once frames and targets are fitted to most of the readings.
+"""Where the nominal robot puts each measurement, without loads, once frames and targets are fitted to most of the measurements.
 
 No NAMES: what the faults of positions have in common.
 """
@@ -16,23 +16,23 @@ from elastocal.fitting.registration import registered
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.pose_differences import rotation_vectors
 
-# Poses enough to tell what concerns all readings.
+# Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
 # No geometric error, no deflection moves a robot so far.
 IMPLAUSIBLE_M, IMPLAUSIBLE_RAD = 0.02, 0.1
 # A correction must lower the residual by this factor.
 FAR_BETTER = 5.0
-# Share of the readings that frames and targets are first fitted to, and steps of fitting to those that fit best.
+# Share of the measurements that frames and targets are first fitted to, and steps of fitting to those that fit best.
 _CORE, _CORE_STEPS = 0.6, 5
-# Readings beyond so many robust standard deviations take no part in the last fit.
+# Measurements beyond so many robust standard deviations take no part in the last fit.
 _APART = 5.0
-# Largest distances that an RMS leaves out: single readings say nothing of all.
+# Largest distances that an RMS leaves out: single measurements say nothing of all.
 _TRIMMED = 0.1
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Readings beside the nominal robot, in base axes.
+    """Measurements beside the nominal robot, in base axes.
 
     Attributes
     ----------
@@ -63,116 +63,116 @@ class Placement:
         return np.linalg.norm(rotation_vectors(relative), axis=1)
 
 
-def placed(campaign, readings):
-    """Fit frames and targets to all readings alike.
+def placed(campaign, measurements):
+    """Fit frames and targets to all measurements alike.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     Placement
     """
-    return placed_by(campaign, readings, _registered(campaign, readings))
+    return placed_by(campaign, measurements, _registered(campaign, measurements))
 
 
-def robustly_placed(campaign, readings):
-    """Fit frames and targets to the readings that agree with each other.
+def robustly_placed(campaign, measurements):
+    """Fit frames and targets to the measurements that agree with each other.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     Placement
     """
-    found = placed(campaign, readings)
+    found = placed(campaign, measurements)
     if campaign.frame == "base" and all(target.offset_m is not None for target in campaign.targets):
         return found
     for step in range(_CORE_STEPS + 1):
-        distance, kept = found.distance, np.zeros(len(readings), bool)
-        for members in _groups(readings):
+        distance, kept = found.distance, np.zeros(len(measurements), bool)
+        for members in _groups(measurements):
             limit = np.quantile(distance[members], _CORE)
             if step == _CORE_STEPS:
                 limit = max(limit, _APART * robust_sigma(distance[members], 3))
             kept[members] = distance[members] <= limit
-        found = placed_by(campaign, readings, _registered(campaign, readings.select(kept)))
+        found = placed_by(campaign, measurements, _registered(campaign, measurements.select(kept)))
     return found
 
 
-def placed_by(campaign, readings, estimate):
-    """Readings beside the nominal robot in given frames and targets, without loads: they move it by millimetres only.
+def placed_by(campaign, measurements, estimate):
+    """Measurements beside the nominal robot in given frames and targets, without loads: they move it by millimetres only.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
     estimate : Estimate
 
     Returns
     -------
     Placement
     """
-    predicted, rotation = np.empty((len(readings), 3)), np.empty((len(readings), 3, 3))
+    predicted, rotation = np.empty((len(measurements), 3)), np.empty((len(measurements), 3, 3))
     for index, target in enumerate(campaign.targets):
-        mask = readings.target == index
+        mask = measurements.target == index
         point = replace(campaign.robot.chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
-        predicted[mask], rotation[mask] = poses(campaign.robot.chain, readings.joint_angles[mask], point)
-    measured, seen = measured_in_base(estimate, single_observations(readings))
-    expected = None if seen is None else rotation @ estimate.target_rotation[readings.target]
+        predicted[mask], rotation[mask] = poses(campaign.robot.chain, measurements.joint_angles[mask], point)
+    measured, seen = measured_in_base(estimate, single_observations(measurements))
+    expected = None if seen is None else rotation @ estimate.target_rotation[measurements.target]
     return Placement(estimate, predicted, measured, expected, seen)
 
 
-def spread(readings, poses=MANY_POSES):
-    """Readings of some poses all over the campaign, at the lowest load of each.
+def spread(measurements, poses=MANY_POSES):
+    """Measurements of some poses all over the campaign, at the lowest load of each.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
     poses : int
         At most so many of each target in each session.
 
     Returns
     -------
-    Readings
+    Measurements
     """
     chosen = []
-    for members in _groups(readings):
-        order = members[np.lexsort((readings.repeat[members], readings.load[members], readings.pose[members]))]
-        first = order[np.unique(readings.pose[order], return_index=True)[1]]
+    for members in _groups(measurements):
+        order = members[np.lexsort((measurements.repeat[members], measurements.load[members], measurements.pose[members]))]
+        first = order[np.unique(measurements.pose[order], return_index=True)[1]]
         chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
-    return readings.select(np.sort(np.concatenate(chosen)))
+    return measurements.select(np.sort(np.concatenate(chosen)))
 
 
-def single_observations(readings):
-    """Every reading as an observation in a state of its own.
+def single_observations(measurements):
+    """Every measurement as an observation in a state of its own.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     Observations
-        In the order of the readings.
+        In the order of the measurements.
     """
     states = States(
-        readings.session,
-        readings.pose,
-        readings.load,
-        readings.joint_angles,
-        readings.wrench,
-        np.ones(len(readings), int),
-        readings.approach,
-        readings.time_s,
-        readings.temperature_c,
+        measurements.session,
+        measurements.pose,
+        measurements.load,
+        measurements.joint_angles,
+        measurements.wrench,
+        np.ones(len(measurements), int),
+        measurements.approach,
+        measurements.time_s,
+        measurements.temperature_c,
     )
-    rotation = None if readings.rotation_vector is None else Rotation.from_rotvec(readings.rotation_vector).as_matrix()
-    return Observations(states, np.arange(len(readings)), readings.target, readings.position, rotation)
+    rotation = None if measurements.rotation_vector is None else Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
+    return Observations(states, np.arange(len(measurements)), measurements.target, measurements.position, rotation)
 
 
 def rms(values):
@@ -190,14 +190,14 @@ def robust_sigma(distance, components):
     return float(np.median(distance) / np.sqrt(chi2.median(components)))
 
 
-def _groups(readings):
-    """Indices of the readings of each target in each session."""
-    pairs = np.column_stack([readings.session, readings.target])
+def _groups(measurements):
+    """Indices of the measurements of each target in each session."""
+    pairs = np.column_stack([measurements.session, measurements.target])
     _, number = np.unique(pairs, axis=0, return_inverse=True)
     number = number.ravel()
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
 
 
-def _registered(campaign, readings):
+def _registered(campaign, measurements):
     model = replace(declared_model(campaign), effects=())
-    return registered(model, single_observations(readings))
+    return registered(model, single_observations(measurements))

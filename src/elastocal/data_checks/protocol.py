@@ -1,12 +1,12 @@
-"""What every fault of the data is: a name, in plain words what the readings look like, and how much better they fit without it.
+"""What every fault of the data is: a name, what the data resemble in plain words, and how much better they fit without it.
 
 Faults are looked for by the modules of this package, each with
 
 - ``NAMES`` of the faults that it may find and their ``FAMILY``, as in the design's table;
 - ``AFTER``, the modules whose decisive faults make it meaningless to look for these;
-- ``find(campaign, readings)``, which lists the faults of these names that the readings show.
+- ``find(campaign, measurements)``, which lists the faults of these names that the measurements show.
 
-Nothing else knows the faults by name: a new module is new faults. On doubt none is found: a false alarm stops a trace that
+Nothing else knows the faults by name: a new module is new faults. Where it is ambiguous none is found: a false alarm stops a trace that
 was right, a miss only leaves it to what comes after.
 """
 
@@ -32,7 +32,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault that the readings show.
+    """A fault that the measurements show.
 
     Attributes
     ----------
@@ -48,9 +48,9 @@ class Fault:
     rows : tuple of int
         Rows of the file concerned; empty where all are.
     decisive : bool
-        Whether the readings must be corrected before anything is traced.
+        Whether the measurements must be corrected before anything is traced.
     alternatives : tuple of str
-        What would explain the readings as well, in plain words.
+        What would explain the measurements as well, in plain words.
     """
 
     name: str

@@ -58,38 +58,38 @@ class _Shift:
     kind: str
 
 
-def find(campaign, readings):
+def find(campaign, measurements):
     """Rows whose measured columns, or whose loads, belong to other rows.
 
     Parameters
     ----------
     campaign : Campaign
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
     list of Fault
     """
-    return [*_of_positions(campaign, readings), *_of_loads(campaign, readings)]
+    return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
 
 
-def _of_positions(campaign, readings):
-    some = robustly_placed(campaign, spread(readings))
+def _of_positions(campaign, measurements):
+    some = robustly_placed(campaign, spread(measurements))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
-    as_written = placed_by(campaign, readings, some.estimate)
+    as_written = placed_by(campaign, measurements, some.estimate)
     far = (as_written.distance > IMPLAUSIBLE_M).mean()
-    if far * len(readings) < _FEWEST_ROWS:
+    if far * len(measurements) < _FEWEST_ROWS:
         return []
-    found = _shifted(campaign, readings, as_written) if far > _MANY else []
+    found = _shifted(campaign, measurements, as_written) if far > _MANY else []
     if not found and trimmed_rms(some.distance) > IMPLAUSIBLE_M:
-        return _all_matched(campaign, readings, as_written)
-    return found or _matched(readings, as_written, as_written, as_written)
+        return _all_matched(campaign, measurements, as_written)
+    return found or _matched(measurements, as_written, as_written, as_written)
 
 
-def _shifted(campaign, readings, as_written):
+def _shifted(campaign, measurements, as_written):
     """All rows fit once the measured columns are moved by one row."""
     shifts = [_Shift(steps, kind) for kind in ("row", "row of its target", "pose") for steps in (1, -1)]
-    moved = [_moved(readings, shift) for shift in shifts]
+    moved = [_moved(measurements, shift) for shift in shifts]
     plain = [trimmed_rms(placed(campaign, spread(part)).distance) for part in moved]
     best = int(np.argmin(plain))
     estimate = robustly_placed(campaign, spread(moved[best])).estimate
@@ -103,65 +103,67 @@ def _shifted(campaign, readings, as_written):
     return [Fault(NAMES[0], (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
 
 
-def _moved(readings, shift):
-    """Readings with the measured columns moved down; those that fall off the end are left out."""
-    order = np.argsort(readings.row, kind="stable")
-    key = np.zeros((len(readings), 1), int)
+def _moved(measurements, shift):
+    """Measurements with the measured columns moved down; those that fall off the end are left out."""
+    order = np.argsort(measurements.row, kind="stable")
+    key = np.zeros((len(measurements), 1), int)
     if shift.kind == "row of its target":
-        key = readings.target[:, None]
+        key = measurements.target[:, None]
     if shift.kind == "pose":
-        key = np.column_stack([readings.target, readings.load, readings.repeat])
-    _, group = np.unique(np.column_stack([readings.session, key]), axis=0, return_inverse=True)
+        key = np.column_stack([measurements.target, measurements.load, measurements.repeat])
+    _, group = np.unique(np.column_stack([measurements.session, key]), axis=0, return_inverse=True)
     group = group.ravel()
-    source = np.full(len(readings), -1)
+    source = np.full(len(measurements), -1)
     for number in range(group.max() + 1):
         members = order[group[order] == number]
         if shift.steps > 0:
             source[members[1:]] = members[:-1]
         else:
             source[members[:-1]] = members[1:]
-    return _with_measured(readings, np.maximum(source, 0)).select(source >= 0)
+    return _with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
 
 
-def _with_measured(readings, source):
-    """Readings with the measured columns of other rows."""
-    turned = readings.rotation_vector
-    return replace(readings, position=readings.position[source], rotation_vector=None if turned is None else turned[source])
+def _with_measured(measurements, source):
+    """Measurements with the measured columns of other rows."""
+    turned = measurements.rotation_vector
+    return replace(
+        measurements, position=measurements.position[source], rotation_vector=None if turned is None else turned[source]
+    )
 
 
-def _all_matched(campaign, readings, as_written):
+def _all_matched(campaign, measurements, as_written):
     """Frames, targets and rows found together, from the main axes of all points: most rows are out of place."""
     starts = [as_written.estimate]
     if campaign.frame == "tracker":
-        starts += _by_main_axes(campaign, readings, as_written)
+        starts += _by_main_axes(campaign, measurements, as_written)
     nearest = []
     for start in starts:
-        beside = placed_by(campaign, readings, start)
-        nearest.append((_gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))[0], start))
+        beside = placed_by(campaign, measurements, start)
+        nearest.append((_gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))[0], start))
     _, estimate = min(nearest, key=lambda entry: trimmed_rms(entry[0]))
     before = None
     for _ in range(_MATCHING_ROUNDS):
-        beside = placed_by(campaign, readings, estimate)
-        _, source = _gaps(readings, beside.predicted, beside.measured, np.arange(len(readings)))
+        beside = placed_by(campaign, measurements, estimate)
+        _, source = _gaps(measurements, beside.predicted, beside.measured, np.arange(len(measurements)))
         if before is not None and (source == before).all():
             break
         before = source
-        estimate = placed(campaign, spread(_with_measured(readings, source))).estimate
-    return _matched(readings, as_written, beside, None)
+        estimate = placed(campaign, spread(_with_measured(measurements, source))).estimate
+    return _matched(measurements, as_written, beside, None)
 
 
-def _by_main_axes(campaign, readings, as_written):
+def _by_main_axes(campaign, measurements, as_written):
     """Estimates whose frames turn the main axes of the predicted points into those of the measured ones."""
     found, estimate = [], as_written.estimate
     unknown = [target.offset_m is None for target in campaign.targets]
     offset = np.where(np.array(unknown)[:, None], 0.0, estimate.target_offset)
     estimate = replace(estimate, target_offset=offset)
-    predicted = placed_by(campaign, readings, estimate).predicted
+    predicted = placed_by(campaign, measurements, estimate).predicted
     for first, second in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
         rotation, position = estimate.frame_rotation.copy(), estimate.frame_position.copy()
         for number, session in enumerate(estimate.sessions):
-            mask = readings.session == session
-            ours, theirs = predicted[mask], readings.position[mask]
+            mask = measurements.session == session
+            ours, theirs = predicted[mask], measurements.position[mask]
             from_axes, to_axes = _main_axes(ours), _main_axes(theirs) * [first, second, first * second]
             rotation[number] = to_axes @ from_axes.T
             position[number] = theirs.mean(axis=0) - rotation[number] @ ours.mean(axis=0)
@@ -174,7 +176,7 @@ def _main_axes(points):
     return axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
 
 
-def _matched(readings, as_written, beside, rest):
+def _matched(measurements, as_written, beside, rest):
     """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
     distance = beside.distance
     out = distance > IMPLAUSIBLE_M
@@ -188,19 +190,19 @@ def _matched(readings, as_written, beside, rest):
     if len(rows) < _FEWEST_ROWS:
         return []
     predicted = _places(beside.predicted, beside.predicted_rotation)
-    left, source = _gaps(readings, predicted, _places(beside.measured, beside.measured_rotation), rows)
-    back = (left < level) & (left < _NO_CHANCE * _spacing(readings, predicted, rows)) & (source != rows)
-    # Each reading has one place: one that stands for many is no permutation.
-    pose = state_clusters(readings)
+    left, source = _gaps(measurements, predicted, _places(beside.measured, beside.measured_rotation), rows)
+    back = (left < level) & (left < _NO_CHANCE * _spacing(measurements, predicted, rows)) & (source != rows)
+    # Each measurement has one place: one that stands for many is no permutation.
+    pose = state_clusters(measurements)
     taken = len(np.unique(pose[source[back]])), len(np.unique(pose[rows[back]]))
     if back.sum() < max(_FEWEST_ROWS, _MOST * len(rows)) or taken[0] < _MOST * taken[1]:
         return []
     before, after = rms(as_written.distance[rows]), rms(left[back])
     if after > before / FAR_BETTER:
         return []
-    detail = f"{back.sum()} of {len(readings)} rows fit with the measured columns of another one of them"
-    concerned = tuple(sorted(readings.row[rows[back]].tolist()))
-    share = Value("share of the readings", float(back.mean() * len(rows) / len(readings)), "–")
+    detail = f"{back.sum()} of {len(measurements)} rows fit with the measured columns of another one of them"
+    concerned = tuple(sorted(measurements.row[rows[back]].tolist()))
+    share = Value("share of the measurements", float(back.mean() * len(rows) / len(measurements)), "–")
     return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
 
 
@@ -212,22 +214,22 @@ def _places(position, rotation):
     return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
 
 
-def _gaps(readings, predicted, measured, rows):
+def _gaps(measurements, predicted, measured, rows):
     """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
     left, source = np.empty(len(rows)), np.empty(len(rows), int)
-    for session in np.unique(readings.session[rows]):
-        members = np.flatnonzero(readings.session[rows] == session)
+    for session in np.unique(measurements.session[rows]):
+        members = np.flatnonzero(measurements.session[rows] == session)
         tree = cKDTree(measured[rows[members]])
         left[members], number = tree.query(predicted[rows[members]])
         source[members] = rows[members[number]]
     return left, source
 
 
-def _spacing(readings, predicted, rows):
+def _spacing(measurements, predicted, rows):
     """For each of some rows how far the next place is among those predicted for them."""
     spacing = np.zeros(len(rows))
-    for session in np.unique(readings.session[rows]):
-        members = np.flatnonzero(readings.session[rows] == session)
+    for session in np.unique(measurements.session[rows]):
+        members = np.flatnonzero(measurements.session[rows] == session)
         points = predicted[rows[members]]
         # One of each place.
         places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
@@ -237,8 +239,8 @@ def _spacing(readings, predicted, rows):
     return spacing
 
 
-def _of_loads(campaign, readings):
-    states = state_deflections(campaign, readings)
+def _of_loads(campaign, measurements):
+    states = state_deflections(campaign, measurements)
     if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
         return []
     every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance

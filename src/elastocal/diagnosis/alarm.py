@@ -1,10 +1,10 @@
 """Is anything missing at all? One test, exact by simulation.
 
 The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
-distribution is that of simulated readings of the same design, at the pose error that fits best, with the pose error averaged
-over anew in each draw; the p-value counts how many draws reach the statistic of the readings [1]_. No Bonferroni correction and
-no choice of a test: competitors that the readings cannot show have a Bayes factor of one in every draw. Sizes begin a step
-below those of the posterior: what lies between may be seen, and its probability does not matter to a test.
+distribution is that of simulated measurements of the same design, at the pose error that fits best, with the pose error
+averaged over anew in each draw; the p-value counts how many draws reach the statistic of the measurements [1]_. No Bonferroni
+correction and no choice of a test: competitors that the measurements cannot show have a Bayes factor of one in every draw.
+Sizes begin a step below those of the posterior: what lies between may be seen, and its probability does not matter to a test.
 
 References
 ----------
@@ -47,7 +47,7 @@ def alarm_of(problem, products, pose_error_rad, stream):
     problem : Problem
     products : Products
     pose_error_rad : float
-        Pose error of the declared model at which readings are simulated.
+        Pose error of the declared model at which measurements are simulated.
     stream : numpy.random.Generator
 
     Returns
@@ -55,7 +55,7 @@ def alarm_of(problem, products, pose_error_rad, stream):
     Alarm
     """
     settings, statistics = problem.settings, problem.statistics
-    # Of readings that are summed, the size of the pose error is known to a step of its grid.
+    # Of measurements that are summed, the size of the pose error is known to a step of its grid.
     chosen = _near(statistics.pose_error_rad, pose_error_rad, 0 if isinstance(products, Sums) else REACH)
     statistics, log_pose = statistics.at(chosen), problem.log_pose[chosen]
     along, squares = null_draws(products, pose_error_rad, statistics.pose_error_rad, settings.alarm_draws, stream)
@@ -73,7 +73,7 @@ def _near(pose_error_rad, fitted, reach):
 
 
 def _average_bayes_factors(problem, statistics, log_pose, along, squares):
-    """Log of the average Bayes factor for N sets of readings, ndarray (N,).
+    """Log of the average Bayes factor for N sets of measurements, ndarray (N,).
 
     Parameters
     ----------

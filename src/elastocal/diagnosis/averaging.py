@@ -73,10 +73,10 @@ def averaged(linearized, posterior, best, owners):
 
 
 def expected_to_help(problem, posterior, model):
-    """Whether predictions are expected to be better with a model than without it, at poses like those of the readings.
+    """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
 
     With d the displacement that a model predicts and E d its mean over all models, the expected square of the error falls from
-    E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds d'd. Readings that were held out take no part.
+    E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds d'd. Measurements that were held out take no part.
 
     Parameters
     ----------

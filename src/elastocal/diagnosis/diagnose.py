@@ -11,7 +11,7 @@ from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
-from elastocal.diagnosis.search import first_look, posterior
+from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -108,7 +108,7 @@ def diagnose(case, settings, seed, progress=None):
     Diagnosis
     """
     tell = progress or (lambda line: None)
-    known = faults(case.campaign, case.campaign.readings)
+    known = faults(case.campaign, case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
     noise, warnings = estimated_noise(case)
     declared = fit(case.model, case.observations, noise)
@@ -134,10 +134,10 @@ def _explained(case, declared, settings, seed, tell):
     before = None
     for round_number in range(settings.linearizations):
         problem = linearized(about, searched, candidates, settings)
-        nothing, alone = first_look(problem.problem)
+        nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)
         alarm = alarm_of(problem.problem, problem.products, nothing.pose_error_rad, draws)
-        # The alarm comes before the readings choose at which shapes to look more closely: it would no longer be exact.
+        # The alarm comes before the measurements choose at which shapes to look more closely: it would no longer be exact.
         closer = shapes_looked_at_closely(problem.problem, alone) if alarm.raised else {}
         if closer:
             problem = linearized(about, searched, candidates, settings, closer)
@@ -254,15 +254,15 @@ def _noise_warnings(measured, left, settings):
     if factor < settings.relinearize_noise:
         return []
     said = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"readings scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
+    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
 
 
 def _pose_error_warnings(left, linearized):
     if left.pose_rad < linearized.pose_std_error_rad:
         return []
     return [
-        f"readings of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a pose do"
-        " not show: new poses will err as much"
+        f"measurements of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a"
+        " pose do not show: new poses will err as much"
     ]
 
 

@@ -298,9 +298,9 @@ def evaluate(statistics, units, grid, log_pose, start):
     """Evidence of one model, averaged over the sizes of its units.
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
-    unit, and where sizes are independent given the readings. The mode is found by coordinate ascent, all units at once where
-    that raises the density and else the one that gains most. One inverse gives what every unit sees given all others: with C
-    the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
+    unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent, all units at once
+    where that raises the density and else the one that gains most. One inverse gives what every unit sees given all others:
+    with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
     Parameters
     ----------
@@ -369,7 +369,7 @@ def _inverses(matrices):
 
 
 class Joint:
-    """Density of the readings under one model with one size for each unit.
+    """Density of the measurements under one model with one size for each unit.
 
     Parameters
     ----------
@@ -431,7 +431,7 @@ class Joint:
 
     def _given_the_others(self):
         """What each unit sees with the others integrated out: number, and eigenvalues and eigenvectors of its Gram matrix, its
-        products with the readings along these, squares and ln |I + D^1/2 G D^1/2| without it."""
+        products with the measurements along these, squares and ln |I + D^1/2 G D^1/2| without it."""
         widths = np.diff(self.starts)
         for width in np.unique(widths):
             numbers = np.flatnonzero(widths == width)

@@ -1,4 +1,4 @@
-"""What was found, as people and files want it: effects with parameters, probabilities and what may stand in their place."""
+"""What was found, as people and files want it: effects with parameters, probabilities and what else may be meant."""
 
 import numpy as np
 
@@ -33,9 +33,9 @@ def location_words(mechanism, location):
     str
     """
     joints = [str(entry) for entry in location if not isinstance(entry, str)]
-    places = [entry for entry in location if isinstance(entry, str)]
+    names = [entry for entry in location if isinstance(entry, str)]
     where = f"{part_of(mechanism)}{'s' if len(joints) > 1 else ''} {' and '.join(joints)}" if joints else ""
-    return " ".join(filter(None, [where, *places])) or ("base" if mechanism == OTHER else "")
+    return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 
 def probability_facts(problem, posterior, conclusion, alarm):
@@ -101,8 +101,8 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages, obser
                 "members": [member.key for member in members],
                 "probability": conclusion.mechanisms[name],
                 "locations": [
-                    {"location": location_words(name, place), "probability": value}
-                    for place, value in where.items()
+                    {"location": location_words(name, at), "probability": value}
+                    for at, value in where.items()
                     if value >= _LEAST_LISTED
                 ],
                 "parameters": sag_entries(name, members, final, observations) + values,
@@ -126,7 +126,7 @@ def parameter_entries(member, final, averages):
     """Parameters and shapes of one candidate in a fit.
 
     How far springs of unknown compliance sag does not tell a mass. Where the compliances are those of the robot
-    file, a mass is given as its product with that of the joint that it turns most, which readings tell.
+    file, a mass is given as its product with that of the joint that it turns most, which measurements tell.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def _product(entry, model):
 
 
 def sag_entries(name, members, final, observations):
-    """How far weight lets a target sag at most, where the readings tell no masses.
+    """How far weight lets a target sag at most, where the measurements tell no masses.
 
     Parameters
     ----------
@@ -184,10 +184,10 @@ def sag_entries(name, members, final, observations):
     list of dict
         One entry, in m; none where the effect is not of gravity, or where its masses can be told.
     """
-    if members[0].family != "gravity" or final.model.identifies_compliance or final.circumstances is None:
+    if members[0].family != "gravity" or final.model.identifies_compliance or final.conditions is None:
         return []
     jacobian = final.joint_jacobian[:, :3]
-    columns = effect_columns([(member, ()) for member in members], final.circumstances, jacobian, observations.state)
+    columns = effect_columns([(member, ()) for member in members], final.conditions, jacobian, observations.state)
     owners = [owner for owner, _ in final.parameters]
     mine = np.concatenate([np.flatnonzero([owner == member.key for owner in owners]) for member in members])
     sag = columns @ np.concatenate([final.values_of(member.key)[0] for member in members])

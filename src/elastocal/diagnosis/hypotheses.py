@@ -36,7 +36,7 @@ class Unit:
     competitor : Competitor or None
         Of `OTHER`.
     smallest : int
-        Place in the grid of sizes of the smallest that the readings could show.
+        Place in the grid of sizes of the smallest that the measurements could show.
     """
 
     mechanism: str

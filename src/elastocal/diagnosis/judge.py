@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
-from elastocal.effects.circumstances import offered
-from elastocal.fitting.displacement import circumstances
+from elastocal.effects.conditions import offered
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import each_approach, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
@@ -51,7 +51,7 @@ def judge(diagnosis, held_out, seed):
     ----------
     diagnosis : Diagnosis
     held_out : Case
-        The held-out readings; of another campaign, whose frames and targets are then fitted to them.
+        The held-out measurements; of another campaign, whose frames and targets are then fitted to them.
     seed : int
         Of the bootstrap over poses.
 
@@ -177,22 +177,22 @@ def split_table(diagnosis, held_out, seed):
 
 
 def residual_blocks(diagnosis, held_out):
-    """Blocks of the residuals table: training readings, then held-out ones; every reading before and after."""
+    """Blocks of the residuals table: training measurements, then held-out ones; every measurement before and after."""
     case, steps, before, after = diagnosis.case, diagnosis.steps, diagnosis.declared, diagnosis.final
     inside = np.zeros(case.observations.cluster.max() + 1, bool)
     for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
-        observations, order = _in_order(part.campaign.readings)
+        observations, order = _in_order(part.campaign.measurements)
         off, position = [], None
         for fitted in (before, after):
             model, estimate = _placed(fitted, case, part)
-            off.append(residuals(model, estimate, observations, circumstances(model, estimate, observations.states)))
+            off.append(residuals(model, estimate, observations, conditions(model, estimate, observations.states)))
             position = measured_in_base(estimate, observations)[0]
-        readings = part.campaign.readings.select(order)
-        yield residual_columns(readings, unseen, outside[state_clusters(readings)], position, *off)
+        measurements = part.campaign.measurements.select(order)
+        yield residual_columns(measurements, unseen, outside[state_clusters(measurements)], position, *off)
 
 
 def _placed(fitted, case, part):
-    """Model and estimate for the readings of a part: as fitted, or with frames and targets of another campaign."""
+    """Model and estimate for the measurements of a part: as fitted, or with frames and targets of another campaign."""
     if _same_campaign(case, part):
         return fitted.model, placed_estimate(fitted, part.observations)
     carried = carried_over(fitted, part.observations.states)
@@ -227,12 +227,12 @@ def carried_over(fitted, states):
     return replace(fitted, model=model, estimate=estimate)
 
 
-def _in_order(readings):
-    """Every reading as an observation of its own, and the order of the readings in which they come."""
-    observations, _ = each_approach(readings)
-    approach = () if readings.approach is None else tuple(readings.approach.T[::-1])
+def _in_order(measurements):
+    """Every measurement as an observation of its own, and the order of the measurements in which they come."""
+    observations, _ = each_approach(measurements)
+    approach = () if measurements.approach is None else tuple(measurements.approach.T[::-1])
     return observations, np.lexsort(
-        (readings.target, readings.repeat, *approach, readings.load, readings.pose, readings.session)
+        (measurements.target, measurements.repeat, *approach, measurements.load, measurements.pose, measurements.session)
     )
 
 

@@ -10,15 +10,15 @@ from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
-from elastocal.effects.circumstances import at_states, offered
-from elastocal.fitting.displacement import circumstances
+from elastocal.effects.conditions import at_states, offered
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses
-from elastocal.fitting.parameters import bends as shape_parameters
+from elastocal.fitting.parameters import nonlinear_parameters as shape_parameters
 from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
 
-# Values of a shape that are tried: neighbours differ by less than readings show at the sizes that matter.
+# Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
 # Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
 # a step is looked for within a quarter of the spacing to either side.
@@ -27,7 +27,7 @@ _SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
 # below, its shape hardly matters.
 _NEAR_THE_BEST, _WORTH_A_LOOK = 10.0, 5.0
 # Declared parameters without a prior of their own get one this many times their plausible size: it decides nothing, and keeps
-# well posed what the readings do not determine.
+# well posed what the measurements do not determine.
 _WIDE = 10.0
 
 
@@ -39,16 +39,16 @@ class Linearized:
     ----------
     problem : Problem
     products : Products
-        Of one pass over the readings.
+        Of one pass over the measurements.
     declared_size : float
-        Size of declared geometry, in plausible sizes, that makes the readings most probable.
+        Size of declared geometry, in plausible sizes, that makes the measurements most probable.
     untestable : dict of str to str
         Why a candidate is not tested.
     about : Fit
     candidates : frozenset of str
         Keys of all candidates: parameters of the fit that they own are coefficients of units here.
     pose_std_error_rad : float
-        With which the readings of one pose tell a joint angle.
+        With which the measurements of one pose tell a joint angle.
     """
 
     problem: object
@@ -61,7 +61,7 @@ class Linearized:
 
 
 def linearized(fitted, observations, candidates, settings, shapes=None):
-    """Gather what the readings say of a fit and of all candidates.
+    """Gather what the measurements say of a fit and of all candidates.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is
     given back to the residual, so that their priors mean what they say.
@@ -80,7 +80,7 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     -------
     Linearized
     """
-    around, sites = fitted.circumstances, fitted.model.sites
+    around, sites = fitted.conditions, fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
@@ -164,9 +164,9 @@ def has_prior(fitted):
 
 
 def declared_size(fitted, parameters, owners, triangle, count, present, settings):
-    """Size of declared geometry that makes the readings most probable (type II maximum likelihood, one number for all of it).
+    """Size of declared geometry that makes the measurements most probable (type II maximum likelihood, one number for all).
 
-    At the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the readings.
+    At the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the measurements.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def smallest_shown(statistics, units, settings):
     """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction among all units reaches that where the non-centrality is the critical value. A smaller effect is
-    there or not, and the readings are the same: it counts as not there.
+    there or not, and the measurements are the same: it counts as not there.
 
     Parameters
     ----------
@@ -245,13 +245,13 @@ class _Source:
     values: np.ndarray
 
     def lines(self, parts):
-        """Linearization, circumstances, states and whitening of each part."""
+        """Linearization, conditions, states and whitening of each part."""
         fitted = self.fitted
         for states, seen in parts:
             some = part_at(self.observations, states, seen)
-            line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.circumstances, states))
+            line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.conditions, states))
             jacobian, root = fitted.jacobian_at(line, seen), np.sqrt(fitted.weights[seen])
-            yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_readings), root)
+            yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_measurements), root)
 
     def declared_part(self, parts):
         """Triangular factor of declared sensitivities and residual; standard error with which one pose tells a joint."""
@@ -270,7 +270,7 @@ class _Source:
         """`WhiteRows` of each part."""
         sizes = np.concatenate([unit.sizes for unit in self.units])
         for line, some, jacobian, white in self.lines(parts):
-            around = line.circumstances
+            around = line.conditions
             laws = [*self.tested, *((law, ()) for law in self.against)]
             made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
             made *= sizes
@@ -322,15 +322,15 @@ def selected(fitted, observations, chosen):
     Fit, Observations
     """
     some = select_states(observations, chosen)
-    around = fitted.circumstances
+    around = fitted.conditions
     if around is None:
-        around = circumstances(fitted.model, fitted.estimate, some.states)
+        around = conditions(fitted.model, fitted.estimate, some.states)
     elif not chosen.all():
         around = at_states(around, chosen)
     seen = chosen[observations.state]
     kept = {name: getattr(fitted, name) for name in ("weights", "residual", "joint_jacobian")}
     parts = {name: None if values is None else values[seen] for name, values in kept.items()}
-    return replace(fitted, circumstances=around, **parts), some
+    return replace(fitted, conditions=around, **parts), some
 
 
 def shapes_tried(candidate, fitted):
@@ -386,7 +386,7 @@ def shapes_looked_at_closely(problem, alone):
 
 
 def lacking(candidate, sites, states):
-    """Why the readings cannot test a candidate at all; empty where they might."""
+    """Why the measurements cannot test a candidate at all; empty where they might."""
     missing = sorted(candidate.needs - offered(sites, states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"

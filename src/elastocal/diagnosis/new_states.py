@@ -3,8 +3,8 @@
 An entry is one pose, read at all targets without its load, under it and under the opposite one, or under given shares of it.
 Loads are those of the campaign: as large, at the same lever or none, in any direction where the campaign has loads in all of
 them; up to the weight of the rated payload where the robot file has it. A weight hung at the flange is known without a load
-cell: readings of its force have no errors. A repeat is another entry: it costs as much as another pose, and tells no more than
-a pose close by.
+cell: measurements of its force have no errors. A repeat is another entry: it costs as much as another pose, and tells no more
+than a pose close by.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Target
 from elastocal.diagnosis import other
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
@@ -256,7 +256,7 @@ class Instrument:
     declared, added : ndarray of bool
         Which of the model's parameters are those of the products, and which belong to targets that are not there yet.
     noise : Noise
-        With the error common to the readings of a pose.
+        With the error common to the measurements of a pose.
     states : States
         Of the campaign, whose last session, time and usual temperature go on.
     reach : Reach
@@ -302,13 +302,13 @@ class Instrument:
         return np.concatenate(parts)
 
     def rows(self, entries, targets):
-        """Whitened sensitivities of the readings of each entry, ndarray (E, rows, U)."""
+        """Whitened sensitivities of the measurements of each entry, ndarray (E, rows, U)."""
         observations = self.observations(entries, targets)
-        around = circumstances(self.model, self.estimate, observations.states)
+        around = conditions(self.model, self.estimate, observations.states)
         # Nothing comes after the last row of the campaign but these.
         around = replace(around, progress=np.ones(len(observations.states)))
         line = linearize(self.model, self.estimate, observations, around)
-        jacobian, state, around = line.coordinate_jacobian, observations.state, line.circumstances
+        jacobian, state, around = line.coordinate_jacobian, observations.state, line.conditions
         made = effect_columns(self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
@@ -355,7 +355,7 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     numbers : sequence of int
         Units of the problem whose columns matter.
     noise : Noise
-        Of one reading, with the error common to the readings of a pose.
+        Of one measurement, with the error common to the measurements of a pose.
     states : States
         Of the campaign.
     reach : Reach
@@ -374,7 +374,7 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     added = np.array([owner in new for owner in owners], bool)
     declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
     laws, columns, sizes, cell = [], [], [], []
-    problem, campaign = linearized.problem, linearized.about.circumstances
+    problem, campaign = linearized.problem, linearized.about.conditions
     for number in numbers:
         unit = problem.units[number]
         law = unit.candidate or other.law_of(unit.competitor, campaign, problem.settings.other_features)

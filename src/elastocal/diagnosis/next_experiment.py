@@ -1,7 +1,7 @@
-"""The next experiment: poses and loads after which the readings, most probably, say which hypothesis holds.
+"""The next experiment: poses and loads after which the measurements, most probably, say which hypothesis holds.
 
-The experiment that leaves the least entropy between the models of the posterior (`rivals`) is looked for greedily, then by
-exchange [1]_, then by ascent in the angles. What is promised of it is simulated (`promise`).
+The experiment that leaves the least entropy between the models of the posterior (`alternatives`) is looked for greedily, then
+by exchange [1]_, then by ascent in the angles. What is promised of it is simulated (`promise`).
 
 References
 ----------
@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from elastocal.diagnosis import new_states
+from elastocal.diagnosis.alternatives import Criterion, members_of
 from elastocal.diagnosis.promise import HALF_RESOLVED, Promise, poses_needed
 from elastocal.diagnosis.proposal import (
     DATA_AT_FAULT,
@@ -25,7 +26,6 @@ from elastocal.diagnosis.proposal import (
     without_poses,
 )
 from elastocal.diagnosis.refit import mean_square_left
-from elastocal.diagnosis.rivals import Criterion, members_of
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE
 
 # States that are looked at, and entries among them that greedy search and exchange choose from: as many by what they tell alone
@@ -91,7 +91,7 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     unreachable = tuple(members.names[h] for h in lost)
     members = members.without(lost)
     promise = Promise(members, stream)
-    # What can be told from the best holds no more probability than is left open where nothing is ambiguous.
+    # What is distinguishable from the best holds no more probability than is left open where nothing is ambiguous.
     if np.exp(promise.log_prior[0]) >= settings.credible:
         return without_poses(joints, best, unreachable, NOT_DISTINGUISHABLE)
     order = _by_worth(members, information, stream)
@@ -221,7 +221,7 @@ def _by_worth(members, information, stream):
 
 
 def _present_separation(linearized, found, alternative, factor):
-    """What the present readings separate an effect as large as the one found from a model that is fitted to it."""
+    """What the present measurements separate an effect as large as the one found from a model that is fitted to it."""
     problem = linearized.problem
     statistics = problem.statistics
     at = int(np.argmin(np.abs(statistics.pose_error_rad - found.pose_error_rad)))

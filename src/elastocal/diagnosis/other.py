@@ -63,7 +63,7 @@ def competitors(campaign):
 
     Parameters
     ----------
-    campaign : Circumstances
+    campaign : Conditions
 
     Returns
     -------
@@ -84,7 +84,7 @@ class Law:
     Attributes
     ----------
     competitor : Competitor
-    campaign : Circumstances
+    campaign : Conditions
         By whose inputs and loads those of all states are normalised.
     size : float
         rad or m.
@@ -115,7 +115,7 @@ def law_of(competitor, campaign, features):
     Parameters
     ----------
     competitor : Competitor
-    campaign : Circumstances
+    campaign : Conditions
         Of whose states what has a name is taken off.
     features : int
         At a joint.

@@ -1,4 +1,4 @@
-"""What an experiment promises: simulated, with coefficients from the posterior and readings of the whole experiment.
+"""What an experiment promises: simulated, with coefficients from the posterior and measurements of the whole experiment.
 
 Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6, 16 and 21; where they may
 turn out small, the separation that is stated is the one for which this holds.
@@ -33,7 +33,7 @@ class Promise:
         self.white = stream.standard_normal(self.truths.shape)
 
     def log_factors(self, information):
-        """ln p of the simulated readings under each hypothesis, but for what is common to all; ndarray (N, H)."""
+        """ln p of the simulated measurements under each hypothesis, but for what is common to all; ndarray (N, H)."""
         members = self.members
         values, vectors = np.linalg.eigh(information)
         noise = self.white @ (vectors * np.sqrt(np.clip(values, 0.0, None))).T

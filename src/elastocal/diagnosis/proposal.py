@@ -37,12 +37,12 @@ class Proposal:
     points : tuple of str
         Measuring points at which targets are read in every pose.
     separation : ndarray (E,)
-        From the nearest alternative, by readings of this pose and all before it: at most twice the log Bayes factor that they
-        bring for the truth on average; 16 gives it odds of 19:1 from even ones with 90 %.
+        From the nearest alternative, by measurements of this pose and all before it: at most twice the log Bayes factor that
+        they bring for the truth on average; 16 gives it odds of 19:1 from even ones with 90 %.
     resolved : ndarray (E,)
         Probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
     present : float
-        Separation from the nearest alternative that the present readings give to an effect as large as the one found.
+        Separation from the nearest alternative that the present measurements give to an effect as large as the one found.
     poses_needed : int or None
         For `resolved` of 90 %, if further poses tell as much as these; None where a hundred are not enough.
     best : tuple of str
@@ -119,9 +119,9 @@ def table_of(proposal, robot):
     -------
     pandas.DataFrame
         One row for each pose; joint angles as the controller reports them (rad), ``load`` 1 where it is loaded,
-        ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present readings, and what the
-        promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and ``reference_weight_kg``
-        where a weight is asked for.
+        ``separation`` and ``resolved`` after it and all before, ``separation_without`` from the present measurements, and what
+        the promise leaves aside as ``indistinguishable``; ``approach1..n`` where the campaign has them and
+        ``reference_weight_kg`` where a weight is asked for.
     """
     joints, count = robot.joints, len(proposal)
     columns = {

@@ -1,7 +1,7 @@
 """The exact fit of a selected model: same priors, exact kinematics.
 
-Coefficients keep the normal priors under which they were selected, so that what the readings do not determine stays at zero;
-the noise is that which the selected model leaves.
+Coefficients keep the normal priors under which they were selected, so that what the measurements do not determine stays at
+zero; the noise is that which the selected model leaves.
 
 References
 ----------
@@ -63,7 +63,7 @@ def fit_with_sizes(declared, observations, noise, chosen, near=None, **options):
         Where the search starts.
     observations : Observations
     noise : Noise
-        Of readings and poses, as the selected model leaves it.
+        Of measurements and poses, as the selected model leaves it.
     chosen : Selected
     near : Fit, optional
         With other effects: the search then starts from its values of those that are the same.

@@ -33,7 +33,7 @@ _NEGLIGIBLE = 9.0
 _BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
 _UNLIKELY, _TELLING_UNITS = -9.0, 10
-# Steps of the grid of the pose error to either side that readings simulated with one size can make likely.
+# Steps of the grid of the pose error to either side that measurements simulated with one size can make likely.
 REACH = 2
 
 
@@ -78,7 +78,7 @@ class Model:
     scales : ndarray
         Most probable size of each unit.
     pose_error_rad : float
-        Most probable size of the error common to the readings of a pose.
+        Most probable size of the error common to the measurements of a pose.
     """
 
     units: tuple
@@ -107,7 +107,7 @@ class Posterior:
         return next(model for model in self.models if not model.units)
 
 
-def first_look(problem):
+def initial_screening(problem):
     """The declared model alone, and each unit alone against it.
 
     Parameters
@@ -149,7 +149,7 @@ def posterior(problem, known=()):
 def pose_errors_within_reach(statistics, settings):
     """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
 
-    And up to `REACH` steps beyond the most likely, for readings that are simulated with that may look like more.
+    And up to `REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
 
     Parameters
     ----------

@@ -51,9 +51,9 @@ class Settings:
     )
     pose_steps: tuple = _setting(
         (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
-        "grid of the error common to the readings of a pose, in standard errors with which one pose determines a joint angle",
+        "grid of the error common to the measurements of a pose, in standard errors of a joint angle from one pose",
     )
-    pose_error_probability: float = _setting(0.5, "prior probability that the readings of a pose have an error in common")
+    pose_error_probability: float = _setting(0.5, "prior probability that the measurements of a pose have an error in common")
     harmonic_decay: float = _setting(0.3, "amplitudes of gear harmonics fall with the order to this power (measured UR10)")
     other_features: int = _setting(16, "random Fourier features of each law at each joint; few inputs need no more")
     named_probability: float = _setting(
@@ -74,13 +74,13 @@ class Settings:
     )
     searched_observations: int = _setting(
         20_000,
-        "averaged readings, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
+        "averaged measurements, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"
         " noise, and the fit takes all",
     )
     linear_misfit: float = _setting(
         0.02,
         "relative difference between the mean square that an exact fit leaves and that which the linear problem promised, below"
-        " which the problem was linear enough: it changes the log likelihood of a hundred readings by one",
+        " which the problem was linear enough: it changes the log likelihood of a hundred measurements by one",
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")

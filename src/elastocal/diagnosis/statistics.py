@@ -1,15 +1,15 @@
-"""All that the readings say of a linearised model, in numbers whose count does not grow with the readings.
+"""All that the measurements say of a linearised model, in numbers whose count does not grow with the measurements.
 
-Readings y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by the
-noise of the readings. The readings of a pose may have an error in common as well: that of the joints when the pose was taken,
-of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By the
-matrix inversion lemma
+Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
+the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
+was taken, of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By
+the matrix inversion lemma
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
-so that one pass over the readings serves every tau. Columns are first made orthogonal to X by a QR decomposition of the scaled
-rows: no condition number is squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X (X'Sigma^-1 X)^-1
-X'Sigma^-1 and the determinants of restricted maximum likelihood (REML).
+so that one pass over the measurements serves every tau. Columns are first made orthogonal to X by a QR decomposition of the
+scaled rows: no condition number is squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
+(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML).
 
 References
 ----------
@@ -69,7 +69,7 @@ class Statistics:
 
 @dataclass(frozen=True)
 class Products:
-    """What one pass over the readings gathers; `statistics_of` makes `Statistics` of it, `null_draws` simulated ones.
+    """What one pass over the measurements gathers; `statistics_of` makes `Statistics` of it, `null_draws` simulated ones.
 
     Attributes
     ----------
@@ -82,11 +82,11 @@ class Products:
     pose_gram : ndarray (G, n, n)
         C_p.
     joint_rad : ndarray (n,)
-        Repeatability of the joints, where the readings of a pose share one approach; else zero.
+        Repeatability of the joints, where the measurements of a pose share one approach; else zero.
     white_gram : ndarray (P + K, P + K)
         Z'Z without y and without the rows of the declared parameters' priors: covariance of Z'e for white e.
     rows : int
-        Readings' components.
+        Measurements' components.
     freedom : int
         The same less what the declared model fits.
     """
@@ -203,7 +203,7 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
 
 
 def pose_error_unit(products):
-    """Standard error, rad, with which the readings of one pose determine a joint angle: the unit of the grid of tau."""
+    """Standard error, rad, with which the measurements of one pose determine a joint angle: the unit of the grid of tau."""
     information = np.median(np.trace(products.pose_gram, axis1=1, axis2=2)) / products.pose_gram.shape[1]
     return float(1.0 / np.sqrt(information))
 
@@ -254,7 +254,7 @@ def normal_equations(products, tau):
 
 
 def null_draws(products, tau, pose_error_rad, count, stream):
-    """Statistics of simulated readings of the declared model, in which nothing is missing.
+    """Statistics of simulated measurements of the declared model, in which nothing is missing.
 
     Parameters
     ----------

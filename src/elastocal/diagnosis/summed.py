@@ -1,8 +1,8 @@
-"""Sufficient statistics of readings that are too many to be held whitened: one pass over blocks of whole poses.
+"""Sufficient statistics of measurements that are too many to be held whitened: one pass over blocks of whole poses.
 
-Z'Sigma(tau)^-1 Z is summed at every size of the pose error that is likely, in memory that does not grow with the readings.
+Z'Sigma(tau)^-1 Z is summed at every size of the pose error that is likely, in memory that does not grow with the measurements.
 No condition number is squared: candidates and residual come with what the declared parameters explain of them in a sample of
-the readings taken off, so that what is summed is of the size of what is left; the rest is exact algebra.
+the measurements taken off, so that what is summed is of the size of what is left; the rest is exact algebra.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class WhiteRows:
 
 @dataclass(frozen=True)
 class Sums:
-    """What `Products` are for readings that are held; in the same parameters.
+    """What `Products` are for measurements that are held; in the same parameters.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def summed(blocks, triangle, sample, prior_std, present, pose_error_rad):
     every = np.concatenate([prior @ into_basis, rest], axis=1)
     totals += every.T @ every
     declared = totals[0, :count, :count]
-    # Of the readings, not of the priors: the trace of the hat matrix.
+    # Of the measurements, not of the priors: the trace of the hat matrix.
     hat = np.trace(np.linalg.solve(declared, declared - every[:, :count].T @ every[:, :count]))
     projected = np.linalg.solve(into_basis, explained)
     freedom = max(round(rows - hat), 1)
@@ -171,7 +171,7 @@ def _whitened(every, jacobian, pose, tau):
 
 
 def null_draws_of(sums, gram, count, stream):
-    """Statistics of simulated readings of the declared model, at the size of the pose error with which they are simulated.
+    """Statistics of simulated measurements of the declared model, at the size of the pose error with which they are simulated.
 
     b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left.
 

@@ -12,7 +12,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
-# Family of what any readings test, even of a single pose: that nothing of it shows says nothing of the robot.
+# Family of what any measurements test, even of a single pose: that nothing of it shows says nothing of the robot.
 _OF_THE_SETUP = "drift"
 
 
@@ -56,7 +56,7 @@ class Conclusion:
     best : Hypothesis
         The most probable in accordance with the alarm: "nothing" without one.
     alternatives : dict of str to tuple of str
-        For each mechanism of the best hypothesis what may stand in its place.
+        For each mechanism of the best hypothesis what may be meant instead.
     mechanisms : dict of str to float
         Probability that each mechanism is there, in falling order.
     """
@@ -81,10 +81,10 @@ def concluded(problem, posterior, alarm):
     -------
     Conclusion
         adequate: no alarm. named: one mechanism, with at least the probability that the settings ask for, and favoured over
-        each other one by the readings alone. class: one mechanism, but which of some, or whether a related one, remains
+        each other one by the measurements alone. class: one mechanism, but which of some, or whether a related one, remains
         ambiguous. several: more than one mechanism.
         unexplained: something acts that the catalogue does not have, or that no model explains better than "nothing" does.
-        not_testable: the readings can test no mechanism of the robot, and nothing of the set-up shows.
+        not_testable: the measurements can test no mechanism of the robot, and nothing of the set-up shows.
     """
     settings = problem.settings
     hypotheses = hypotheses_of(problem, posterior)
@@ -116,9 +116,9 @@ def concluded(problem, posterior, alarm):
 
 
 def _favoured_instead(problem, posterior, best, hypotheses):
-    """Other single mechanisms under which the readings are at least as probable, each at its best place.
+    """Other single mechanisms under which the measurements are at least as probable, each at its best location.
 
-    The best has only its prior over these, which goes by how many places and laws each has: no name rests on that alone.
+    The best has only its prior over these, which goes by how many locations and laws each has: no name rests on that alone.
     """
 
     def log_bayes_factor(hypothesis):
@@ -171,11 +171,11 @@ def location_probabilities(problem, posterior, mechanism):
     """
     total, found = 0.0, {}
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        places = {problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism}
-        total += probability if places else 0.0
-        for place in places:
-            found[place] = found.get(place, 0.0) + float(probability)
-    return {place: value / total for place, value in sorted(found.items(), key=lambda entry: -entry[1])}
+        locations = {problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism}
+        total += probability if locations else 0.0
+        for location in locations:
+            found[location] = found.get(location, 0.0) + float(probability)
+    return {location: value / total for location, value in sorted(found.items(), key=lambda entry: -entry[1])}
 
 
 def _credible(hypotheses, probability):
@@ -185,7 +185,7 @@ def _credible(hypotheses, probability):
 
 
 def _instead_of(name, best, credible):
-    """What stands in the place of one mechanism in the other credible hypotheses."""
+    """What stands instead of one mechanism in the other credible hypotheses."""
     rest = set(best.mechanisms) - {name}
     found = []
     for hypothesis in credible:

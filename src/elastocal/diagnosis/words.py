@@ -73,12 +73,12 @@ def effect_words(effect, locations=()):
     str
         Such as: gravity sag of joints 2 and 3.
     """
-    places = []
+    locations = []
     for location in filter(None, locations):
         found = _LOCATION.match(location)
         numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
-        places.append((numbers, found["detail"]))
-    return physical_name(effect) + _where(effect, places)
+        locations.append((numbers, found["detail"]))
+    return physical_name(effect) + _where(effect, locations)
 
 
 def found_words(effect, keys):
@@ -95,11 +95,13 @@ def found_words(effect, keys):
     str
         As `effect_words`.
     """
-    places = []
+    locations = []
     for key in keys:
         found = re.match(_ANY_KEY, key)
-        places.append((tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or ""))
-    return physical_name(effect) + _where(effect, places)
+        locations.append(
+            (tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or "")
+        )
+    return physical_name(effect) + _where(effect, locations)
 
 
 def candidate_words(key):
@@ -162,7 +164,7 @@ def hypotheses_words(sets):
 
 
 def alternative_words(name):
-    """What may stand in the place of a mechanism: another, or a related one."""
+    """What may be meant instead of a mechanism: another, or a related one."""
     return RELATED if name == OTHER else physical_name(name)
 
 
@@ -187,10 +189,10 @@ def in_words(text):
     return re.sub(r"(?<![\w@])" + _KEY.format(names=names) + r"(?!\w)", worded, text)
 
 
-def _where(effect, places):
+def _where(effect, locations):
     """Where an effect acts, by joints or links and details: " of joint 4 (orders 1-2)"."""
     details = {}
-    for numbers, detail in places:
+    for numbers, detail in locations:
         details.setdefault(numbers, []).append(detail)
     singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
     if singles and (len(details) > _MOST_DETAILED or not any(map(any, details.values()))):

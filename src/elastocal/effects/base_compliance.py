@@ -18,12 +18,12 @@ def candidates(sites):
     """Two candidates at the foot: all ways to give, and rocking alone, which is what most foundations do."""
     tx, ty, tz, rx, ry, _ = sites.base
 
-    def displacement(circumstances):
-        load = circumstances.total
+    def displacement(conditions):
+        load = conditions.total
         return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
 
-    def rocking(circumstances):
-        return displacement(circumstances)[2:]
+    def rocking(conditions):
+        return displacement(conditions)[2:]
 
     load = frozenset({"load"})
     return [

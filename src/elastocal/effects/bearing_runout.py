@@ -38,8 +38,8 @@ def _candidate(sites, joint, motion):
         for name, _ in _WAVES
     )
 
-    def displacement(circumstances):
-        angle = circumstances.joint_angles[:, joint]
+    def displacement(conditions):
+        angle = conditions.joint_angles[:, joint]
         fixed = [_seen_behind(sites, joint, axis, angle) for axis in axes]
         return [
             _at(sites, joint, motion, direction * wave(order * angle))
@@ -49,7 +49,9 @@ def _candidate(sites, joint, motion):
         ]
 
     distinct = _SAMPLES_PER_PERIOD * max(_ORDERS)
-    return Candidate(NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, place=motion)
+    return Candidate(
+        NAME, FAMILY, (joint + 1,), motion, parameters, displacement, distinct_angles=distinct, location_name=motion
+    )
 
 
 def _seen_behind(sites, joint, axis, angle):

@@ -19,8 +19,8 @@ def candidates(sites):
     if joint is None:
         return []
 
-    def displacement(circumstances):
-        torque = circumstances.total[:, joint]
-        return [{joint: torque * wave} for wave in compensator_torque.waves(circumstances.joint_angles[:, joint])]
+    def displacement(conditions):
+        torque = conditions.total[:, joint]
+        return [{joint: torque * wave} for wave in compensator_torque.waves(conditions.joint_angles[:, joint])]
 
     return [Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))]

@@ -19,11 +19,11 @@ def candidates(sites):
     if joint is None:
         return []
 
-    def displacement(circumstances):
-        return [{joint: wave} for wave in waves(circumstances.joint_angles[:, joint])]
+    def displacement(conditions):
+        return [{joint: wave} for wave in waves(conditions.joint_angles[:, joint])]
 
-    def first_order(circumstances):
-        return displacement(circumstances)[:2]
+    def first_order(conditions):
+        return displacement(conditions)[:2]
 
     return [
         Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement),

@@ -16,8 +16,8 @@ def candidates(sites):
     """One candidate a pair of joints that turn."""
 
     def of(one, other):
-        def displacement(circumstances):
-            return [{one: circumstances.total[:, other], other: circumstances.total[:, one]}]
+        def displacement(conditions):
+            return [{one: conditions.total[:, other], other: conditions.total[:, one]}]
 
         return Candidate(NAME, FAMILY, (one + 1, other + 1), "", _PARAMETERS, displacement, frozenset({"load"}))
 

@@ -18,8 +18,8 @@ _WIDTH_OF_LENGTH = 0.1
 def candidate(sites):
     """Errors of all declared masses and first moments as one candidate, each with the prior of the robot file."""
 
-    def displacement(circumstances):
-        torques = circumstances.mass_torques * circumstances.compliance
+    def displacement(conditions):
+        torques = conditions.mass_torques * conditions.compliance
         return [{joint: of_joint for joint, of_joint in enumerate(columns.T) if of_joint.any()} for columns in torques]
 
     width = _WIDTH_OF_LENGTH * float(np.linalg.norm(sites.link_vectors_m, axis=1).sum())

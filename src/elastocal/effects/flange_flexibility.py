@@ -17,11 +17,11 @@ def candidates(sites):
     """Two candidates at the last measuring point: all six directions, and turns alone, which is most of what a flange does."""
     coordinates = sites.link_end[-1]
 
-    def displacement(circumstances):
-        return [{coordinate: circumstances.load[:, coordinate]} for coordinate in coordinates]
+    def displacement(conditions):
+        return [{coordinate: conditions.load[:, coordinate]} for coordinate in coordinates]
 
-    def turning(circumstances):
-        return displacement(circumstances)[3:]
+    def turning(conditions):
+        return displacement(conditions)[3:]
 
     load = frozenset({"load"})
     return [

@@ -13,7 +13,7 @@ _PARAMETERS = (Parameter("scale", "1", 0.02),)
 def candidates(sites):
     """One candidate."""
 
-    def displacement(circumstances):
-        return [dict(enumerate(circumstances.joint_deflections(circumstances.wrench).T))]
+    def displacement(conditions):
+        return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]

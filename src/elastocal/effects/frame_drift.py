@@ -1,4 +1,4 @@
-"""A tracker or a foot that wanders: a rigid motion of all readings, linear in the time since the campaign began.
+"""A tracker or a foot that wanders: a rigid motion of all measurements, linear in the time since the campaign began.
 
 Catalogue row 23.
 """
@@ -17,8 +17,8 @@ _HOUR_S = 3600.0
 def candidates(sites):
     """One candidate, at the foot."""
 
-    def displacement(circumstances):
-        hours = circumstances.time_s / _HOUR_S
+    def displacement(conditions):
+        hours = conditions.time_s / _HOUR_S
         return [{coordinate: hours} for coordinate in sites.base]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}), of_setup=True)]

@@ -15,8 +15,8 @@ def candidates(sites):
     """One candidate a joint."""
 
     def at(joint):
-        def displacement(circumstances):
-            return [{joint: circumstances.approach[:, joint]}]
+        def displacement(conditions):
+            return [{joint: conditions.approach[:, joint]}]
 
         parameter = _SHIFT if sites.prismatic[joint] else _TURN
         return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement, frozenset({"approach"}))

@@ -9,8 +9,8 @@ from elastocal.effects.protocol import Candidate, Parameter
 def candidate(sites):
     """Compliances of all joints as one candidate."""
 
-    def displacement(circumstances):
-        return [{joint: circumstances.total[:, joint]} for joint in range(sites.joints)]
+    def displacement(conditions):
+        return [{joint: conditions.total[:, joint]} for joint in range(sites.joints)]
 
     sizes = [("m/N", 1e-6) if prismatic else ("rad/(N m)", 1e-5) for prismatic in sites.prismatic]
     parameters = tuple(Parameter(f"c{joint}", unit, size) for joint, (unit, size) in enumerate(sizes, 1))

@@ -16,8 +16,8 @@ def candidates(sites):
     """One candidate a joint."""
 
     def at(joint):
-        def displacement(circumstances):
-            angle, torque = circumstances.joint_angles[:, joint], circumstances.total[:, joint]
+        def displacement(conditions):
+            angle, torque = conditions.joint_angles[:, joint], conditions.total[:, joint]
             return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}))

@@ -16,8 +16,8 @@ def candidates(sites):
     """One candidate a joint."""
 
     def at(joint):
-        def displacement(circumstances):
-            return [{joint: np.ones(len(circumstances.joint_angles))}]
+        def displacement(conditions):
+            return [{joint: np.ones(len(conditions.joint_angles))}]
 
         parameter = _SHIFT if sites.prismatic[joint] else _TURN
         return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement)

@@ -18,8 +18,8 @@ def candidates(sites):
         parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
-        def displacement(circumstances):
-            return [{c: circumstances.total[:, c]} for c in coordinates]
+        def displacement(conditions):
+            return [{c: conditions.total[:, c]} for c in coordinates]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))
 

@@ -34,16 +34,18 @@ def candidates(sites):
 
 
 def _candidate(sites, links, detail):
-    def displacement(circumstances, taper):
+    def displacement(conditions, taper):
         bent, twisted = {}, {}
         for link in links:
-            bending, torsion = _deflection(sites, link, circumstances.total, taper)
+            bending, torsion = _deflection(sites, link, conditions.total, taper)
             bent |= bending
             twisted |= torsion
         return [bent, twisted]
 
     joints = tuple(k for k in links if k)
-    return Candidate(NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), (_TAPER,), place=detail)
+    return Candidate(
+        NAME, FAMILY, joints, detail, _PARAMETERS, displacement, frozenset({"load"}), (_TAPER,), location_name=detail
+    )
 
 
 def _deflection(sites, link, load, taper):

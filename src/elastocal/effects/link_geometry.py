@@ -20,8 +20,8 @@ def candidates(sites):
     """One candidate a link behind a joint, named by that joint; the column before joint 1 belongs to the base."""
 
     def at(joint):
-        def displacement(circumstances):
-            ones = np.ones(len(circumstances.joint_angles))
+        def displacement(conditions):
+            ones = np.ones(len(conditions.joint_angles))
             return [{coordinate: ones} for coordinate in sites.link_end[joint + 1]]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement)

@@ -46,13 +46,13 @@ def _of_the_arm(sites, joints):
         parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass) for k in links]
         parameters += [Parameter(f"moment_{'xyz'[axis]}_of_link_{k}", "kg m", _OFF_M * mass) for k, axis in axes]
 
-        def displacement(circumstances):
-            torques = _torques(circumstances, links, axes)
-            return [dict(enumerate((torque * circumstances.compliance).T)) for torque in torques]
+        def displacement(conditions):
+            torques = _torques(conditions, links, axes)
+            return [dict(enumerate((torque * conditions.compliance).T)) for torque in torques]
 
         # Without a load nothing tells the compliances, and nominal ones are far off.
         return Candidate(
-            NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"external load"}), place=_OF_THE_ARM
+            NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"external load"}), location_name=_OF_THE_ARM
         )
 
     yield candidate("", some, ())
@@ -68,8 +68,8 @@ def _of_joints(sites, joints):
         names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in axes)
         parameters += [Parameter(name, "rad kg m/(N m)", _MOMENT) for name in names]
 
-        def displacement(circumstances):
-            return [{joint: torque[:, joint]} for torque in _torques(circumstances, links, axes)]
+        def displacement(conditions):
+            return [{joint: torque[:, joint]} for torque in _torques(conditions, links, axes)]
 
         return Candidate(NAME, FAMILY, (joint + 1,), detail, tuple(parameters), displacement)
 
@@ -85,5 +85,5 @@ def _across(sites, links, turned):
     return [pair for pair in axes if any(sites.moment_turns(*pair, joint) for joint in turned)]
 
 
-def _torques(circumstances, links, axes):
-    return [*(circumstances.weight[k] for k in links), *(circumstances.weight_moment(k, axis) for k, axis in axes)]
+def _torques(conditions, links, axes):
+    return [*(conditions.weight[k] for k in links), *(conditions.weight_moment(k, axis) for k, axis in axes)]

@@ -27,8 +27,8 @@ def candidates(sites):
         full = full_torque_Nm(sites, joint)
         taken_up = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
-        def displacement(circumstances, torque):
-            return [{joint: np.tanh(circumstances.total[:, joint] / torque)}]
+        def displacement(conditions, torque):
+            return [{joint: np.tanh(conditions.total[:, joint] / torque)}]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}), (taken_up,))
 

@@ -29,8 +29,8 @@ def _candidate(joint, ratio):
         Parameter(f"{wave}_{order}_motor", "rad", _AMPLITUDE_RAD) for order in _ORDERS for wave in ("cos", "sin")
     )
 
-    def displacement(circumstances):
-        angle = ratio * circumstances.joint_angles[:, joint]
+    def displacement(conditions):
+        angle = ratio * conditions.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in _ORDERS for wave in (np.cos, np.sin)]
 
     return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, distinct_angles=_DISTINCT_ANGLES)

@@ -25,8 +25,8 @@ def candidates(sites):
         Parameter(f"{wave}_{'xyz'[axis]}_{_ORDER}q", "m", _SIZE_M, _SIZE_M) for axis in across for wave in ("cos", "sin")
     )
 
-    def displacement(circumstances):
-        angle = _ORDER * circumstances.joint_angles[:, last]
+    def displacement(conditions):
+        angle = _ORDER * conditions.joint_angles[:, last]
         turned = sites.link_rotations[last + 1].T
         return [
             dict(zip(sites.link_end[last + 1][:3], np.outer(turned[:, axis], wave(angle)), strict=True))

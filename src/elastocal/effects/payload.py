@@ -14,14 +14,14 @@ WORDS = "weight of an undeclared payload"
 _SHARE_OF_RATED, _RATED_OVER_MASS, _LEVER_M, _USUAL_KG = 0.15, 1 / 6, 0.2, 10.0
 
 
-def displacement(circumstances):
+def displacement(conditions):
     """Joint deflections per kilogram at the end-effector, and per kilogram metre along its axes."""
-    gravity = np.array(circumstances.sites.gravity_m_s2)
-    levers = [np.zeros_like(circumstances.wrench[:, :3]), *np.moveaxis(circumstances.end_rotation, -1, 0)]
+    gravity = np.array(conditions.sites.gravity_m_s2)
+    levers = [np.zeros_like(conditions.wrench[:, :3]), *np.moveaxis(conditions.end_rotation, -1, 0)]
     columns = []
     for lever, mass in zip(levers, (1.0, 0.0, 0.0, 0.0), strict=True):
         force = np.broadcast_to(mass * gravity, lever.shape)
-        turned = circumstances.joint_deflections(np.concatenate([force, np.cross(lever, gravity)], axis=-1))
+        turned = conditions.joint_deflections(np.concatenate([force, np.cross(lever, gravity)], axis=-1))
         columns.append(dict(enumerate(turned.T)))
     return columns
 
@@ -29,8 +29,8 @@ def displacement(circumstances):
 def candidates(sites):
     """Two candidates at the flange: a tool, and a mass alone, which is most of what a tool does."""
 
-    def mass(circumstances):
-        return displacement(circumstances)[:1]
+    def mass(conditions):
+        return displacement(conditions)[:1]
 
     plausible = _plausible_kg(sites)
     parameters = (

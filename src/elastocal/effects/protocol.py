@@ -25,7 +25,7 @@ class Parameter:
     ----------
     name, unit : str
     plausible : float
-        Magnitude that such an effect can reach on a real robot; a parameter that the data cannot tell from zero even at this
+        Magnitude that such an effect can reach on a real robot; one that the data cannot distinguish from zero even at this
         size is not estimated.
     prior_std : float or None
         Standard deviation of a normal prior about zero, for series whose terms the data tell from each other only in part.
@@ -35,7 +35,7 @@ class Parameter:
     order : int
         Of a harmonic, whose plausible size falls with it; 1 elsewhere.
     sized : bool
-        Whether the prior's standard deviation was estimated from the readings, not known beforehand.
+        Whether the prior's standard deviation was estimated from the measurements, not known beforehand.
     """
 
     name: str
@@ -110,16 +110,16 @@ class Candidate:
     parameters : tuple of Parameter
         In which the displacement is linear.
     displacement : callable
-        ``displacement(circumstances, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
+        ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
         displacement per unit of the parameter, ndarray (S,).
     needs : frozenset of str
-        What must be there, see `circumstances.offered`: "load", "external load", "approach", "time", "temperature".
+        What must be there, see `conditions.offered`: "load", "external load", "approach", "time", "temperature".
     shapes : tuple of Shape
     distinct_angles : int
-        How many different angles of its joints the law needs to be told from a smooth one.
+        How many different angles of its joints the law needs to be distinguishable from a smooth one.
     of_setup : bool
         Whether it belongs to where tracker and robot stood in one campaign, and is not carried over to another.
-    place : str
+    location_name : str
         Names the location beside the joints where these do not: a column, a band of orders. Candidates of one effect at one
         location are variants of its law, of which only one can hold.
     turning : tuple of int
@@ -135,14 +135,14 @@ class Candidate:
     needs: frozenset = frozenset()
     shapes: tuple = ()
     distinct_angles: int = 0
-    place: str = ""
+    location_name: str = ""
     of_setup: bool = False
     turning: tuple = ()
 
     @property
     def location(self):
-        """Where the effect acts: its joints, with the place where they do not tell it."""
-        return (*self.joints, self.place) if self.place else self.joints
+        """Where the effect acts: its joints, with the name of the location where they do not tell it."""
+        return (*self.joints, self.location_name) if self.location_name else self.joints
 
     @property
     def key(self):

@@ -1,4 +1,4 @@
-"""A tracker, a nest or a foot that was moved between two rows: a rigid motion of all readings from there on.
+"""A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
 
 A step needs no clock: the rows stand in the order in which they were read, and where the rows are not known the poses count by
 their numbers. Where in the campaign it happens is a shape: 0 is its first row, 1 its last.
@@ -12,16 +12,16 @@ _PARAMETERS = (
     *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
     *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),
 )
-# The nearest of these has all but a 24th of the readings on the right side of the step. Nearer to an end than the outermost a
-# step would be a shift of nearly all readings.
+# The nearest of these has all but a 24th of the measurements on the right side of the step. Nearer to an end than the outermost
+# a step would be a shift of nearly all measurements.
 _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
 
 
 def candidates(sites):
     """One candidate, at the foot."""
 
-    def displacement(circumstances, when):
-        after = (circumstances.progress >= when).astype(float)
+    def displacement(conditions, when):
+        after = (conditions.progress >= when).astype(float)
         return [{coordinate: after} for coordinate in sites.base]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,), of_setup=True)]

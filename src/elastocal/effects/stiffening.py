@@ -34,8 +34,8 @@ def _candidate(sites, joint, detail):
     beyond = Parameter("beyond", "rad/(N m)", _MOVED_M / lever_m(sites, joint) / full, sign=-1)
     meeting = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
-    def displacement(circumstances, torque):
-        load = circumstances.total[:, joint]
+    def displacement(conditions, torque):
+        load = conditions.total[:, joint]
         return [{joint: load - as_at_rest(load, torque)}]
 
     return Candidate(NAME, FAMILY, (joint + 1,), detail, (beyond,), displacement, frozenset({"load"}), (meeting,))

@@ -53,9 +53,11 @@ def _across(sites, link):
         unit, plausible = _PLAUSIBLE[cause]
         parameters = tuple(Parameter(name, unit, plausible) for name in names)
         where = cause if link else f"column {cause}"
-        law = lambda circumstances, *values: bent(rise(circumstances, *values))  # noqa: E731
-        place = "" if link else "column"
-        return Candidate(NAME, FAMILY, (link,) if link else (), where, parameters, law, needs, shapes, place=place)
+        law = lambda conditions, *values: bent(rise(conditions, *values))  # noqa: E731
+        location_name = "" if link else "column"
+        return Candidate(
+            NAME, FAMILY, (link,) if link else (), where, parameters, law, needs, shapes, location_name=location_name
+        )
 
     return by_warmth(candidate_of)
 
@@ -74,8 +76,8 @@ def _along(sites, lengths):
 
     def candidate_of(cause, rise, needs, shapes):
         unit, plausible = _PLAUSIBLE[cause]
-        law = lambda circumstances, *values: [grown(rise(circumstances, *values))]  # noqa: E731
+        law = lambda conditions, *values: [grown(rise(conditions, *values))]  # noqa: E731
         growth = (Parameter("growth_along", unit, plausible),)
-        return Candidate(NAME, FAMILY, (), f"along {cause}", growth, law, needs, shapes, place="along")
+        return Candidate(NAME, FAMILY, (), f"along {cause}", growth, law, needs, shapes, location_name="along")
 
     return by_warmth(candidate_of)

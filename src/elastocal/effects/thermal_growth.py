@@ -19,8 +19,8 @@ def candidates(sites):
     """One candidate by temperature and one by time."""
 
     def candidate_of(cause, rise, needs, shapes):
-        def displacement(circumstances, *values):
-            return [longer(sites, rise(circumstances, *values))]
+        def displacement(conditions, *values):
+            return [longer(sites, rise(conditions, *values))]
 
         return Candidate(NAME, FAMILY, (), cause, (_PARAMETERS[cause],), displacement, needs, shapes)
 

@@ -19,7 +19,7 @@ _PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
 def candidates(sites):
     """One candidate."""
 
-    def displacement(circumstances):
-        return [longer(sites, np.ones(len(circumstances.joint_angles)))]
+    def displacement(conditions):
+        return [longer(sites, np.ones(len(conditions.joint_angles)))]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]

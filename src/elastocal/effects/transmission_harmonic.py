@@ -30,9 +30,9 @@ def _candidate(joint, low, high):
         for wave in ("cos", "sin")
     )
 
-    def displacement(circumstances):
-        angle = circumstances.joint_angles[:, joint]
+    def displacement(conditions):
+        angle = conditions.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in orders for wave in (np.cos, np.sin)]
 
     detail, angles = f"orders {low}-{high}", _SAMPLES_PER_PERIOD * high
-    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=angles, place=detail)
+    return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement, distinct_angles=angles, location_name=detail)

@@ -13,7 +13,7 @@ from elastocal.effects.protocol import Candidate, Parameter, Shape
 NAME, FAMILY = "transmission_order", "transmission"
 WORDS = "non-integer gear transmission error"
 _HIGHEST = 18
-# Nearer to an integer than this an order cannot be told from it.
+# Nearer to an integer than this an order is not distinguishable from it.
 _MARGIN = 0.25
 _SAMPLES_PER_PERIOD = 4
 _AMPLITUDE_RAD = 2e-4
@@ -29,11 +29,19 @@ def _candidate(joint, above):
     order = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
     parameters = tuple(Parameter(f"{wave}_kq", "rad", _AMPLITUDE_RAD, order=above + 1) for wave in ("cos", "sin"))
 
-    def displacement(circumstances, order):
-        angle = order * circumstances.joint_angles[:, joint]
+    def displacement(conditions, order):
+        angle = order * conditions.joint_angles[:, joint]
         return [{joint: np.cos(angle)}, {joint: np.sin(angle)}]
 
     detail, angles = f"order {above}-{above + 1}", _SAMPLES_PER_PERIOD * (above + 1)
     return Candidate(
-        NAME, FAMILY, (joint + 1,), detail, parameters, displacement, shapes=(order,), distinct_angles=angles, place=detail
+        NAME,
+        FAMILY,
+        (joint + 1,),
+        detail,
+        parameters,
+        displacement,
+        shapes=(order,),
+        distinct_angles=angles,
+        location_name=detail,
     )

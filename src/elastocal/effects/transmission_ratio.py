@@ -26,7 +26,7 @@ def _candidate(sites, joint, sources, detail):
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
     parameters = tuple(Parameter(f"per_q{source + 1}", unit, 1e-3) for source in alike)
 
-    def displacement(circumstances):
-        return [{joint: circumstances.joint_angles[:, source]} for source in alike]
+    def displacement(conditions):
+        return [{joint: conditions.joint_angles[:, source]} for source in alike]
 
     return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement)

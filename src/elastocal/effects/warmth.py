@@ -15,7 +15,7 @@ def by_warmth(candidate_of):
     Parameters
     ----------
     candidate_of : callable
-        ``candidate_of(cause, rise, needs, shapes)`` gives a candidate; ``rise(circumstances, *shapes)`` is by how much it is
+        ``candidate_of(cause, rise, needs, shapes)`` gives a candidate; ``rise(conditions, *shapes)`` is by how much it is
         warmer, ndarray (S,): in K from 20 °C, at which dimensions are stated (ISO 1), or the share of a first order lag.
 
     Returns
@@ -23,11 +23,11 @@ def by_warmth(candidate_of):
     list of Candidate
     """
 
-    def by_temperature(circumstances):
-        return circumstances.temperature_c - _REFERENCE_C
+    def by_temperature(conditions):
+        return conditions.temperature_c - _REFERENCE_C
 
-    def by_time(circumstances, lag):
-        return -np.expm1(-circumstances.time_s / lag)
+    def by_time(conditions, lag):
+        return -np.expm1(-conditions.time_s / lag)
 
     return [
         candidate_of("temperature", by_temperature, frozenset({"temperature"}), ()),

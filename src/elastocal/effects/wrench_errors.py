@@ -45,9 +45,9 @@ def at_flange_and_in_pull(name, family, parameters, change):
     list of Candidate
     """
 
-    def in_pull(circumstances, axes):
-        wrench = circumstances.wrench
-        lever = lever_of_pull(wrench, circumstances.end_rotation)
+    def in_pull(conditions, axes):
+        wrench = conditions.wrench
+        lever = lever_of_pull(wrench, conditions.end_rotation)
         forces = [change(axis, wrench)[:, :3] for axis in axes]
         return [np.concatenate([force, np.cross(lever, force)], axis=1) for force in forces]
 
@@ -98,25 +98,25 @@ def base_and_flange(name, family, parameters, change):
     list of Candidate
     """
 
-    def changes(circumstances, axes):
-        return [change(axis, circumstances.wrench) for axis in axes]
+    def changes(conditions, axes):
+        return [change(axis, conditions.wrench) for axis in axes]
 
     return _in_both_frames(name, family, parameters, changes, "")
 
 
 def _in_both_frames(name, family, parameters, changes, how):
-    """Candidates whose wrench changes by each of ``changes(circumstances, axes)``; `how` follows the axes in their names."""
+    """Candidates whose wrench changes by each of ``changes(conditions, axes)``; `how` follows the axes in their names."""
 
-    def in_base(circumstances):
-        axes = [np.broadcast_to(axis, circumstances.wrench[:, :3].shape) for axis in np.eye(3)]
-        return _deflections(circumstances, axes)
+    def in_base(conditions):
+        axes = [np.broadcast_to(axis, conditions.wrench[:, :3].shape) for axis in np.eye(3)]
+        return _deflections(conditions, axes)
 
-    def in_flange(circumstances):
-        return _deflections(circumstances, np.moveaxis(circumstances.end_rotation, -1, 0))
+    def in_flange(conditions):
+        return _deflections(conditions, np.moveaxis(conditions.end_rotation, -1, 0))
 
-    def _deflections(circumstances, axes):
-        changed = changes(circumstances, [Axis(axis) for axis in axes])
-        turned = [circumstances.joint_deflections(wrench) for wrench in changed]
+    def _deflections(conditions, axes):
+        changed = changes(conditions, [Axis(axis) for axis in axes])
+        turned = [conditions.joint_deflections(wrench) for wrench in changed]
         return [dict(enumerate(angles.T)) for angles in turned]
 
     return [

@@ -16,7 +16,7 @@ _LEADING = 16
 _LINE = 44
 _REST_COLOUR = "#d9d9d9"
 # Why nothing is tested where the data are at fault, as tables.candidate_columns notes it.
-_AT_FAULT = "the readings are at fault"
+_AT_FAULT = "the measurements are at fault"
 
 
 @styled

@@ -14,9 +14,9 @@ COMPONENTS = ("radial", "tangential", "vertical", "along force")
 # More points than this are drawn as pixels, so that the PDF stays small, and more dots per inch then make them sharp.
 _MOST_VECTORS = 1500
 _PIXELS_PER_INCH = 200
-# Bins of a running median: as many as leave so many readings in each, within limits.
+# Bins of a running median: as many as leave so many measurements in each, within limits.
 _FEWEST_BINS, _MOST_BINS, _READINGS_IN_BIN = 16, 50, 80
-# No line is drawn over a share of the range in which there is no reading.
+# No line is drawn over a share of the range in which there is no measurement.
 _GAP = 0.1
 _FEWEST_IN_BIN = 4
 # Of more states than this only one is drawn in each cell of a grid of so many columns.
@@ -42,14 +42,14 @@ def residuals(table):
     """
     drawn_against, stages = quantities(table), _stages(table)
     if not drawn_against:
-        return note("All readings were taken at the same joint angles and load: there is nothing to draw them against.")
+        return note("All measurements were taken at the same joint angles and load: there is nothing to draw them against.")
     # Three in a row, or four where that saves a row.
     columns = min((3, 4), key=lambda count: -(-len(drawn_against) // count))
     rows = -(-len(drawn_against) // columns)
     figure, axes = panels(rows, columns, 24 + 43 * rows, sharey=True)
     parts = {stage: components(table, stage) for stage in stages}
     scale, unit = length_unit(np.abs(parts["before"]))
-    # A few readings may lie outside, which would press all others together.
+    # A few measurements may lie outside, which would press all others together.
     low, high = scale * np.nanquantile(parts["before"], [0.001, 0.999])
     limits = (min(1.2 * low, -0.2 * high), max(1.2 * high, -0.2 * low))
     held_out = table["held_out"].astype(bool)
@@ -76,7 +76,7 @@ def residuals(table):
 
 @styled
 def arrows(table):
-    """Residuals as arrows where the readings were taken, from the side and from above.
+    """Residuals as arrows where the measurements were taken, from the side and from above.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def quantities(table):
 
 
 def components(table, stage):
-    """Position residuals in m, radial, tangential and vertical at the place of each reading, and along its force.
+    """Position residuals in m, radial, tangential and vertical at the place of each measurement, and along its force.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def length_unit(lengths_m):
 
 
 def bins_of(values):
-    """Bin of each reading: its own for each value where there are few, else of about equal counts; -1 where there is none."""
+    """Bin of each measurement: its own for each value where there are few, else of about equal counts; -1 where none."""
     finite = np.isfinite(values)
     levels = np.unique(np.round(values[finite], 3))
     edges = levels[:-1] + np.diff(levels) / 2

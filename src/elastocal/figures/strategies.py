@@ -146,7 +146,7 @@ def bias_and_accuracy(metrics, per_dataset, titles, order):
 
 @styled
 def accuracy_of_one_data_set(per_dataset, titles, order, length):
-    """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own readings.
+    """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own measurements.
 
     Parameters
     ----------

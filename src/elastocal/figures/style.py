@@ -3,7 +3,7 @@
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 
 WIDTH_MM = 165
 # Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
@@ -73,5 +73,5 @@ def save(figure, pdf, png):
         Paths; each file appears whole or not at all.
     """
     for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
-        with appearing_whole(path) as partial:
+        with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)

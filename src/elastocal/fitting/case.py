@@ -5,11 +5,11 @@ from dataclasses import asdict, dataclass, fields
 import numpy as np
 
 from elastocal.campaigns.campaign import Campaign, described_campaign
-from elastocal.campaigns.columns import readings_from
+from elastocal.campaigns.columns import measurements_from
 from elastocal.effects.catalogue import candidates_on, declared_candidates
 from elastocal.fitting.model import Model, declared_model
 from elastocal.fitting.noise import Noise
-from elastocal.fitting.observations import Observations, averaged, without_wild_repeats
+from elastocal.fitting.observations import Observations, averaged, without_outlying_repeats
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
 
@@ -21,9 +21,9 @@ class Case:
     Attributes
     ----------
     campaign : Campaign
-        Its readings are those to fit.
+        Its measurements are those to fit.
     observations : Observations
-        Their repeats averaged, without the wild ones.
+        Their repeats averaged, without the outlying ones.
     model : Model
         As declared.
     candidates : dict of str to Candidate
@@ -44,7 +44,7 @@ def case_from(descriptions, columns):
     descriptions : dict
         With ``campaign`` and ``robot``, as step 1 writes them.
     columns : dict of str to ndarray
-        Of the readings table.
+        Of the measurements table.
 
     Returns
     -------
@@ -52,11 +52,11 @@ def case_from(descriptions, columns):
     """
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
-    campaign = described_campaign(descriptions["campaign"], robot, readings_from(columns), source)
+    campaign = described_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
     sites = sites_of(robot)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
-    return Case(campaign, averaged(without_wild_repeats(campaign.readings)), model, candidates)
+    return Case(campaign, averaged(without_outlying_repeats(campaign.measurements)), model, candidates)
 
 
 def noise_facts(noise):

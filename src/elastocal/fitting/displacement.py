@@ -3,14 +3,14 @@
 import numpy as np
 
 from elastocal.effects import declared_weight
-from elastocal.effects.circumstances import MASS_PARAMETERS, at_coordinates, circumstances_of, with_springs
+from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, with_springs
 
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.
 _PASSES = 2
 
 
-def circumstances(model, estimate, states, coordinates=None):
+def conditions(model, estimate, states, coordinates=None):
     """What the effects of a model may depend on, in some states.
 
     Parameters
@@ -24,10 +24,10 @@ def circumstances(model, estimate, states, coordinates=None):
 
     Returns
     -------
-    Circumstances
+    Conditions
     """
     compliance, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-    around = circumstances_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
+    around = conditions_of(model.sites, compliance, states, model.time_zero_s, corrections, model.row_span, coordinates)
     for _ in range(_PASSES if coordinates is None else 0):
         around = at_coordinates(around, displaced_coordinates(model, estimate, around))
     return around
@@ -39,7 +39,7 @@ def joint_compliances(model, estimate):
 
 
 def mass_corrections(model, estimate):
-    """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Circumstances`."""
+    """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Conditions`."""
     return _values_of(declared_weight.EFFECT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
 
 
@@ -50,23 +50,23 @@ def _values_of(name, model, estimate, otherwise):
     return otherwise
 
 
-def with_springs_of(model, estimate, circumstances):
-    """Circumstances with the joint compliances and masses of an estimate, where they are parameters.
+def with_springs_of(model, estimate, conditions):
+    """Conditions with the joint compliances and masses of an estimate, where they are parameters.
 
     Parameters
     ----------
     model : Model
     estimate : Estimate
-    circumstances : Circumstances
+    conditions : Conditions
 
     Returns
     -------
-    Circumstances
+    Conditions
     """
-    return with_springs(circumstances, joint_compliances(model, estimate), mass_corrections(model, estimate))
+    return with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
 
 
-def displaced_coordinates(model, estimate, circumstances):
+def displaced_coordinates(model, estimate, conditions):
     """Coordinates of the sites in each state: joint angles, springs under load and effects.
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
@@ -75,7 +75,7 @@ def displaced_coordinates(model, estimate, circumstances):
     -------
     ndarray (S, C)
     """
-    around = with_springs_of(model, estimate, circumstances)
+    around = with_springs_of(model, estimate, conditions)
     displaced = np.zeros((len(around.joint_angles), model.sites.chain.coordinates))
     displaced[:, : model.sites.joints] = around.joint_angles
     if not model.identifies_compliance:
@@ -98,7 +98,7 @@ def displace(displaced, effect, values, shapes, around):
         Its linear parameters.
     shapes : ndarray
         Its shape parameters.
-    around : Circumstances
+    around : Conditions
         Of the S states.
     """
     for value, law in zip(values, effect.displacement(around, *shapes), strict=True):

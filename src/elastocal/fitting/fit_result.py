@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.effects.circumstances import at_states
-from elastocal.fitting.displacement import circumstances
+from elastocal.effects.conditions import at_states
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import Noise
@@ -24,7 +24,7 @@ class Fit:
     estimate : Estimate
     noise : Noise
     held : ndarray of bool (P,)
-        Parameters that the data cannot tell.
+        Parameters that are not identifiable from the data.
     covariance : ndarray (P, P)
         Of the parameters; zero where held.
     weights : ndarray (M,)
@@ -34,7 +34,7 @@ class Fit:
         m and rad, base axes.
     joint_jacobian : ndarray (M, rows, n) or None
         Of each target with respect to the joints; None where there are too many to keep it.
-    circumstances : Circumstances or None
+    conditions : Conditions or None
         Of the states fitted; None where these are too many to keep it.
     converged : bool
         Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
@@ -49,7 +49,7 @@ class Fit:
     whitener: Whitening
     residual: np.ndarray
     joint_jacobian: np.ndarray
-    circumstances: object
+    conditions: object
     converged: bool = True
 
     @property
@@ -82,10 +82,10 @@ class Fit:
         """
         for states, seen in parts_of(observations, observations_at_once(observations.rows, len(self.held))):
             some = part_at(observations, states, seen)
-            if self.circumstances is None:
-                around = circumstances(self.model, self.estimate, some.states)
+            if self.conditions is None:
+                around = conditions(self.model, self.estimate, some.states)
             else:
-                around = at_states(self.circumstances, states)
+                around = at_states(self.conditions, states)
             line = linearize(self.model, self.estimate, some, around)
             white = whitening(some, self.jacobian_at(line, seen), self.noise)
             yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])

@@ -7,7 +7,7 @@ from scipy.linalg import solve_triangular
 _BOUND_TO_SHAPE = 0.5
 
 
-def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
+def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False):
     """Least squares over the parameters that the data can tell.
 
     A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
@@ -27,7 +27,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
         One over the variance of the prior about zero; 0 for none.
     present : float or ndarray (P,)
         Values from which the step is taken.
-    bending : bool or ndarray of bool (P,)
+    nonlinear : bool or ndarray of bool (P,)
         As in `identifiable`.
 
     Returns
@@ -38,17 +38,17 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     held : ndarray of bool (P,)
     """
     scaled = left * plausible
-    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, bending)
+    return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, nonlinear)
 
 
-def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0, bending=False):
+def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False):
     """As `solve_identifiable`, from products of sensitivities in plausible sizes.
 
     Parameters
     ----------
     gram : ndarray (P, P)
     along : ndarray (P,)
-    plausible, frozen, penalty, present, bending
+    plausible, frozen, penalty, present, nonlinear
         As in `solve_identifiable`.
 
     Returns
@@ -58,7 +58,7 @@ def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0,
     """
     gram = gram + np.diag(np.broadcast_to(penalty, len(plausible)) * plausible**2)
     along = along - plausible * np.broadcast_to(penalty * present, len(plausible))
-    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, bending)))
+    held = ~identifiable(gram, *(np.broadcast_to(flags, len(plausible)) for flags in (frozen, nonlinear)))
     free = np.flatnonzero(~held)
     step, covariance = np.zeros(len(plausible)), np.zeros((len(plausible),) * 2)
     if len(free):
@@ -68,7 +68,7 @@ def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0,
     return step, covariance, held
 
 
-def identifiable(gram, frozen, bending):
+def identifiable(gram, frozen, nonlinear):
     """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
 
     Parameters
@@ -77,7 +77,7 @@ def identifiable(gram, frozen, bending):
         Information on the parameters, each in units of its plausible size.
     frozen : ndarray of bool (P,)
         Left out from the start.
-    bending : ndarray of bool (P,)
+    nonlinear : ndarray of bool (P,)
         Shapes: given up before a parameter that they are bound to, as that of their law is where it is nearly a straight line.
 
     Returns
@@ -102,7 +102,7 @@ def identifiable(gram, frozen, bending):
         worst = int(np.argmax(deviation))
         if deviation[worst] <= 1.0:
             break
-        correlation = np.where(bending[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
+        correlation = np.where(nonlinear[kept], np.abs(covariance[worst]) / (deviation[worst] * deviation), 0.0)
         shape = int(np.argmax(correlation))
         kept.pop(shape if correlation[shape] > _BOUND_TO_SHAPE else worst)
     mask = np.zeros(len(gram), bool)

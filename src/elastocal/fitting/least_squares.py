@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from elastocal.fitting.memory import kept_circumstances
+from elastocal.fitting.memory import kept_conditions
 from elastocal.fitting.observations import sample_of
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
@@ -37,12 +37,12 @@ def fit(model, observations, noise, start=None, reweighted=False, settled=SETTLE
     """
     few = sample_of(observations, _MOST_STARTED_FROM)
     if len(few) < len(observations):
-        # Where all the readings lead is close to where some of them do.
+        # Where all the measurements lead is close to where some of them do.
         start = fit(model, few, noise, start, reweighted, ON_THE_WAY).estimate
-        around = kept_circumstances(model, start, observations)
+        around = kept_conditions(model, start, observations)
         return robustly(model, observations, around, noise, start, reweighted=True, settled=settled)
     start = registered(model, observations) if start is None else start
-    around = kept_circumstances(model, start, observations)
+    around = kept_conditions(model, start, observations)
     return robustly(model, observations, around, noise, start, reweighted=reweighted, settled=settled)
 
 
@@ -72,5 +72,5 @@ def fit_frames(fitted, model, observations, noise, own_targets=True):
     if not own_targets:
         start = replace(start, target_rotation=found.target_rotation)
     frozen = np.array([not owner.startswith(("frame ", "target ")) for owner, _ in parameters(model, start)], bool)
-    around = kept_circumstances(model, start, observations)
+    around = kept_conditions(model, start, observations)
     return robustly(model, observations, around, noise, start, frozen).estimate

@@ -1,11 +1,11 @@
-"""Sensitivities of the readings: the Jacobian of the chain times the displacement of its coordinates per parameter."""
+"""Sensitivities of the measurements: the Jacobian of the chain times the displacement of its coordinates per parameter."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from elastocal.effects import declared_weight
-from elastocal.effects.circumstances import Circumstances, with_springs
+from elastocal.effects.conditions import Conditions, with_springs
 from elastocal.fitting.displacement import displace, displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
 from elastocal.mechanics.motion import motion
@@ -30,29 +30,29 @@ class Linearization:
         Of each target with respect to the coordinates of the sites.
     sensitivities : ndarray (M, rows, P)
         With respect to `parameters`.
-    circumstances : Circumstances
+    conditions : Conditions
         Where the robot has yielded to, by this estimate.
     """
 
     residual: np.ndarray
     coordinate_jacobian: np.ndarray
     sensitivities: np.ndarray
-    circumstances: Circumstances
+    conditions: Conditions
 
 
-def linearize(model, estimate, observations, circumstances):
+def linearize(model, estimate, observations, conditions):
     """Residuals of a model and their sensitivities.
 
     Parameters
     ----------
-    model, estimate, observations, circumstances
+    model, estimate, observations, conditions
         As in `predict`.
 
     Returns
     -------
     Linearization
     """
-    around = with_springs_of(model, estimate, circumstances)
+    around = with_springs_of(model, estimate, conditions)
     coordinates = displaced_coordinates(model, estimate, around)
     count, rows, chain, points = len(observations), model.rows, model.sites.chain, target_points(model, estimate)
     moved = motion(chain, coordinates, (*model.sites.followed, *points))
@@ -89,14 +89,14 @@ def linearize(model, estimate, observations, circumstances):
     return Linearization(residual, jacobian, sensitivities, replace(around, motion=moved))
 
 
-def effect_columns(effects, circumstances, coordinate_jacobian, state):
-    """Sensitivities of the readings to the linear parameters of effects.
+def effect_columns(effects, conditions, coordinate_jacobian, state):
+    """Sensitivities of the measurements to the linear parameters of effects.
 
     Parameters
     ----------
     effects : sequence of (Candidate, sequence of float)
         With their shape parameters.
-    circumstances : Circumstances
+    conditions : Conditions
     coordinate_jacobian : ndarray (M, rows, C)
     state : ndarray (M,)
         State of each observation.
@@ -105,7 +105,7 @@ def effect_columns(effects, circumstances, coordinate_jacobian, state):
     -------
     ndarray (M, rows, D)
     """
-    laws = [law for effect, shapes in effects for law in effect.displacement(circumstances, *shapes)]
+    laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
     return _columns(laws, coordinate_jacobian, state)
 
 
@@ -125,7 +125,7 @@ def _target_columns(rotation, mask, rows):
     return columns
 
 
-def _shape_columns(effect, values, shapes, circumstances, jacobian, state):
+def _shape_columns(effect, values, shapes, conditions, jacobian, state):
     columns = np.zeros((*jacobian.shape[:2], len(shapes)))
     for number in range(len(shapes)):
         shape = effect.shapes[number]
@@ -134,7 +134,7 @@ def _shape_columns(effect, values, shapes, circumstances, jacobian, state):
         for sign in (1, -1):
             moved = shapes.copy()
             moved[number] += sign * step
-            sides.append(effect_columns([(effect, moved)], circumstances, jacobian, state) @ values)
+            sides.append(effect_columns([(effect, moved)], conditions, jacobian, state) @ values)
         columns[..., number] = (sides[0] - sides[1]) / (2 * step)
     return columns
 

@@ -1,13 +1,13 @@
 """How much of a long campaign a fit holds at once: what is beyond comes in parts and is found again in each step."""
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 
 # Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
 # linearised again in each step.
 _MOST_HELD = 4_000_000
 # Observations of a part: what it makes stays in the processor's cache and is not asked of the system again and again.
 _MOST_AT_ONCE = 4000
-# States beyond which circumstances are not kept from step to step but found again: they take some ten kilobytes each.
+# States beyond which conditions are not kept from step to step but found again: they take some ten kilobytes each.
 _MOST_STATES = 20_000
 
 
@@ -21,8 +21,8 @@ def held_at_once(observations, columns):
     return observations.rows * len(observations) * max(columns, 60) <= _MOST_HELD
 
 
-def kept_circumstances(model, estimate, observations):
-    """Circumstances of all states, or None where these are too many to keep them.
+def kept_conditions(model, estimate, observations):
+    """Conditions of all states, or None where these are too many to keep them.
 
     Parameters
     ----------
@@ -32,6 +32,6 @@ def kept_circumstances(model, estimate, observations):
 
     Returns
     -------
-    Circumstances or None
+    Conditions or None
     """
-    return circumstances(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None
+    return conditions(model, estimate, observations.states) if len(observations.states) <= _MOST_STATES else None

@@ -1,4 +1,4 @@
-"""What is taken to make the readings: nominal robot, frames, targets and any set of effects, and values of all that is open."""
+"""What the measurements are modelled by: nominal robot, frames, targets, any set of effects, and values of what is unknown."""
 
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ from elastocal.mechanics.sites import Sites, sites_of
 
 @dataclass(frozen=True)
 class Model:
-    """What is taken to make the readings.
+    """What is taken to make the measurements.
 
     Attributes
     ----------
@@ -27,9 +27,9 @@ class Model:
     effects : tuple of Candidate
         Joint compliances, where they are identified, and errors of declared masses, where there are any, among them.
     time_zero_s : float
-        From which effects count the time: the first reading to be fitted.
+        From which effects count the time: the first measurement to be fitted.
     row_span : (int, int) or None
-        First and last row of the readings to be fitted, between which the campaign made its progress.
+        First and last row of the measurements to be fitted, between which the campaign made its progress.
     """
 
     sites: Sites
@@ -108,6 +108,6 @@ def declared_model(campaign, effects=()):
         6 if campaign.measured == "pose" else 3,
         campaign.robot.compliance,
         (*springs, *weight, *effects),
-        0.0 if campaign.readings.time_s is None else float(campaign.readings.time_s.min()),
-        (int(campaign.readings.row.min()), int(campaign.readings.row.max())) if len(campaign.readings) else None,
+        0.0 if campaign.measurements.time_s is None else float(campaign.measurements.time_s.min()),
+        (int(campaign.measurements.row.min()), int(campaign.measurements.row.max())) if len(campaign.measurements) else None,
     )

@@ -1,4 +1,4 @@
-"""Noise of the readings: a sensor part, alike in all directions, and the repeatability of the joints, seen through the
+"""Noise of the measurements: a sensor part, alike in all directions, and the repeatability of the joints, seen through the
 Jacobian.
 
 Repeats of a state tell both: each repeat is a fresh approach, so that the joints come to rest a little differently and move all
@@ -12,11 +12,11 @@ from scipy.linalg import helmert
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.observations import each_approach, select_states, without_wild_repeats
+from elastocal.fitting.observations import each_approach, select_states, without_outlying_repeats
 
-# Fewer contrasts of repeats than this cannot tell the joints' part from the sensor's.
+# Fewer contrasts of repeats than this do not separate the joints' part from the sensor's.
 FEWEST_FOR_JOINTS = 60
 # Fewer than this say nothing of their own.
 FEWEST = 9
@@ -32,7 +32,7 @@ _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of one reading.
+    """Standard deviations of one measurement.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Noise:
     degrees_of_freedom : int
         Contrasts of repeats behind the figures; 0 where they are declared.
     pose_rad : float
-        Error of each joint that all readings of a pose have in common.
+        Error of each joint that all measurements of a pose have in common.
     """
 
     source: str
@@ -55,12 +55,12 @@ class Noise:
     pose_rad: float = 0.0
 
     @property
-    def of_readings(self):
-        """The same without what the readings of a pose have in common."""
+    def of_measurements(self):
+        """The same without what the measurements of a pose have in common."""
         return replace(self, pose_rad=0.0)
 
     def scaled(self, factor):
-        """The same with the noise of single readings multiplied."""
+        """The same with the noise of single measurements multiplied."""
         return replace(
             self,
             position_m=factor * self.position_m,
@@ -77,22 +77,22 @@ def declared_noise(campaign):
     return Noise("declared", position, campaign.noise.get("orientation_rad", position), np.zeros(campaign.robot.joints))
 
 
-def noise_from_repeats(model, estimate, readings):
+def noise_from_repeats(model, estimate, measurements):
     """Noise by restricted maximum likelihood from the differences between repeats.
 
     Parameters
     ----------
     model : Model
     estimate : Estimate
-        Its frames turn readings into base axes; nothing else of it matters.
-    readings : Readings
+        Its frames turn measurements into base axes; nothing else of it matters.
+    measurements : Measurements
 
     Returns
     -------
     Noise or None
         None where there are too few repeats, or where they do not differ at all.
     """
-    contrasts, jacobians = _contrasts(model, estimate, readings)
+    contrasts, jacobians = _contrasts(model, estimate, measurements)
     total = sum(part.size for part in contrasts)
     if total < FEWEST:
         return None
@@ -121,13 +121,13 @@ def noise_from_repeats(model, estimate, readings):
     return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
 
 
-def taken_noise(campaign, model, estimate, readings):
+def chosen_noise(campaign, model, estimate, measurements):
     """Noise from repeats where there are enough, else as declared.
 
     Parameters
     ----------
     campaign : Campaign
-    model, estimate, readings
+    model, estimate, measurements
         As in `noise_from_repeats`.
 
     Returns
@@ -136,7 +136,7 @@ def taken_noise(campaign, model, estimate, readings):
         None where there are neither.
     warnings : list of str
     """
-    repeats, declared = noise_from_repeats(model, estimate, readings), declared_noise(campaign)
+    repeats, declared = noise_from_repeats(model, estimate, measurements), declared_noise(campaign)
     if repeats is None:
         return declared, [] if declared else ["no repeats and no declared noise: nothing says how large the residual may be"]
     if declared is None:
@@ -149,8 +149,8 @@ def taken_noise(campaign, model, estimate, readings):
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
 
 
-def reading_covariances(noise, jacobians, rows):
-    """Covariance of all readings of one approach.
+def measurement_covariances(noise, jacobians, rows):
+    """Covariance of all measurements of one approach.
 
     Parameters
     ----------
@@ -172,12 +172,12 @@ def reading_covariances(noise, jacobians, rows):
     return covariance
 
 
-def _contrasts(model, estimate, readings):
+def _contrasts(model, estimate, measurements):
     """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
-    if not len(readings) or not np.ptp(readings.repeat):
+    if not len(measurements) or not np.ptp(measurements.repeat):
         return [], []
     bare, at = replace(model, effects=()), replace(estimate, coefficients=(), shapes=())
-    observations, repeated = each_approach(without_wild_repeats(readings))
+    observations, repeated = each_approach(without_outlying_repeats(measurements))
     first = np.flatnonzero(np.diff(repeated, prepend=-1))
     # The targets that an approach saw, beside those of the first approach to its state.
     seen = np.bincount(observations.state)
@@ -195,7 +195,7 @@ def _contrasts(model, estimate, readings):
     if not chosen.any():
         return [], []
     some = select_states(observations, chosen)
-    line = linearize(bare, at, some, circumstances(bare, at, some.states))
+    line = linearize(bare, at, some, conditions(bare, at, some.states))
     state, seen = repeated[chosen], seen[chosen]
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
     first = np.flatnonzero(np.diff(state, prepend=-1))
@@ -221,7 +221,7 @@ def _negative_log_likelihood(logs, contrasts, jacobians, rows):
     total, slope = 0.0, np.zeros(len(values))
     for vectors, jacobian in zip(contrasts, jacobians, strict=True):
         groups, targets = jacobian.shape[:2]
-        inverse = np.linalg.inv(reading_covariances(noise, jacobian, rows))
+        inverse = np.linalg.inv(measurement_covariances(noise, jacobian, rows))
         told = (inverse @ vectors[..., None])[..., 0]
         total += 0.5 * ((vectors * told).sum() - np.linalg.slogdet(inverse)[1].sum())
         # By an element of the covariance: half of (inverse - told told^T).

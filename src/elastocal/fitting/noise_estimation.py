@@ -1,4 +1,4 @@
-"""Steps 2 and 3: the noise of the readings, and the model as declared."""
+"""Steps 2 and 3: the noise of the measurements, and the model as declared."""
 
 from dataclasses import replace
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
-from elastocal.fitting.noise import FINEST, Noise, taken_noise
+from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.registration import registered
 
 _ASSUMED_M = 1e-4
@@ -31,7 +31,7 @@ def noise_of(case):
         ``noise`` and ``warnings``, JSON-serialisable.
     """
     start = registered(case.model, case.observations)
-    noise, warnings = taken_noise(case.campaign, case.model, start, case.campaign.readings)
+    noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)
     if noise is None:
         assumed = Noise("residual", _ASSUMED_M, _ASSUMED_M, np.zeros(case.campaign.robot.joints))
         left = fit(case.model, case.observations, assumed, start).residual

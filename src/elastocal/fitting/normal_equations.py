@@ -1,22 +1,22 @@
-"""Normal equations of a step, added up over readings that are held whole or come in parts of whole poses."""
+"""Normal equations of a step, added up over measurements that are held whole or come in parts of whole poses."""
 
 import numpy as np
 
-from elastocal.effects.circumstances import at_states, with_springs
-from elastocal.fitting.displacement import circumstances, displaced_coordinates, joint_compliances, mass_corrections
+from elastocal.effects.conditions import at_states, with_springs
+from elastocal.fitting.displacement import conditions, displaced_coordinates, joint_compliances, mass_corrections
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import held_at_once, kept_circumstances, observations_at_once
+from elastocal.fitting.memory import held_at_once, kept_conditions, observations_at_once
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.whitening import Whitening, whitening
 
 
 class Parts:
-    """Readings beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
+    """Measurements beside a model, whole or in parts of whole poses: what a step needs of them adds up over the parts.
 
     Whitening in parts is that of the last step; where the noise has no part of the joints it is always the same. Of states that
-    are too many to keep their circumstances, the coordinates are kept at which loads are taken.
+    are too many to keep their conditions, the coordinates are kept at which loads are taken.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ class Parts:
     observations : Observations
         M of them.
     noise : Noise
-    around : Circumstances or None
+    around : Conditions or None
         Of all their states; None where these are too many to keep it.
     plausible : ndarray (P,)
         Plausible size of each parameter.
@@ -42,7 +42,7 @@ class Parts:
             self.around = [at_states(around, states) for states, _ in self.slices]
         self.coordinates = [None] * len(self.parts)
         self.whiteners = [None] * len(self.parts)
-        # Of so many states that circumstances are not kept neither is this.
+        # Of so many states that conditions are not kept neither is this.
         shape = len(observations), observations.rows, model.sites.joints
         self.jacobian = None if around is None else np.zeros(shape)
         self.line = None
@@ -62,7 +62,7 @@ class Parts:
         """Take loads and whitening at the present estimate."""
         self.origin = self.estimate
         if self.whole:
-            self.around = [self.line.circumstances]
+            self.around = [self.line.conditions]
             self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
             self.whiteners = [whitening(self.observations, self.jacobian, self.noise)]
         elif self.whiteners[0] is None:
@@ -111,16 +111,16 @@ class Parts:
         return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
 
     def fit(self, estimate, held, covariance, weights, converged):
-        """The `Fit` of these readings."""
+        """The `Fit` of these measurements."""
         model, around = self.model, None
         if self.whole:
             springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
-            around = with_springs(self.line.circumstances, *springs)
+            around = with_springs(self.line.conditions, *springs)
             residual = residuals(model, estimate, self.observations, around)
         else:
             self.linearize(estimate)
             residual = self.residual
-            around = kept_circumstances(model, estimate, self.observations)
+            around = kept_conditions(model, estimate, self.observations)
         whitener = Whitening(
             tuple(
                 (members + edges[1].start, factor)
@@ -139,7 +139,7 @@ class Parts:
             moved, displaced = self.coordinates[number]
             coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
             coordinates[:, moved] = displaced
-        return circumstances(self.model, estimate or self.estimate, states, coordinates)
+        return conditions(self.model, estimate or self.estimate, states, coordinates)
 
     def _linearized(self, number, part):
         around = self._around(number)
@@ -149,7 +149,7 @@ class Parts:
             moved = np.flatnonzero(displaced.any(axis=0))
             self.coordinates[number] = moved, displaced[:, moved]
         else:
-            self.around[number] = line.circumstances
+            self.around[number] = line.conditions
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
         if self.jacobian is not None:
             self.jacobian[self.slices[number][1]] = jacobian

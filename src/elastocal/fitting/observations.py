@@ -1,4 +1,4 @@
-"""Readings as the loop uses them: repeats averaged, grouped by the state of the robot in which they were taken."""
+"""Measurements as the loop uses them: repeats averaged, grouped by the state of the robot in which they were taken."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.groups import groups_of
 
-# Readings this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
+# Measurements this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
 
 
@@ -86,8 +86,8 @@ def state_clusters(states):
 
     Parameters
     ----------
-    states : States or Readings
-        Of readings, that of each reading.
+    states : States or Measurements
+        Of measurements, that of each measurement.
 
     Returns
     -------
@@ -96,27 +96,27 @@ def state_clusters(states):
     return groups_of(np.column_stack([states.session, states.pose]))[1]
 
 
-def averaged(readings):
+def averaged(measurements):
     """Observations with the repeats averaged that were approached alike.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
         Of `campaign`.
 
     Returns
     -------
     Observations
     """
-    return _observations(readings, _approached_alike(readings))
+    return _observations(measurements, _approached_alike(measurements))
 
 
-def each_approach(readings):
+def each_approach(measurements):
     """Observations of every single approach: repeats are states of their own.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
@@ -124,33 +124,34 @@ def each_approach(readings):
     repeated : ndarray (S,)
         Number of the state that would hold this approach if repeats were averaged.
     """
-    key = _approached_alike(readings)
-    single = np.column_stack([key, readings.repeat])
-    return _observations(readings, single), groups_of(key[groups_of(single)[0]])[1]
+    key = _approached_alike(measurements)
+    single = np.column_stack([key, measurements.repeat])
+    return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
 
 
-def without_wild_repeats(readings):
-    """Readings without those that are far from the other repeats of their state and target.
+def without_outlying_repeats(measurements):
+    """Measurements without those that are far from the other repeats of their state and target.
 
-    A wild one would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is wild.
+    An outlier would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is
+    outlying.
 
     Parameters
     ----------
-    readings : Readings
+    measurements : Measurements
 
     Returns
     -------
-    Readings
+    Measurements
     """
-    group = groups_of(np.column_stack([_approached_alike(readings), readings.target]))[1]
-    off = np.abs(readings.position - _medians(readings.position, group)[group])
+    group = groups_of(np.column_stack([_approached_alike(measurements), measurements.target]))[1]
+    off = np.abs(measurements.position - _medians(measurements.position, group)[group])
     telling = np.bincount(group)[group] > 2
     if not telling.any():
-        return readings
+        return measurements
     apart = off[telling]
     # The middle one of an odd number is not off at all, and tells nothing of the others.
     usual = np.median(apart[apart > 0]) if apart.any() else 0.0
-    return readings.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
+    return measurements.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
 
 
 def _medians(values, group):
@@ -161,40 +162,40 @@ def _medians(values, group):
     return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
 
 
-def _approached_alike(readings):
-    key = np.column_stack([readings.session, readings.pose, readings.load])
-    return key if readings.approach is None else np.column_stack([key, readings.approach])
+def _approached_alike(measurements):
+    key = np.column_stack([measurements.session, measurements.pose, measurements.load])
+    return key if measurements.approach is None else np.column_stack([key, measurements.approach])
 
 
-def _observations(readings, key):
+def _observations(measurements, key):
     first, state_of = groups_of(key)
-    pairs = np.column_stack([state_of, readings.target])
+    pairs = np.column_stack([state_of, measurements.target])
     first_pair, pair_of = groups_of(pairs)
     pairs = pairs[first_pair]
 
     def of_states(values):
         return None if values is None else _means(values, state_of)
 
-    repeats = np.full(len(first), len(readings))
+    repeats = np.full(len(first), len(measurements))
     np.minimum.at(repeats, pairs[:, 0], np.bincount(pair_of))
-    first_row = readings.row[first].copy()
-    np.minimum.at(first_row, state_of, readings.row)
+    first_row = measurements.row[first].copy()
+    np.minimum.at(first_row, state_of, measurements.row)
     states = States(
-        session=readings.session[first],
-        pose=readings.pose[first],
-        load=readings.load[first],
-        joint_angles=of_states(readings.joint_angles),
-        wrench=of_states(readings.wrench),
+        session=measurements.session[first],
+        pose=measurements.pose[first],
+        load=measurements.load[first],
+        joint_angles=of_states(measurements.joint_angles),
+        wrench=of_states(measurements.wrench),
         repeats=repeats,
-        approach=None if readings.approach is None else readings.approach[first],
-        time_s=of_states(readings.time_s),
-        temperature_c=of_states(readings.temperature_c),
+        approach=None if measurements.approach is None else measurements.approach[first],
+        time_s=of_states(measurements.time_s),
+        temperature_c=of_states(measurements.temperature_c),
         row=first_row,
     )
     rotation = None
-    if readings.rotation_vector is not None:
-        rotation = _mean_rotations(Rotation.from_rotvec(readings.rotation_vector), pair_of)
-    return Observations(states, pairs[:, 0], pairs[:, 1], _means(readings.position, pair_of), rotation)
+    if measurements.rotation_vector is not None:
+        rotation = _mean_rotations(Rotation.from_rotvec(measurements.rotation_vector), pair_of)
+    return Observations(states, pairs[:, 0], pairs[:, 1], _means(measurements.position, pair_of), rotation)
 
 
 def select_states(observations, kept):

@@ -39,7 +39,7 @@ def parameters(model, estimate):
     return found
 
 
-def bends(model, estimate):
+def nonlinear_parameters(model, estimate):
     """Which of the `parameters` are shapes, ndarray of bool (P,)."""
     shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
     return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
@@ -103,10 +103,10 @@ def stepped(model, estimate, step):
             if model.rows == 6:
                 target_rotation[number] = Rotation.from_rotvec(take(3)).as_matrix() @ target_rotation[number]
     coefficients, shapes = [], []
-    for effect, values, bent in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
+    for effect, values, shape in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
         coefficients.append(values + take(len(values)))
         limits = np.array([(shape.lowest, shape.highest) for shape in effect.shapes]).reshape(-1, 2)
-        shapes.append(np.clip(bent + take(len(bent)), *limits.T))
+        shapes.append(np.clip(shape + take(len(shape)), *limits.T))
     return Estimate(
         estimate.sessions,
         frame_rotation,

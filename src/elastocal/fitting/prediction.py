@@ -1,4 +1,4 @@
-"""What a model predicts: exact poses of the targets, and residuals of the readings, both in base axes."""
+"""What a model predicts: exact poses of the targets, and residuals of the measurements, both in base axes."""
 
 from dataclasses import replace
 
@@ -9,7 +9,7 @@ from elastocal.mechanics.kinematics import poses_of_points
 from elastocal.mechanics.pose_differences import pose_differences
 
 
-def predict(model, estimate, observations, circumstances):
+def predict(model, estimate, observations, conditions):
     """Exact poses of the targets, in base axes.
 
     Parameters
@@ -17,7 +17,7 @@ def predict(model, estimate, observations, circumstances):
     model : Model
     estimate : Estimate
     observations : Observations
-    circumstances : Circumstances
+    conditions : Conditions
         Of the states of the observations.
 
     Returns
@@ -25,18 +25,18 @@ def predict(model, estimate, observations, circumstances):
     position : ndarray (M, 3)
     rotation : ndarray (M, 3, 3)
     """
-    coordinates = displaced_coordinates(model, estimate, circumstances)
+    coordinates = displaced_coordinates(model, estimate, conditions)
     position, rotation = poses_of_points(model.sites.chain, coordinates, target_points(model, estimate))
     seen = observations.target, observations.state
     return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
 
 
-def residuals(model, estimate, observations, circumstances):
+def residuals(model, estimate, observations, conditions):
     """Measured less predicted, in base axes.
 
     Parameters
     ----------
-    model, estimate, observations, circumstances
+    model, estimate, observations, conditions
         As in `predict`.
 
     Returns
@@ -44,7 +44,7 @@ def residuals(model, estimate, observations, circumstances):
     ndarray (M, rows)
         m and, where poses are measured, rad.
     """
-    position, rotation = predict(model, estimate, observations, circumstances)
+    position, rotation = predict(model, estimate, observations, conditions)
     return differences(measured_in_base(estimate, observations), position, rotation)
 
 

@@ -40,7 +40,7 @@ def registered(model, observations):
     frames = np.tile(np.eye(3), (len(sessions), 1, 1)), np.zeros((len(sessions), 3))
     offsets = np.array([target.offset_m or (0.0, 0.0, 0.0) for target in model.targets], float)
     seen = set(observations.target.tolist())
-    # A target may have all of its readings among those held out.
+    # A target may have all of its measurements among those held out.
     unknown = [index for index, target in enumerate(model.targets) if target.offset_m is None and index in seen]
     for _ in range(_ROUNDS if model.fitted_frames and unknown else 1):
         placed = nominal_position + (nominal_rotation @ offsets[observations.target][..., None])[..., 0]

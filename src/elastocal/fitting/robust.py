@@ -6,7 +6,7 @@ from statsmodels.robust.norms import HuberT
 
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.normal_equations import Parts
-from elastocal.fitting.parameters import bends, limits, parameter_values, parameters, stepped
+from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
 
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
@@ -25,8 +25,8 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
     """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
-    (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where readings have errors in common there is none: weights
-    come before whitening, which would carry an outlier into the readings beside it, and the estimate solves the weighted
+    (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where measurements have errors in common there is none: weights
+    come before whitening, which would carry an outlier into the measurements beside it, and the estimate solves the weighted
     equations (Preisser and Qaqish 1999). A whitening belongs to the axes in which a step begins: residuals after the step
     are turned into these, or a fit would turn frame and robot together on and on. Against curvature a step is backtracked
     (Nocedal and Wright 2006, 3.1). The first step gives all observations one weight, unless the start comes of reweighted
@@ -37,7 +37,7 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
     model : Model
     observations : Observations
         M of them.
-    around : Circumstances or None
+    around : Conditions or None
         Of all their states; None where these are too many to keep it.
     noise : Noise
     estimate : Estimate
@@ -54,10 +54,10 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
-    # What has a prior need not be held: where the data cannot tell it, the prior does.
+    # What has a prior need not be held: where the data do not identify it, the prior does.
     plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
     penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
-    bending, bounds = bends(model, estimate), limits(model, estimate)
+    nonlinear, bounds = nonlinear_parameters(model, estimate), limits(model, estimate)
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
@@ -66,24 +66,24 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
     converged, scale, last, stuck = False, 1.0, np.zeros(len(plausible)), False
-    readings = Parts(model, observations, noise, around, plausible)
-    readings.linearize(estimate)
+    measurements = Parts(model, observations, noise, around, plausible)
+    measurements.linearize(estimate)
     for step_number in range(_STEPS):
         # Loads where the robot yielded to in the last step: a fixed point that the steps bring about.
-        readings.whiten()
+        measurements.whiten()
         if step_number or reweighted:
-            distance = readings.distance()
+            distance = measurements.distance()
             scale = max(np.median(distance) / typical, 1.0)
             weights = norm.weights(distance / scale)
-        gram, along = readings.normal_equations(weights)
+        gram, along = measurements.normal_equations(weights)
         present = parameter_values(model, estimate)
-        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, bending)
+        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, nonlinear)
         # A shape that would leave its range goes to the end of it, and the others as they do then.
         leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
         if leaving.any():
             ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
             rest = along - gram[:, leaving] @ (ends / plausible[leaving])
-            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, bending)[0]
+            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, nonlinear)[0]
             step[leaving] = ends
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
@@ -98,20 +98,20 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
         last = step / plausible
         # Twice the fall that a parabola promises.
         slope = along @ (step / plausible) - penalty @ (present * step)
-        before, origin = objective(estimate, readings.squares(weights)), estimate
+        before, origin = objective(estimate, measurements.squares(weights)), estimate
         for halving in range(first, _HALVINGS + 1):
             estimate = stepped(model, origin, 0.5**halving * step)
-            readings.linearize(estimate)
-            after = objective(estimate, readings.squares(weights))
+            measurements.linearize(estimate)
+            after = objective(estimate, measurements.squares(weights))
             least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
             if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
-                before = objective(origin, readings.squares(weights, origin))
+                before = objective(origin, measurements.squares(weights, origin))
             if after <= before - least:
                 break
         else:
             estimate = origin
-            readings.linearize(estimate)
+            measurements.linearize(estimate)
             # A step goes by the loads of the step before, and the first one by weights that are all alike: once more by those
             # of now.
             if stuck:
@@ -119,4 +119,4 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
             stuck = True
             continue
         stuck = False
-    return readings.fit(estimate, held, covariance, weights, converged)
+    return measurements.fit(estimate, held, covariance, weights, converged)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from elastocal.fitting.noise import reading_covariances
+from elastocal.fitting.noise import measurement_covariances
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ def whitening(observations, jacobian, noise):
     jacobian : ndarray (M, rows, n)
         With respect to the joints.
     noise : Noise
-        Of one reading.
+        Of one measurement.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def _covariances(observations, jacobian, noise):
     rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad:
         for members in _members(observations.state):
-            covariance = reading_covariances(noise, jacobian[members], rows)
+            covariance = measurement_covariances(noise, jacobian[members], rows)
             yield members, covariance / repeats[members[:, 0]][:, None, None]
         return
     for members in _members(observations.cluster):
@@ -84,7 +84,7 @@ def _covariances(observations, jacobian, noise):
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
-        yield members, alike * reading_covariances(noise, jacobian[members], rows) + common
+        yield members, alike * measurement_covariances(noise, jacobian[members], rows) + common
 
 
 def _members(group):

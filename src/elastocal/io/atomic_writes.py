@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 
 
 @contextmanager
-def appearing_whole(path):
+def atomic_write(path):
     """Write beside a file, then rename.
 
     Parameters
@@ -35,5 +35,5 @@ def write_text(path, text):
     path : str
     text : str
     """
-    with appearing_whole(path) as partial, open(partial, "w", encoding="utf-8") as file:
+    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
         file.write(text)

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 
 _TABLE, _PROVENANCE, _DIGESTS = "elastocal.table", "elastocal.provenance", "elastocal.sha256"
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
@@ -78,7 +78,7 @@ def write_table(path, schema, blocks, provenance):
     floats = [c.name for c in schema.columns if c.type.startswith("float")]
     digests = []
     with (
-        appearing_whole(path) as partial,
+        atomic_write(path) as partial,
         pq.ParquetWriter(
             partial,
             pa.schema(fields),

@@ -6,7 +6,7 @@ import numpy as np
 
 from elastocal.diagnosis.confounding import angles_between, nearest_angles
 from elastocal.diagnosis.diagnose import Diagnosis, Step
-from elastocal.diagnosis.search import first_look
+from elastocal.diagnosis.search import initial_screening
 from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.io.storage import Column, TableSchema
@@ -29,7 +29,7 @@ MODELS = TableSchema(
         Column("log_odds", "float64", "", "posterior log odds against the declared model"),
         Column("mechanisms", "text", "", "its mechanisms, joined by +; nothing, and other, are mechanisms here"),
         Column("units", "text", "", "its candidates with shape values, joined by ;"),
-        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the readings of a pose"),
+        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the measurements of a pose"),
     ),
 )
 
@@ -159,7 +159,7 @@ def candidate_columns(diagnosis):
     rows = []
     if evidence:
         problem = evidence.linearized.problem
-        factors = first_look(problem)[1]
+        factors = initial_screening(problem)[1]
         inclusion = np.zeros(len(problem.units))
         for model, probability in zip(evidence.posterior.models, evidence.posterior.probabilities, strict=True):
             inclusion[list(model.units)] += probability
@@ -174,7 +174,7 @@ def candidate_columns(diagnosis):
                 told = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
                 rows.append((unit.candidate, shape, *told, ""))
     tested = {row[0].key for row in rows}
-    untestable = evidence.linearized.untestable if evidence else dict.fromkeys(candidates, "the readings are at fault")
+    untestable = evidence.linearized.untestable if evidence else dict.fromkeys(candidates, "the measurements are at fault")
     for key, candidate in candidates.items():
         if key not in tested:
             rows.append((candidate, np.nan, np.nan, np.nan, np.nan, np.nan, False, untestable[key]))

@@ -1,4 +1,4 @@
-"""Step 1: a campaign's folder to descriptions and readings, those to fit apart from those to test."""
+"""Step 1: a campaign's folder to descriptions and measurements, those to fit apart from those to test."""
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
 from elastocal.campaigns.holdout import split
@@ -7,8 +7,8 @@ from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
 
 
-def taken_in(folder, robots_folder):
-    """Read a campaign and part its readings.
+def load_campaign(folder, robots_folder):
+    """Read a campaign and part its measurements.
 
     Parameters
     ----------
@@ -19,7 +19,7 @@ def taken_in(folder, robots_folder):
     -------
     descriptions : dict
         ``campaign`` and ``robot``, the documents; ``held_out`` with the same of the campaign that holds the test, or None.
-    training, held_out : Readings
+    training, held_out : Measurements
 
     Raises
     ------
@@ -32,7 +32,7 @@ def taken_in(folder, robots_folder):
     if other is None:
         return descriptions | {"held_out": None}, training, held_out
     elsewhere = f"{folder}/{campaign.holdout['campaign']}"
-    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.readings
+    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.measurements
 
 
 def _descriptions(folder, robots_folder):

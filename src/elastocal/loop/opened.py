@@ -3,15 +3,15 @@
 from elastocal.fitting.case import case_from
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.schemas import readings
+from elastocal.loop.schemas import measurements
 
 
-def opened_case(descriptions_path, readings_path, part=None):
+def opened_case(descriptions_path, measurements_path, part=None):
     """A campaign from the files of step 1.
 
     Parameters
     ----------
-    descriptions_path, readings_path : str
+    descriptions_path, measurements_path : str
     part : {"held_out"}, optional
         The campaign that holds the test, where it is another one.
 
@@ -22,4 +22,4 @@ def opened_case(descriptions_path, readings_path, part=None):
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
     joints = len(described["robot"]["compliance_urad_per_Nm"])
-    return case_from(described, read_table(readings_path, readings(joints)))
+    return case_from(described, read_table(measurements_path, measurements(joints)))

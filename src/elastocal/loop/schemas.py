@@ -20,10 +20,10 @@ def _angles_and_wrench(joints):
     )
 
 
-def readings(joints):
-    """Readings of a campaign, as the library takes them; what was not recorded is not a number."""
+def measurements(joints):
+    """Measurements of a campaign, as the library takes them; what was not recorded is not a number."""
     return TableSchema(
-        "readings",
+        "measurements",
         (
             *_IDENTITY,
             *_angles_and_wrench(joints),
@@ -45,7 +45,7 @@ PARAMETER_COLUMNS = (
     Column("unit", "text", "", "unit of value, standard error and prior"),
     Column("value", "float64", "", "estimate; placement of the base for frames, of the target in its point for targets"),
     Column("std_error", "float64", "", "standard error; 0 where held", missing=True),
-    Column("held", "bool", "", "whether these data cannot tell the parameter, which keeps its value"),
+    Column("held", "bool", "", "whether the parameter is not identifiable from these data and keeps its value"),
     Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
 )
 
@@ -60,7 +60,7 @@ CORRELATIONS = TableSchema(
 
 
 def residuals(joints):
-    """Every reading, before and after."""
+    """Every measurement, before and after."""
     return TableSchema(
         "residuals",
         (

@@ -20,7 +20,7 @@ def campaign_rows(verdicts, residuals, folds, seed):
     residuals : dict of str to pandas.DataFrame
         Held-out rows of residuals.parquet.
     folds : dict of str to list of str
-        Campaigns that hold out the folds of one set of readings, by a name for all.
+        Campaigns that hold out the folds of one set of measurements, by a name for all.
     seed : int
         Of the bootstrap over poses.
 
@@ -56,7 +56,7 @@ def _counted(counts, total):
 
 
 def _errors(part, draws):
-    """Errors of averaged readings: repeats of a state count once."""
+    """Errors of averaged measurements: repeats of a state count once."""
     state = ["pose", "load", "target"]
     columns = [f"{stage}_{axis}" for stage in _STAGES for axis in ("dx", "dy", "dz")]
     mean = part.groupby(state, sort=True)[columns].mean()

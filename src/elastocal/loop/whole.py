@@ -1,12 +1,12 @@
 """A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
 same two calls, with tables between them."""
 
-from elastocal.campaigns.columns import reading_columns
+from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
-from elastocal.loop.loading import taken_in
+from elastocal.loop.loading import load_campaign
 
 
 def cases_in(folder, robots_folder):
@@ -21,10 +21,10 @@ def cases_in(folder, robots_folder):
     -------
     training, held_out : Case
     """
-    descriptions, training, held_out = taken_in(folder, robots_folder)
+    descriptions, training, held_out = load_campaign(folder, robots_folder)
     return (
-        case_from(descriptions, reading_columns(training)),
-        case_from(descriptions["held_out"] or descriptions, reading_columns(held_out)),
+        case_from(descriptions, columns_of(training)),
+        case_from(descriptions["held_out"] or descriptions, columns_of(held_out)),
     )
 
 

@@ -67,7 +67,7 @@ def generalized_forces(jacobian, wrench):
 
 
 def loaded_point(chain, point, wrench_at):
-    """Where the wrench acts that deflects a measuring point (reading R6).
+    """Where the wrench acts that deflects a measuring point (interpretation R6).
 
     Parameters
     ----------

@@ -158,7 +158,7 @@ class Robot:
 
 
 def with_target_offset(holder, offset_m):
-    """A chain, or the robot around it, with the same target offset on every measuring point (the paper's T_tool, reading R5).
+    """A chain, or the robot around it, with the same target offset on every measuring point (T_tool, interpretation R5).
 
     Parameters
     ----------

@@ -186,7 +186,7 @@ def measured_table(robot, design, schedule):
     -------
     table : dict of str to ndarray
     outliers : list of (int, str)
-        State and target of every reading that is one.
+        State and target of every measurement that is one.
     """
     position, rotation = seen_poses(robot, schedule)
     position, rotation, outlier = robot.tracker.read(position, rotation, stream(schedule.seed, "readings"))

@@ -63,7 +63,7 @@ class Kind:
         Of the size.
     plausible : float
         A size such as real robots have.
-    places : callable
+    locations : callable
         Joints at which it can be on an arm: list of tuples.
     apply : callable
         ``apply(robot, joints, size, draws)`` gives the defective robot and those parameters that the catalogue's law of this
@@ -78,7 +78,7 @@ class Kind:
 
     unit: str
     plausible: float
-    places: Callable
+    locations: Callable
     apply: Callable
     needs: tuple = ()
     largest: float = np.inf
@@ -123,7 +123,7 @@ def truth_of(robot, defect):
 
 
 def drawn_defect(effect, arm, seed):
-    """A defect of plausible size at a place that is drawn.
+    """A defect of plausible size at a location that is drawn.
 
     Parameters
     ----------
@@ -135,9 +135,9 @@ def drawn_defect(effect, arm, seed):
     -------
     Defect
     """
-    places = _kind(effect).places(arm)
+    locations = _kind(effect).locations(arm)
     return Defect(
-        effect, places[stream(seed, f"place of {effect}").integers(len(places))], KINDS[effect].plausible_on(arm), seed
+        effect, locations[stream(seed, f"place of {effect}").integers(len(locations))], KINDS[effect].plausible_on(arm), seed
     )
 
 
@@ -149,8 +149,8 @@ def _kind(effect):
 
 def _applied(robot, defect):
     kind = _kind(defect.effect)
-    if defect.joints not in kind.places(robot.arm):
-        allowed = ", ".join(map(str, kind.places(robot.arm)))
+    if defect.joints not in kind.locations(robot.arm):
+        allowed = ", ".join(map(str, kind.locations(robot.arm)))
         raise InputError("defect", f"joints of {defect.effect}", str(defect.joints), allowed)
     if not 0.0 <= defect.size <= kind.largest:
         raise InputError("defect", f"size of {defect.effect}", f"{defect.size:g}", f"0 to {kind.largest:g} {kind.unit}")
@@ -207,9 +207,9 @@ def _each_pair(arm):
     return list(combinations(range(1, arm.joints + 1), 2))
 
 
-def _register(effect, unit, plausible, places, needs=(), largest=np.inf, scale=(0.0, 0.0)):
+def _register(effect, unit, plausible, locations, needs=(), largest=np.inf, scale=(0.0, 0.0)):
     def keep(apply):
-        KINDS[effect] = Kind(unit, plausible, places, apply, needs, largest, scale)
+        KINDS[effect] = Kind(unit, plausible, locations, apply, needs, largest, scale)
         return apply
 
     return keep
@@ -252,7 +252,7 @@ def _drawn_frame(robot, error, draws):
 
 
 def _with_wrong_cell(robot, error, draws, **changes):
-    """The error in a frame that is drawn, of a cell at a place that is drawn."""
+    """The error in a frame that is drawn, of a cell at a location that is drawn."""
     frame, mount = _drawn_frame(robot, error, draws), ("pull", "flange")[draws.integers(2)]
     return replace(robot, cell=replace(robot.cell, in_flange=frame, mount=mount, **changes))
 

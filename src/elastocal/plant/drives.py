@@ -167,7 +167,7 @@ class Repeatability:
 
 @dataclass(frozen=True)
 class PoseError:
-    """An error of the angles common to all readings of a pose; `sigma_rad` (n,). No defect: every arm has it."""
+    """An error of the angles common to all measurements of a pose; `sigma_rad` (n,). No defect: every arm has it."""
 
     sigma_rad: tuple
 

@@ -1,7 +1,8 @@
 """A tracker in its dynamic mode: one target on the flange, read a thousand times a second while the arm moves without a load.
 
 Quasi-static: the arm yields under its own weight and to its drives' errors as at rest, and what acceleration does is left out;
-so the path is slow. Deflections change far more slowly than readings come: they are found at knots and interpolated between.
+so the path is slow. Deflections change far more slowly than measurements come: they are found at knots and interpolated
+between.
 """
 
 import numpy as np
@@ -49,13 +50,13 @@ def moving_angles(arm, time_s, seed):
     return angle
 
 
-def dynamic_table(robot, readings, seed, rate_hz=1000.0):
+def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
     """Columns of the file of measurements of one uninterrupted path.
 
     Parameters
     ----------
     robot : PhysicalRobot
-    readings : int
+    measurements : int
         Of one target; each is a pose of its own.
     seed : int
     rate_hz : float
@@ -65,14 +66,14 @@ def dynamic_table(robot, readings, seed, rate_hz=1000.0):
     dict of str to ndarray
         As `campaigns.measured_table` has them: pose, load, repeat, target, angles, wrench (nothing), position, time.
     """
-    arm, time = robot.arm, np.arange(1, readings + 1) / rate_hz
+    arm, time = robot.arm, np.arange(1, measurements + 1) / rate_hz
     angle = moving_angles(arm, time, seed)
     knots = np.linspace(0.0, time[-1], max(int(time[-1] * _KNOTS_PER_S), 8))
     machine, rest = at_rest(robot, _unloaded(moving_angles(arm, knots, seed), knots, seed))
     sprung = np.setdiff1d(np.arange(machine.model.nq), machine.drive)
     deflection = CubicSpline(knots, rest.coordinates[:, sprung])
-    position = np.empty((readings, 1, 3))
-    for part in _parts(readings):
+    position = np.empty((measurements, 1, 3))
+    for part in _parts(measurements):
         schedule = _unloaded(angle[part], time[part], seed)
         drive, growth, _, _ = driven(robot, schedule, machine)
         coordinates = np.zeros((len(drive), machine.model.nq))
@@ -82,12 +83,12 @@ def dynamic_table(robot, readings, seed, rate_hz=1000.0):
         if robot.nest is not None:
             seen[:, 0] = robot.nest.moved(seen[:, 0], where.rotation[:, -1], angle[part, -1])
         position[part] = robot.tracker.seen(seen, where.rotation[:, -1:], time[part])[0]
-    facing = np.broadcast_to(np.eye(3), (readings, 1, 3, 3))
+    facing = np.broadcast_to(np.eye(3), (measurements, 1, 3, 3))
     position = robot.tracker.read(position, facing, stream(seed, "readings"))[0][:, 0]
-    shown, count = arm.shown_angles(angle), np.arange(readings)
-    table = {"pose": count, "load": 0 * count, "repeat": 0 * count, "target": np.full(readings, arm.points[-1])}
+    shown, count = arm.shown_angles(angle), np.arange(measurements)
+    table = {"pose": count, "load": 0 * count, "repeat": 0 * count, "target": np.full(measurements, arm.points[-1])}
     table |= {f"q{joint}": shown[:, joint - 1] for joint in range(1, arm.joints + 1)}
-    table |= {name: np.zeros(readings) for name in ("fx", "fy", "fz", "mx", "my", "mz")}
+    table |= {name: np.zeros(measurements) for name in ("fx", "fy", "fz", "mx", "my", "mz")}
     return table | dict(zip("xyz", position.T, strict=True)) | {"time_s": time}
 
 

@@ -1,9 +1,9 @@
 """How large a defect is to the eye of a tracker, and how large it must be to have a given non-centrality.
 
-With d the change that a defect makes in the readings, noise free, of the poses that are not held out, in standard deviations,
-the raw non-centrality is |d|^2: the signal before anything has absorbed it. What the declared model cannot absorb by other
-compliances X of its joints (and, where the frame is unknown, by a motion of the frame) and by other weights V, declared with a
-standard deviation each, is
+With d the change that a defect makes in the measurements, noise free, of the poses that are not held out, in standard
+deviations, the raw non-centrality is |d|^2: the signal before anything has absorbed it. What the declared model cannot absorb
+by other compliances X of its joints (and, where the frame is unknown, by a motion of the frame) and by other weights V,
+declared with a standard deviation each, is
 
     min over b, w of |d - X b - V w|^2 + |w|^2,
 
@@ -25,14 +25,14 @@ _SAME = 0.02
 
 @dataclass(frozen=True)
 class Signal:
-    """What a defect does to the readings.
+    """What a defect does to the measurements.
 
     Attributes
     ----------
     raw, retained : float
         Non-centralities before and after absorption.
     rms_m, rms_rad : float
-        Root mean square over all readings of the length of the change of position, and of orientation.
+        Root mean square over all measurements of the length of the change of position, and of orientation.
     """
 
     raw: float
@@ -77,7 +77,7 @@ class Yardstick:
         self._absorbed, self._priors = np.linalg.qr(stacked)[0], len(weights)
 
     def change(self, robot):
-        """Change of the readings against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
+        """Change of the measurements against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
         return self._whitened(*self._change(robot))
 
     def signal(self, robot):
@@ -98,7 +98,7 @@ class Yardstick:
         return Signal(float(seen @ seen), float(left @ left), *rms)
 
     def left(self, robot):
-        """What the declared model cannot absorb of a robot's change in the readings that are not held out, ndarray.
+        """What the declared model cannot absorb of a robot's change in the measurements that are not held out, ndarray.
 
         Its last entries are the weights, in their standard deviations, that absorb the rest.
         """
@@ -143,7 +143,7 @@ class Yardstick:
         return np.concatenate(parts, axis=-1)
 
     def _turned_by(self, joint, turn):
-        """Change of the readings, to first order, where one gear, or each of them, turns by so much (S,) or (S, n) more."""
+        """Change of the measurements, to first order, where one gear, or each of them, turns by so much (S,) or (S, n) more."""
         metres, radians = self._turns
         if joint is None:
             turn = turn[:, None, :, None]

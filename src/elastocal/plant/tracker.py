@@ -16,7 +16,7 @@ class Drift:
     Attributes
     ----------
     rate_m_per_h, rate_rad_per_h : tuple of float
-        At the start; along and about the base axes, seen as a motion of the readings.
+        At the start; along and about the base axes, seen as a motion of the measurements.
     settling_h : float
         T; inf for a steady drift.
     """
@@ -26,7 +26,7 @@ class Drift:
     settling_h: float = np.inf
 
     def moved(self, time_s):
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the readings."""
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements."""
         hours = np.asarray(time_s) / _HOUR_S
         if np.isfinite(self.settling_h):
             hours = -self.settling_h * np.expm1(-hours / self.settling_h)
@@ -35,12 +35,12 @@ class Drift:
 
 @dataclass(frozen=True)
 class Move:
-    """A stand that was knocked, or put elsewhere and tied to the old frame badly: from one row on all readings are moved.
+    """A stand that was knocked, or put elsewhere and tied to the old frame badly: from one row on all measurements are moved.
 
     Attributes
     ----------
     after_s : float
-        Readings later than this are moved.
+        Measurements later than this are moved.
     shift_m, turn_rad : tuple of float
         Along and about the base axes through where the tracker stands.
     """
@@ -50,7 +50,7 @@ class Move:
     turn_rad: tuple
 
     def moved(self, time_s):
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the readings."""
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements."""
         later = (np.asarray(time_s) > self.after_s)[:, None]
         return later * np.array(self.shift_m), turned(later * np.array(self.turn_rad))
 
@@ -67,7 +67,7 @@ class Tracker:
     stand_m : tuple of float
         Where it stands, base frame.
     frame_turn : tuple of float
-        Rotation vector of its own axes in the base's; readings are in the base frame unless the design says otherwise.
+        Rotation vector of its own axes in the base's; measurements are in the base frame unless the design says otherwise.
     drift : Drift or None
     move : Move or None
     refraction_per_m : float
@@ -75,7 +75,7 @@ class Tracker:
     scale : float
         A wrong wavelength. The frame of the base was measured with it too, so that a target at x is read at (1 + s) x.
     outliers : float
-        Share of the readings that are off by far.
+        Share of the measurements that are off by far.
     outlier_sigmas : float
         Of how many standard deviations these are.
     """
@@ -129,7 +129,7 @@ class Tracker:
         position, rotation, outlier
             The last one bool (S, targets).
         """
-        # A generator each, so that readings that come later change none that are there.
+        # A generator each, so that measurements that come later change none that are there.
         chance, metres, radians = draws.spawn(3)
         sigma = self.sigma_at(position)[..., None]
         outlier = chance.random(position.shape[:2]) < self.outliers

@@ -109,8 +109,13 @@ def _explanation(row):
 
 def _text_row(row):
     shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
-    reading = row.reading if isinstance(row.reading, str) else ""
-    return {"figure": row.quantity.replace("_", " "), "paper": f"{row.paper:g}", "ours": shown, "reading": reading}
+    interpretation = row.interpretation if isinstance(row.interpretation, str) else ""
+    return {
+        "figure": row.quantity.replace("_", " "),
+        "paper": f"{row.paper:g}",
+        "ours": shown,
+        "interpretation": interpretation,
+    }
 
 
 def _one_set_rows(comparison, table2):

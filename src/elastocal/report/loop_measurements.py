@@ -79,7 +79,7 @@ def misfit_sentence(misfit):
 
 
 def _part(part, campaign):
-    """What was measured in one part of the readings."""
+    """What was measured in one part of the measurements."""
     if not len(part["pose"]):
         return dict.fromkeys(("campaign", "measurements"), "none")
     states = _distinct(part, "session", "pose", "load")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import typst
 
-from elastocal.io.atomic_writes import appearing_whole
+from elastocal.io.atomic_writes import atomic_write
 
 
 def compile_document(path, document, data, figures=()):
@@ -32,5 +32,5 @@ def compile_document(path, document, data, figures=()):
             (Path(folder) / f"{name}.json").write_text(json.dumps(contents, allow_nan=False), encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)
-        with appearing_whole(path) as partial:
+        with atomic_write(path) as partial:
             typst.compile(source, output=partial, format="pdf", root=folder)

@@ -1,4 +1,4 @@
-"""Cramér-Rao bounds: the least error that any unbiased estimator can have from the readings that a strategy takes."""
+"""Cramér-Rao bounds: the least error that any unbiased estimator can have from the measurements that a strategy takes."""
 
 import numpy as np
 
@@ -6,19 +6,19 @@ from elastocal.study.identification import cholesky_triangles, inverse_triangles
 
 
 def squared_error_bounds(information, moment):
-    """Bound of the mean squared end-effector position error, for readings of unit variance.
+    """Bound of the mean squared end-effector position error, for measurements of unit variance.
 
     Parameters
     ----------
     information : ndarray (configurations, n, n, sets)
-        Sum of A^T A over the readings of the first k configurations, for every k (`identification.prefix_information`).
+        Sum of A^T A over the measurements of the first k configurations, for every k (`identification.prefix_information`).
     moment : ndarray (n, n)
         Mean over test configurations of A^T A of the end-effector position (`metrics.error_moment`).
 
     Returns
     -------
     ndarray (configurations, sets)
-        trace(M N^-1), m^2 per m^2 of reading variance; infinite where N is singular.
+        trace(M N^-1), m^2 per m^2 of measurement variance; infinite where N is singular.
 
     Notes
     -----

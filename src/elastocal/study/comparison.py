@@ -46,18 +46,18 @@ def comparison_table(reference, ours):
     Returns
     -------
     pandas.DataFrame
-        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, reading. `mc_std` is the standard deviation between
-        studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty where one
-        is missing. The paper is a study of the same size with the same spread, so a faithful z has standard deviation 1.4 and
-        about one in thirteen lies beyond 2.5. What the study does not cover is empty.
+        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation. `mc_std` is the standard deviation
+        between studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty
+        where one is missing. The paper is a study of the same size with the same spread, so a faithful z has standard deviation
+        1.4 and about one in thirteen lies beyond 2.5. What the study does not cover is empty.
     """
     rows = []
     for figure in reference.itertuples():
-        value, spread, reading = _RULES[figure.table](figure, ours)
+        value, spread, interpretation = _RULES[figure.table](figure, ours)
         z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
         printed = (figure.table, figure.robot, figure.strategy, figure.quantity, figure.unit, figure.value)
-        rows.append((*printed, value, spread, z, reading))
-    names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "reading"]
+        rows.append((*printed, value, spread, z, interpretation))
+    names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "interpretation"]
     return pd.DataFrame(rows, columns=names)
 
 

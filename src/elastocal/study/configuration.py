@@ -61,7 +61,7 @@ def check_study(config, folder, source="config.yaml"):
         points[name] = strategy.points
         for chain in chains.values():
             check_strategy(strategy, chain, document_path(folder, "strategies", name))
-        needed = first_solvable_length(strategy, rows_read(config["readings"]["measured"]))
+        needed = first_solvable_length(strategy, rows_read(config["interpretations"]["measured"]))
         if config["configurations"] < needed:
             raise InputError(
                 source, "configurations", str(config["configurations"]), f"{needed} or more: {strategy.name} is short"
@@ -75,7 +75,7 @@ def check_study(config, folder, source="config.yaml"):
 
 
 def rows_read(measured):
-    """Readings of one point in one configuration: 6 where poses are measured, 3 where positions are."""
+    """Measurements of one point in one configuration: 6 where poses are measured, 3 where positions are."""
     return {"pose": 6, "position": 3}[measured]
 
 

@@ -52,9 +52,9 @@ def average(blocks, judge, method, deviation_of, test_weights):
         Compliances (sets, lengths, n) and bootstrap weights (1 + replicates, sets).
     judge : Judge
     method : {"stiffness", "compliance", "median"}
-        What is averaged: 1/c or c, by its mean; or the median of c (reading R7).
+        What is averaged: 1/c or c, by its mean; or the median of c (interpretation R7).
     deviation_of : {"averaged_model", "each_data_set"}
-        Whether equation 15 scores the averaged model or averages the scores of the data sets (reading R8).
+        Whether equation 15 scores the averaged model or averages the scores of the data sets (interpretation R8).
     test_weights : ndarray (1 + replicates, tests)
         From `bootstrap.bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
 

@@ -25,7 +25,7 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
     joint_angles : ndarray (configurations, sets, n)
         rad.
     torques : dict of str to ndarray (configurations, sets, n)
-        Joint torques behind the readings of each point, N m.
+        Joint torques behind the measurements of each point, N m.
     deflections : dict of str to ndarray (configurations, sets, rows)
         Measured deflection of each point, m and, where there are six rows, rad.
     start : ndarray (n,)
@@ -54,7 +54,7 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
 
 def _solve_stage(chain, data, identified, compliance):
     compliance = compliance.copy()
-    data = [(*readings, poses(chain, readings[1], readings[0])) for readings in data]
+    data = [(*measurements, poses(chain, measurements[1], measurements[0])) for measurements in data]
     settled = np.zeros(len(compliance), bool)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):

@@ -15,12 +15,12 @@ import numpy as np
 from elastocal.study.strategies import without_forgotten_stages
 
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
-# the readings do not determine the compliances.
+# the measurements do not determine the compliances.
 LARGEST_CONDITION = 1e7
 
 
 @dataclass(frozen=True)
-class Readings:
+class Measurements:
     """What one measuring point contributes.
 
     Attributes
@@ -42,9 +42,9 @@ class Estimates:
     Attributes
     ----------
     compliance : ndarray (configurations, n, sets)
-        rad/(N m); not a number where the readings of the prefix do not determine them.
+        rad/(N m); not a number where the measurements of the prefix do not determine them.
     covariance : ndarray (configurations, sets, n, n)
-        Of the compliances for readings with unit variance, through all stages.
+        Of the compliances for measurements with unit variance, through all stages.
     condition : ndarray (configurations, sets)
         2-norm condition number of the identification Jacobian, the largest of the stages.
     """
@@ -55,13 +55,13 @@ class Estimates:
 
 
 def first_solvable_length(strategy, rows):
-    """Smallest number of configurations with at least as many readings as unknowns in every stage.
+    """Smallest number of configurations with at least as many measurements as unknowns in every stage.
 
     Parameters
     ----------
     strategy : Strategy
     rows : int
-        Readings of one point in one configuration: 6 for poses, 3 for positions.
+        Measurements of one point in one configuration: 6 for poses, 3 for positions.
 
     Returns
     -------
@@ -70,13 +70,13 @@ def first_solvable_length(strategy, rows):
     return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
 
 
-def identify(strategy, readings, joints):
+def identify(strategy, measurements, joints):
     """Compliances by a strategy for every prefix length of every data set, with covariance and condition number.
 
     Parameters
     ----------
     strategy : Strategy
-    readings : dict of str to Readings
+    measurements : dict of str to Measurements
         For each measuring point of the strategy.
     joints : int
         Number of joints, n.
@@ -85,22 +85,22 @@ def identify(strategy, readings, joints):
     -------
     Estimates
     """
-    compliance, triangles = estimate_compliance(strategy, readings, joints)
-    spread = covariance(strategy, readings, triangles)
+    compliance, triangles = estimate_compliance(strategy, measurements, joints)
+    spread = covariance(strategy, measurements, triangles)
     condition = condition_numbers(strategy, triangles)
-    undetermined = undetermined_prefixes(strategy, readings, condition)
+    undetermined = undetermined_prefixes(strategy, measurements, condition)
     np.moveaxis(compliance, 1, -1)[undetermined] = np.nan
     spread[undetermined] = np.nan
     condition[undetermined] = np.nan
     return Estimates(compliance, spread, condition)
 
 
-def undetermined_prefixes(strategy, readings, condition):
-    """Which prefixes of which data sets do not determine the compliances: too few readings, or not the right ones.
+def undetermined_prefixes(strategy, measurements, condition):
+    """Which prefixes of which data sets do not determine the compliances: too few measurements, or not the right ones.
 
     Parameters
     ----------
-    strategy, readings
+    strategy, measurements
         As in `identify`.
     condition : ndarray (configurations, sets)
         From `condition_numbers`.
@@ -109,18 +109,18 @@ def undetermined_prefixes(strategy, readings, condition):
     -------
     ndarray of bool (configurations, sets)
     """
-    rows = next(iter(readings.values())).regressor.shape[0]
+    rows = next(iter(measurements.values())).regressor.shape[0]
     undetermined = ~(condition < LARGEST_CONDITION)
     undetermined[: first_solvable_length(strategy, rows) - 1] = True
     return undetermined
 
 
-def estimate_compliance(strategy, readings, joints):
+def estimate_compliance(strategy, measurements, joints):
     """Solve the stages of a strategy one after the other (equation 11).
 
     Parameters
     ----------
-    strategy, readings, joints
+    strategy, measurements, joints
         As in `identify`.
 
     Returns
@@ -130,12 +130,12 @@ def estimate_compliance(strategy, readings, joints):
     triangles : list of ndarray (configurations, pivots, columns, sets)
         Triangular factor of each stage; columns: joints identified, joints held, right-hand side.
     """
-    *_, configurations, sets = next(iter(readings.values())).regressor.shape
+    *_, configurations, sets = next(iter(measurements.values())).regressor.shape
     compliance = np.full((configurations, joints, sets), np.nan)
     triangles = []
     for stage in strategy.stages:
         pivots = len(stage.identified)
-        triangle = prefix_triangles(_systems(stage, readings), configurations, pivots)
+        triangle = prefix_triangles(_systems(stage, measurements), configurations, pivots)
         right = triangle[:, :, -1]
         for column, joint in enumerate(stage.held, pivots):
             right = right - triangle[:, :, column] * compliance[:, None, joint]
@@ -149,12 +149,12 @@ def estimate_compliance(strategy, readings, joints):
     return compliance, triangles
 
 
-def covariance(strategy, readings, triangles):
-    """Covariance of the estimates for readings of unit variance, through all stages, also where stages share readings.
+def covariance(strategy, measurements, triangles):
+    """Covariance of the estimates for measurements of unit variance, through all stages, also where stages share measurements.
 
     Parameters
     ----------
-    strategy, readings
+    strategy, measurements
         As in `identify`.
     triangles : list of ndarray
         From `estimate_compliance`.
@@ -165,11 +165,11 @@ def covariance(strategy, readings, triangles):
 
     Notes
     -----
-    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced readings
-    z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the covariance of
-    the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared readings) R_t^-1.
+    A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced
+    measurements z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the
+    covariance of the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared measurements) R_t^-1.
     """
-    joints = next(iter(readings.values())).regressor.shape[1]
+    joints = next(iter(measurements.values())).regressor.shape[1]
     stages, gains, inverses = without_forgotten_stages(strategy, joints).stages, [], []
     for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
         pivots, size = list(stage.identified), len(stage.identified)
@@ -183,7 +183,7 @@ def covariance(strategy, readings, triangles):
     total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
     for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
         if shared := set(earlier.points) & set(later.points):
-            information = _row_major(sum(prefix_information(readings[name].regressor) for name in sorted(shared)))
+            information = _row_major(sum(prefix_information(measurements[name].regressor) for name in sorted(shared)))
             products = information[..., list(earlier.identified), :][..., list(later.identified)]
             between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
             cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
@@ -327,10 +327,10 @@ def prefix_information(regressor):
     return information
 
 
-def _systems(stage, readings):
+def _systems(stage, measurements):
     """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
     order = stage.identified + stage.held
-    points = [readings[name] for name in stage.points]
+    points = [measurements[name] for name in stage.points]
     rows, _, configurations, sets = points[0].regressor.shape
     system = np.empty((len(points), rows, len(order) + 1, sets))
     for configuration in range(configurations):

@@ -41,7 +41,7 @@ def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
     true_deflection : ndarray (..., 6)
         Of the end-effector, as simulated with the robot's full model.
     wrench_at : {"end_effector", "measuring_point"}
-        Reading R6; it matters where a target is offset from the end-effector.
+        Interpretation R6; it matters where a target is offset from the end-effector.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def k_sigma(compliance, true_compliance, joints=slice(None)):
     compliance, true_compliance
         As in `relative_stiffness_error`.
     joints : sequence of int, optional
-        Only these (reading R10).
+        Only these (interpretation R10).
 
     Returns
     -------

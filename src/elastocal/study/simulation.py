@@ -25,9 +25,9 @@ class Loading:
     offset_m : tuple of float
         From the end-effector to where the force acts.
     offset_frame : {"base", "tool"}
-        Axes of the offset (reading R4).
+        Axes of the offset (interpretation R4).
     joint_range : {"full_turn", "limits"}
-        Joint angles uniform in +-pi or within the robot's limits (reading R3).
+        Joint angles uniform in +-pi or within the robot's limits (interpretation R3).
     """
 
     force_N: float
@@ -79,7 +79,7 @@ def true_deflections(robot, experiments, point, wrench_at):
     point : MeasuringPoint
         Of the robot's chain.
     wrench_at : {"end_effector", "measuring_point"}
-        Where the wrench that deflects a partial point is taken to act (reading R6).
+        Where the wrench that deflects a partial point is taken to act (interpretation R6).
 
     Returns
     -------

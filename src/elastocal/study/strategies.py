@@ -12,7 +12,7 @@ class Stage:
     Attributes
     ----------
     points : tuple of str
-        Measuring points whose readings it uses, with equal weight.
+        Measuring points whose measurements it uses, with equal weight.
     identified : tuple of int
         Joint indices, from 0, that it estimates; estimates of an earlier stage are where an iterative solver starts.
     held : tuple of int
@@ -45,7 +45,7 @@ class Strategy:
 
     @property
     def first_stage_joints(self):
-        """Joints that the last stage takes over (the paper's k_sigma seems to count these alone, reading R10); else all."""
+        """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all."""
         last = self.stages[-1]
         return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
 

@@ -34,7 +34,7 @@ def covariance_columns(joints):
 def design(joints):
     """What the experiments can tell a strategy, whatever the noise; one row for each data set and length."""
     covariances = [
-        Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit reading variance", missing=True)
+        Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit measurement variance", missing=True)
         for name, i, j in covariance_columns(joints)
     ]
     condition = Column("condition", "float32", "", "condition number of the identification Jacobian, worst stage", missing=True)
@@ -60,7 +60,9 @@ def metrics(joints):
             f"delta_k_{j}", "percent", f"relative error of the averaged stiffness of joint {j} (equation 13)"
         )
     columns += _with_error("k_sigma", "percent", "sum of delta_k over all joints (equation 14)")
-    columns += _with_error("k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (reading R10)")
+    columns += _with_error(
+        "k_sigma_first_stage", "percent", "sum of delta_k over the joints of the first stage (interpretation R10)"
+    )
     columns += _with_error(
         "deviation", "m", "mean end-effector error of the averaged model on test configurations (equation 15)"
     )

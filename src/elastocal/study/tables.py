@@ -215,7 +215,7 @@ def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length
 
 
 def per_dataset_table(accuracy, bounds, points):
-    """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same readings.
+    """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same measurements.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""One figure of the paper fixes the one free size of the extended robot's tubes (reading R11)."""
+"""One figure of the paper fixes the one free size of the extended robot's tubes (interpretation R11)."""
 
 from dataclasses import replace
 

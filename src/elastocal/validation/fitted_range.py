@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.campaigns.joint_space import beyond_range
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.observations import part_at, parts_of, state_clusters
@@ -38,7 +38,8 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
     """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
 
     The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
-    readings do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look sure.
+    measurements do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look
+    sure.
 
     Parameters
     ----------
@@ -73,7 +74,7 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
     other = np.empty(len(unseen))
     for states, seen in parts_of(unseen, observations_at_once(unseen.rows, len(plausible))):
         some = part_at(unseen, states, seen)
-        there = linearize(model, estimate, some, circumstances(model, estimate, some.states)).sensitivities[:, :3]
+        there = linearize(model, estimate, some, conditions(model, estimate, some.states)).sensitivities[:, :3]
         # Effects come last in the order of the parameters, whatever frames and targets stand before them.
         there = there[..., there.shape[-1] - kept.sum() :] * plausible[kept]
         other[seen] = ((there @ root[:, kept].T) ** 2).sum(axis=(1, 2))
@@ -81,7 +82,7 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
 
 
 def _variances_left_out(wanted, whitened, root, cluster):
-    """Variance (M,) of each position with the readings of its own pose left out of the fit, by Woodbury's identity."""
+    """Variance (M,) of each position with the measurements of its own pose left out of the fit, by Woodbury's identity."""
     projected, own = wanted @ root.T, whitened @ root.T
     variance = (projected**2).sum(axis=(1, 2))
     order, size = np.argsort(cluster, kind="stable"), np.bincount(cluster)

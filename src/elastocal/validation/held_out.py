@@ -6,11 +6,11 @@ import numpy as np
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from elastocal.fitting.displacement import circumstances
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
-from elastocal.fitting.noise import reading_covariances
+from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states
 from elastocal.fitting.prediction import residuals
 
@@ -65,7 +65,7 @@ def position_errors(model, estimate, observations):
     distance = np.empty(len(observations))
     for states, seen in parts_of(observations, observations_at_once(observations.rows, 0)):
         some = part_at(observations, states, seen)
-        off = residuals(model, estimate, some, circumstances(model, estimate, some.states))
+        off = residuals(model, estimate, some, conditions(model, estimate, some.states))
         distance[seen] = np.linalg.norm(off[:, :3], axis=1)
     return Errors(distance, observations.cluster)
 
@@ -138,12 +138,12 @@ class Reduction:
 def intervals(errors, replicates, stream, reference=0):
     """95 % intervals of the summary, for as few poses as a campaign holds out.
 
-    Poses are the independent units; readings of one pose share errors. Mean and RMS, and the ratio of two RMS, have bootstrap-t
-    intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and Tibshirani 1993,
-    sections 11.3 and 12.5; Cameron, Gelbach and Miller 2008 for clusters). The 95th percentile has the interval of Woodruff
-    (1952) at the effective number of readings of Korn and Graubard (1998), open above where that is less than 72. The maximum
-    of a sample has no interval that a bootstrap could give: not a number, see `share_below_largest`. Why these, and what they
-    cover: ``docs/held_out_intervals.md``.
+    Poses are the independent units; measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have
+    bootstrap-t intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and
+    Tibshirani 1993, sections 11.3 and 12.5; Cameron, Gelbach and Miller 2008 for clusters). The 95th percentile has the
+    interval of Woodruff (1952) at the effective number of measurements of Korn and Graubard (1998), open above where that is
+    less than 72. The maximum of a sample has no interval that a bootstrap could give: not a number, see `share_below_largest`.
+    Why these, and what they cover: ``docs/held_out_intervals.md``.
 
     Parameters
     ----------
@@ -241,19 +241,20 @@ def _reduction(before, after, weights):
 
 
 def _quantile_interval(errors):
-    """Interval (2,) of the 95th percentile by inverting the binomial test at the effective number of readings."""
+    """Interval (2,) of the 95th percentile by inverting the binomial test at the effective number of measurements."""
     rising, count, poses = np.sort(errors.distance), len(errors.distance), errors.poses
     if poses < 2:
         return np.full(2, np.nan)
     below = errors.distance <= np.quantile(errors.distance, _SHARE)
     share = below.mean()
-    # Readings of one pose are below together or above together: variance of the share over poses over that of independent ones.
+    # Measurements of one pose are below together or above together: variance of the share over poses over that of independent
+    # ones.
     off = np.bincount(errors.cluster, below - share)
     inflation = poses / (poses - 1) * (off**2).sum() / (count * max(share * (1.0 - share), _ROUNDING))
     effective = int(count / max(inflation, 1.0))
     low, high = binom.ppf(_ENDS, effective, _SHARE)
     bottom = rising[int(low / effective * count) - 1] if low >= 1 else 0.0
-    # So many readings' worth that fewer than 2.5 % of such samples lie below the quantile as a whole.
+    # So many measurements' worth that fewer than 2.5 % of such samples lie below the quantile as a whole.
     top = rising[int(np.ceil((high + 1) / effective * count)) - 1] if high < effective else np.inf
     return np.array([bottom, top])
 
@@ -279,9 +280,9 @@ def noise_floor(fitted, observations, model, estimate):
     variance = np.empty(len(observations))
     for states, seen in parts_of(observations, observations_at_once(observations.rows, len(fitted.held))):
         some = part_at(observations, states, seen)
-        line = linearize(model, estimate, some, circumstances(model, estimate, some.states))
+        line = linearize(model, estimate, some, conditions(model, estimate, some.states))
         jacobian = line.coordinate_jacobian[:, None, :3, : model.sites.joints]
-        variance[seen] = np.trace(reading_covariances(fitted.noise, jacobian, 3), axis1=1, axis2=2)
+        variance[seen] = np.trace(measurement_covariances(fitted.noise, jacobian, 3), axis1=1, axis2=2)
     return float(np.sqrt((variance / observations.states.repeats[observations.state]).mean()))
 
 

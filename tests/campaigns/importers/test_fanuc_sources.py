@@ -1,4 +1,4 @@
-"""Both FANUC sources as campaigns: made-up readings in the files' own formats come back as readings of the chain."""
+"""Both FANUC sources as campaigns: made-up measurements in the files' own formats come back as measurements of the chain."""
 
 import numpy as np
 import pytest
@@ -52,12 +52,12 @@ def cpa(fanuc, tmp_path):
     return path, angles, positions
 
 
-def assert_holds(readings, angles, positions):
-    assert len(readings) == 3 * len(angles)
-    np.testing.assert_allclose(readings.joint_angles, angles.repeat(3, axis=0), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(readings.position, positions.reshape(-1, 3), rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(readings.wrench, 0)
-    np.testing.assert_array_equal(readings.load, 0)
+def assert_holds(measurements, angles, positions):
+    assert len(measurements) == 3 * len(angles)
+    np.testing.assert_allclose(measurements.joint_angles, angles.repeat(3, axis=0), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(measurements.position, positions.reshape(-1, 3), rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(measurements.wrench, 0)
+    np.testing.assert_array_equal(measurements.load, 0)
 
 
 def test_static_source_becomes_a_campaign_with_repeats(static, config_folder, tmp_path):
@@ -67,9 +67,9 @@ def test_static_source_becomes_a_campaign_with_repeats(static, config_folder, tm
     assert (campaign.name, campaign.measured, campaign.frame) == ("fanuc_static", "position", "tracker")
     assert [(target.name, target.point, target.offset_m) for target in campaign.targets] == [(n, "6DoF", None) for n in "ABC"]
     assert (campaign.compliance, campaign.declared) == ("nominal", ("joint_offset", "link_geometry"))
-    assert_holds(campaign.readings, angles, positions)
-    np.testing.assert_array_equal(campaign.readings.pose, np.arange(POSES).repeat(3 * REPEATS))
-    np.testing.assert_array_equal(campaign.readings.repeat, np.tile(np.arange(REPEATS).repeat(3), POSES))
+    assert_holds(campaign.measurements, angles, positions)
+    np.testing.assert_array_equal(campaign.measurements.pose, np.arange(POSES).repeat(3 * REPEATS))
+    np.testing.assert_array_equal(campaign.measurements.repeat, np.tile(np.arange(REPEATS).repeat(3), POSES))
 
 
 def test_cpa_source_becomes_a_campaign_of_the_controllers_angles(cpa, config_folder, tmp_path):
@@ -78,16 +78,16 @@ def test_cpa_source_becomes_a_campaign_of_the_controllers_angles(cpa, config_fol
     campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
     assert [target.name for target in campaign.targets] == list("DEF")
     assert campaign.noise == fanuc_cpa.NOISE
-    assert_holds(campaign.readings, angles, positions)
+    assert_holds(campaign.measurements, angles, positions)
 
 
 def test_joint_campaign_holds_both_as_sessions_of_one_robot(static, cpa, config_folder, tmp_path):
     fanuc_joint.write_campaign(static[0], cpa[0], tmp_path / "campaign", config_folder / "robots")
     campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
     for session, (_, angles, positions) in enumerate((static, cpa)):
-        readings = campaign.readings.select(campaign.readings.session == session)
-        assert_holds(readings, angles, positions)
-        assert {campaign.targets[index].name for index in readings.target} == set(("ABC", "DEF")[session])
+        measurements = campaign.measurements.select(campaign.measurements.session == session)
+        assert_holds(measurements, angles, positions)
+        assert {campaign.targets[index].name for index in measurements.target} == set(("ABC", "DEF")[session])
 
 
 def test_each_session_can_test_the_other(static, cpa, config_folder, tmp_path):
@@ -97,7 +97,7 @@ def test_each_session_can_test_the_other(static, cpa, config_folder, tmp_path):
     for here, there in (("static", "cpa"), ("cpa", "static")):
         campaign = read_campaign(tmp_path / here, robots)
         training, held_out = split(campaign)
-        assert len(training) == len(campaign.readings) and len(held_out) == 0
+        assert len(training) == len(campaign.measurements) and len(held_out) == 0
         assert held_out_campaign(campaign, tmp_path / here, robots).name == f"{there}_to_{here}"
 
 

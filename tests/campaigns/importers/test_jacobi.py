@@ -1,4 +1,4 @@
-"""UR5 and WAM as campaigns: made-up readings in the files' own format come back as readings of the chain."""
+"""UR5 and WAM as campaigns: made-up measurements in the files' own format come back as measurements of the chain."""
 
 import numpy as np
 import pytest
@@ -67,16 +67,16 @@ def test_file_becomes_a_campaign_of_measured_positions(tmp_path, config_folder, 
     assert (campaign.measured, campaign.frame, campaign.noise) == ("position", "tracker", jacobi.NOISE)
     assert campaign.robot.name == expected.name
     assert [(target.point, target.offset_m) for target in campaign.targets] == [(f"{joints}DoF", None)]
-    np.testing.assert_allclose(campaign.readings.joint_angles, np.radians(file.degrees), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(campaign.readings.position, 1e-3 * file.measured_mm, rtol=0, atol=1e-12)
-    np.testing.assert_array_equal(campaign.readings.wrench, 0)
-    np.testing.assert_array_equal(campaign.readings.pose, np.arange(POSES))
+    np.testing.assert_allclose(campaign.measurements.joint_angles, np.radians(file.degrees), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(campaign.measurements.position, 1e-3 * file.measured_mm, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(campaign.measurements.wrench, 0)
+    np.testing.assert_array_equal(campaign.measurements.pose, np.arange(POSES))
 
 
 def test_rows_keep_the_order_in_which_they_were_measured(file, config_folder):
     file.write_campaign("grid")
-    readings = read_campaign(file.folder, config_folder / "robots").readings
-    assert (np.diff(readings.row) > 0).all()
+    measurements = read_campaign(file.folder, config_folder / "robots").measurements
+    assert (np.diff(measurements.row) > 0).all()
 
 
 def test_random_poses_test_the_grid(tmp_path, config_folder):

@@ -1,4 +1,4 @@
-"""The UR10 series as campaigns: made-up readings in the files' own format come back as readings of the chain."""
+"""The UR10 series as campaigns: made-up measurements in the files' own format come back as measurements of the chain."""
 
 import numpy as np
 import pytest
@@ -59,19 +59,19 @@ def series(tmp_path):
 
 def test_series_becomes_a_campaign_of_poses(series, config_folder):
     campaign = series.campaign(config_folder)
-    readings = campaign.readings
+    measurements = campaign.measurements
     assert (campaign.name, campaign.measured, campaign.frame, campaign.noise) == ("series", "pose", "tracker", ur10_ipa.NOISE)
     assert [(target.point, target.offset_m) for target in campaign.targets] == [("6DoF", None)]
-    np.testing.assert_allclose(readings.joint_angles, series.angles, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(readings.position, 1e-3 * series.position_mm, rtol=0, atol=1e-15)
-    np.testing.assert_array_equal(readings.temperature_c, 20 + 0.25 * np.arange(len(readings)))
-    np.testing.assert_array_equal(readings.time_s, 10.0 * np.arange(len(readings)))
-    np.testing.assert_array_equal(readings.wrench, 0)
+    np.testing.assert_allclose(measurements.joint_angles, series.angles, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(measurements.position, 1e-3 * series.position_mm, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(measurements.temperature_c, 20 + 0.25 * np.arange(len(measurements)))
+    np.testing.assert_array_equal(measurements.time_s, 10.0 * np.arange(len(measurements)))
+    np.testing.assert_array_equal(measurements.wrench, 0)
 
 
 def test_orientation_turns_about_x_then_the_new_y_then_the_new_z(series, config_folder):
-    readings = series.campaign(config_folder).readings
-    for vector, degrees in zip(readings.rotation_vector, series.degrees, strict=True):
+    measurements = series.campaign(config_folder).measurements
+    for vector, degrees in zip(measurements.rotation_vector, series.degrees, strict=True):
         angle = np.linalg.norm(vector)
         x, y, z = vector / angle
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
@@ -81,19 +81,19 @@ def test_orientation_turns_about_x_then_the_new_y_then_the_new_z(series, config_
 
 
 def test_the_same_joint_angles_again_are_repeats_of_their_pose(series, config_folder):
-    readings = series.campaign(config_folder).readings
-    assert readings.pose.tolist() == [*range(POSES), 2, 5]
-    assert readings.repeat.tolist() == POSES * [0] + [1, 1]
+    measurements = series.campaign(config_folder).measurements
+    assert measurements.pose.tolist() == [*range(POSES), 2, 5]
+    assert measurements.repeat.tolist() == POSES * [0] + [1, 1]
 
 
 def test_stamps_that_a_spreadsheet_cut_down_leave_time_out(series, config_folder):
     series.columns["Timestamp"] = len(series.angles) * ["2,02011E+13"]
-    assert series.campaign(config_folder).readings.time_s is None
+    assert series.campaign(config_folder).measurements.time_s is None
 
 
 def test_series_without_temperature_is_read_as_well(series, config_folder):
     del series.columns["measurement_temperature"]
-    assert series.campaign(config_folder).readings.temperature_c is None
+    assert series.campaign(config_folder).measurements.temperature_c is None
 
 
 def test_chain_is_the_makers_denavit_hartenberg(config_folder):

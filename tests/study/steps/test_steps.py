@@ -127,7 +127,7 @@ def test_exact_data_give_the_true_compliances(robot, strategies, name, at):
 @pytest.mark.parametrize("at", AT)
 @pytest.mark.parametrize("rows", [3, 6])
 def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, strategies, rows, at):
-    # Readings R5 and R6 together: under "end_effector" the wrench stays where it is stated, whatever target is measured.
+    # Interpretations R5 and R6 together: under "end_effector" the wrench stays where it is stated, whatever target is measured.
     moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
     deflections = deflections_of(moved, experiments, at=at)
     table = identified(moved, strategies["6DoF"], experiments, deflections, rows, at, start=1e-6)
@@ -136,7 +136,7 @@ def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, s
 
 @pytest.mark.parametrize("name", ["6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF"])
 def test_gauss_newton_gets_through_positions_that_are_too_few_to_tell_the_wrist_apart(kuka, strategies, name):
-    # One position of the end-effector has readings enough for joints 4-6, but they meet in one point.
+    # One position of the end-effector has measurements enough for joints 4-6, but they meet in one point.
     loads, moved = experiments_of(kuka), with_target_offset(kuka, OFFSET)
     deflections = deflections_of(moved, loads, at="measuring_point")
     table = identified(moved, strategies[name], loads, deflections, 3, "measuring_point", start=1e-6)

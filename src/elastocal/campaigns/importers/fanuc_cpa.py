@@ -13,7 +13,7 @@ NOISE = {"position_m": 5.2e-5}
 
 
 def read(path):
-    """Readings of the text file.
+    """Measurements of the text file.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ ROBOT, TARGETS = "fanuc_static", ("A", "B", "C")
 
 
 def read(path):
-    """Readings of the MAT file.
+    """Measurements of the MAT file.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def read(path):
     for name in names:
         shape, width = np.shape(found.get(name, ())), 6 if name == "q" else 3
         if len(shape) != 2 or shape != (len(found["q"]), width) or found[name].dtype.kind != "f" or not len(found["q"]):
-            raise InputError(path, name, f"shape {shape}" if name in found else "nothing", f"(readings, {width}) numbers")
+            raise InputError(path, name, f"shape {shape}" if name in found else "nothing", f"(measurements, {width}) numbers")
     return found["q"], {target: found[f"m{target}"] for target in TARGETS}
 
 

@@ -8,7 +8,7 @@ from elastocal.campaigns.writing import write_campaign
 
 
 def reflector_table(pose, repeat, joint_angles, positions, session=None):
-    """Columns of measurements, one row for each reflector of each reading.
+    """Columns of measurements, one row for each reflector of each measurement.
 
     Parameters
     ----------
@@ -25,16 +25,16 @@ def reflector_table(pose, repeat, joint_angles, positions, session=None):
     dict of str to ndarray (N * reflectors,)
     """
     names, count = list(positions), len(pose)
-    readings = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
+    measurements = np.stack([positions[name] for name in names], axis=1).reshape(-1, 3)
     rows = np.repeat(np.arange(count), len(names))
     table = {} if session is None else {"session": np.full(len(rows), session)}
     table |= {"pose": pose[rows], "load": np.zeros(len(rows), int), "repeat": repeat[rows], "target": np.tile(names, count)}
     table |= {f"q{j + 1}": angles[rows] for j, angles in enumerate(joint_angles.T)}
-    return table | {axis: readings[:, i] for i, axis in enumerate("xyz")}
+    return table | {axis: measurements[:, i] for i, axis in enumerate("xyz")}
 
 
 def write_reflectors(folder, name, robot, joint_angles, positions, holdout=None, noise=None):
-    """Write readings of one session as a campaign's folder.
+    """Write measurements of one session as a campaign's folder.
 
     Parameters
     ----------

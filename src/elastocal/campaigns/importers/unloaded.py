@@ -1,4 +1,4 @@
-"""What all public campaigns have in common: a tracker's readings of an unloaded flange, in a frame that nobody knows."""
+"""What all public campaigns have in common: a tracker's measurements of an unloaded flange, in a frame that nobody knows."""
 
 # What such data can be fitted with at all before any physics is looked for.
 _DECLARED = ("joint_offset", "link_geometry")

@@ -11,8 +11,8 @@ from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign as write_folder
 
 ROBOT, TARGET = "ur10", "TMac"
-# One reading of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median and
-# less what the chain explains of their distance. Orientations: the 255 repeats of Series B, by their median.
+# One measurement of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median
+# and less what the chain explains of their distance. Orientations: the 255 repeats of Series B, by their median.
 NOISE = {"position_m": 2.1e-5, "orientation_rad": 3.0e-5}
 TIME, TEMPERATURE = "Timestamp", "measurement_temperature"
 ANGLES = (
@@ -35,7 +35,7 @@ _TIME_FORMAT = "%Y%m%d%H%M%S"
 
 
 def read(path):
-    """Readings of one series.
+    """Measurements of one series.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def write_campaign(path, folder, name, holdout=None, noise=NOISE):
     InputError
         As in `read`.
     """
-    readings = read(path)
-    angles = readings["joint_angles"]
+    measurements = read(path)
+    angles = measurements["joint_angles"]
     pose, repeat = pose_and_repeat(angles, _SAME_POSE_RAD)
     table = {"pose": pose, "load": np.zeros(len(pose), int), "repeat": repeat, "target": np.full(len(pose), TARGET)}
     table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
-    table |= {axis: readings["position"][:, i] for i, axis in enumerate("xyz")}
-    table |= {f"r{axis}": readings["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
-    table |= {covariate: readings[covariate] for covariate in ("time_s", "temperature_c") if covariate in readings}
+    table |= {axis: measurements["position"][:, i] for i, axis in enumerate("xyz")}
+    table |= {f"r{axis}": measurements["rotation_vector"][:, i] for i, axis in enumerate("xyz")}
+    table |= {covariate: measurements[covariate] for covariate in ("time_s", "temperature_c") if covariate in measurements}
     write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
 
 

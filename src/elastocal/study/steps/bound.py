@@ -1,4 +1,4 @@
-"""Step 4b: what the readings of each strategy could give at best."""
+"""Step 4b: what the measurements of each strategy could give at best."""
 
 import numpy as np
 

@@ -7,7 +7,13 @@ import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians
-from elastocal.study.identification import Readings, condition_numbers, covariance, estimate_compliance, undetermined_prefixes
+from elastocal.study.identification import (
+    Measurements,
+    condition_numbers,
+    covariance,
+    estimate_compliance,
+    undetermined_prefixes,
+)
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.study.table_schemas import covariance_columns
 
@@ -24,13 +30,13 @@ class Design:
     rows : int
         6 where poses are measured, 3 where positions are.
     wrench_at : {"end_effector", "measuring_point"}
-        Reading R6.
+        Interpretation R6.
 
     Attributes
     ----------
     joint_angles : ndarray (configurations, sets, n)
     torques : dict of str to ndarray (configurations, sets, n)
-        Joint torques behind the readings of each point, N m.
+        Joint torques behind the measurements of each point, N m.
     regressors : dict of str to ndarray (rows, n, configurations, sets)
     """
 
@@ -50,7 +56,7 @@ class Design:
 
 
 def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
-    """Covariances for readings of unit variance and condition numbers of a strategy, in blocks.
+    """Covariances for measurements of unit variance and condition numbers of a strategy, in blocks.
 
     Parameters
     ----------
@@ -68,10 +74,10 @@ def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
         sets = data_sets(block)
         regressors = Design(block, chain, strategy.points, rows, wrench_at).regressors
         silent = np.zeros((rows, *next(iter(regressors.values())).shape[2:]))
-        readings = {name: Readings(matrix, silent) for name, matrix in regressors.items()}
-        triangles = estimate_compliance(strategy, readings, chain.coordinates)[1]
-        spread, condition = covariance(strategy, readings, triangles), condition_numbers(strategy, triangles)
-        undetermined = undetermined_prefixes(strategy, readings, condition)
+        measurements = {name: Measurements(matrix, silent) for name, matrix in regressors.items()}
+        triangles = estimate_compliance(strategy, measurements, chain.coordinates)[1]
+        spread, condition = covariance(strategy, measurements, triangles), condition_numbers(strategy, triangles)
+        undetermined = undetermined_prefixes(strategy, measurements, condition)
         spread[undetermined], condition[undetermined] = np.nan, np.nan
         columns = prefix_index_columns(sets, len(condition))
         for name, i, j in covariance_columns(chain.coordinates):

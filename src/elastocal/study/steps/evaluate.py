@@ -33,7 +33,7 @@ def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage
     judge : Judge
     first_stage_joints : sequence of int
     method, deviation_of
-        Readings R7 and R8, see `evaluation.average`.
+        Interpretations R7 and R8, see `evaluation.average`.
     lengths : sequence of int
         For the accuracy of one data set.
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from elastocal.study.gauss_newton import identify_exactly
-from elastocal.study.identification import Readings, estimate_compliance
+from elastocal.study.identification import Measurements, estimate_compliance
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections
 from elastocal.study.steps.design import Design, configuration_first
 
@@ -40,7 +40,7 @@ def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=N
     rows : int
         6 where poses are measured, 3 where positions are.
     wrench_at : {"end_effector", "measuring_point"}
-        Reading R6.
+        Interpretation R6.
     start : float, optional
         Given, compliances come from Gauss-Newton on the exact kinematics, started there (rad/(N m)); else from equation 11.
 
@@ -54,7 +54,7 @@ def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=N
         situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
         condition = design["condition"].reshape(len(sets), -1).T
         if start is None:
-            compliance = estimate_compliance(strategy, situation.readings, chain.coordinates)[0]
+            compliance = estimate_compliance(strategy, situation.measurements, chain.coordinates)[0]
         else:
             compliance = situation.solved_exactly(start, range(1, len(condition) + 1))
         np.moveaxis(compliance, 1, -1)[np.isnan(condition)] = np.nan
@@ -63,7 +63,7 @@ def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=N
 
 
 class Situation:
-    """Readings of one block, configuration before data set, ready for either solver.
+    """Measurements of one block, configuration before data set, ready for either solver.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Situation:
 
     Attributes
     ----------
-    readings : dict of str to Readings
+    measurements : dict of str to Measurements
         For equation 11.
     """
 
@@ -82,8 +82,9 @@ class Situation:
         self.chain, self.strategy = chain, strategy
         self.design = Design(experiments, chain, strategy.points, rows, wrench_at)
         self.measured = {name: configuration_first(to_deflections(deflections[name]))[..., :rows] for name in strategy.points}
-        self.readings = {
-            name: Readings(self.design.regressors[name], np.moveaxis(self.measured[name], -1, 0)) for name in strategy.points
+        self.measurements = {
+            name: Measurements(self.design.regressors[name], np.moveaxis(self.measured[name], -1, 0))
+            for name in strategy.points
         }
 
     def solved_exactly(self, start, lengths):

@@ -40,7 +40,7 @@ def ideal_blocks(experiments, robot, wrench_at):
         Blocks of the experiments table.
     robot : Robot
     wrench_at : {"end_effector", "measuring_point"}
-        Reading R6.
+        Interpretation R6.
 
     Yields
     ------

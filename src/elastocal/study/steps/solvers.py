@@ -34,7 +34,7 @@ def solver_table(blocks, chain, strategies, rows, wrench_at, length, start):
             situation = Situation(experiments, deflections, chain, strategy, rows, wrench_at)
             exact = situation.solved_exactly(start, [length])[0]
             lasting = without_forgotten_stages(strategy, chain.coordinates)
-            linear = estimate_compliance(lasting, situation.readings, chain.coordinates)[0][length - 1]
+            linear = estimate_compliance(lasting, situation.measurements, chain.coordinates)[0][length - 1]
             columns = {"strategy": strategy.name, "data_set": sets}
             for j in range(chain.coordinates):
                 columns[f"equation_11_c{j + 1}"], columns[f"gauss_newton_c{j + 1}"] = linear[j], exact[j]

@@ -1,4 +1,4 @@
-"""Checks of readings: wrong units, contradictions and doubles are refused by row and column, and nothing that is right."""
+"""Checks of measurements: wrong units, contradictions and doubles are refused by row and column, and nothing that is right."""
 
 import numpy as np
 import pytest
@@ -36,29 +36,29 @@ def test_whole_file_in_degrees_or_millimetres_is_refused(cell, tmp_path):
 def test_joint_just_beyond_its_limit_is_no_degrees(cell):
     for row in range(1, 9):
         cell.spoil(row, "q2", 1.2)
-    assert len(cell.read().readings) == len(cell.table["pose"])
+    assert len(cell.read().measurements) == len(cell.table["pose"])
 
 
 def test_wrong_sign_beyond_a_limit_is_no_degrees(cell):
     for row in range(1, 9):
         cell.spoil(row, "q2", 1.7)
-    assert len(cell.read().readings) == len(cell.table["pose"])
+    assert len(cell.read().measurements) == len(cell.table["pose"])
 
 
 def test_joint_angles_are_judged_in_the_models_convention(cell):
     cell.arm["reported_joints"] = {"offset_deg": [0, 180, 0]}
     cell.table["q2"] = [angle - np.pi for angle in cell.table["q2"]]
-    assert len(cell.read().readings) == len(cell.table["pose"])
+    assert len(cell.read().measurements) == len(cell.table["pose"])
 
 
-def test_the_same_reading_twice_is_refused(cell):
+def test_the_same_measurement_twice_is_refused(cell):
     cell.spoil(7, "repeat", 0)
     found = "pose 0, load 1, repeat 0, target A again"
     with refused(cell.measurements, "row 7", found, "first in row 5"):
         cell.read()
 
 
-def test_readings_of_one_pose_at_other_angles_are_refused(cell):
+def test_measurements_of_one_pose_at_other_angles_are_refused(cell):
     cell.spoil(14, "q3", cell.table["q3"][8] + 0.025)
     with refused(cell.measurements, "row 14, column q3", "0.025 rad from row 9", "within 0.02 rad"):
         cell.read()

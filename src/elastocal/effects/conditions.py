@@ -14,7 +14,7 @@ MASS_PARAMETERS = 4
 
 
 @dataclass(frozen=True)
-class Circumstances:
+class Conditions:
     """Everything that an effect may depend on, for S states of the robot.
 
     Loads are taken where the robot has yielded to them: at the displaced coordinates behind `motion`, not at the commanded ones
@@ -36,7 +36,7 @@ class Circumstances:
         frame beyond what goes with the mass, kg m.
     approach : ndarray (S, n) or None
     time_s : ndarray (S,) or None
-        Since the first reading to which the model was fitted.
+        Since the first measurement to which the model was fitted.
     temperature_c : ndarray (S,) or None
     progress : ndarray (S,)
         How far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
@@ -171,7 +171,7 @@ def progress_of(states, row_span=None):
     return (place - first) / max(last - first, 1)
 
 
-def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None, coordinates=None):
+def conditions_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None, coordinates=None):
     """What effects may depend on, in some states.
 
     Parameters
@@ -183,7 +183,7 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
     time_zero_s : float
         From which effects count the time.
     mass_corrections : ndarray (4 m,), optional
-        As in `Circumstances`; zero without.
+        As in `Conditions`; zero without.
     row_span : (int, int), optional
         As in `progress_of`.
     coordinates : ndarray (S, C), optional
@@ -191,12 +191,12 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
 
     Returns
     -------
-    Circumstances
+    Conditions
     """
     if coordinates is None:
         coordinates = np.zeros((len(states), sites.chain.coordinates))
         coordinates[:, : sites.joints] = states.joint_angles
-    return Circumstances(
+    return Conditions(
         sites,
         np.asarray(compliance),
         states.joint_angles,
@@ -210,45 +210,45 @@ def circumstances_of(sites, compliance, states, time_zero_s=0.0, mass_correction
     )
 
 
-def at_coordinates(circumstances, coordinates):
+def at_coordinates(conditions, coordinates):
     """The same states where the robot has yielded to other coordinates, ndarray (S, C)."""
-    sites = circumstances.sites
-    return replace(circumstances, motion=motion(sites.chain, coordinates, sites.followed))
+    sites = conditions.sites
+    return replace(conditions, motion=motion(sites.chain, coordinates, sites.followed))
 
 
-def at_states(circumstances, chosen):
+def at_states(conditions, chosen):
     """Some of the states.
 
     Parameters
     ----------
-    circumstances : Circumstances
+    conditions : Conditions
     chosen : slice or ndarray of bool (S,)
 
     Returns
     -------
-    Circumstances
+    Conditions
     """
-    moved = circumstances.motion
+    moved = conditions.motion
     some = replace(
         moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
     )
     by_state = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
-    values = {name: getattr(circumstances, name) for name in by_state}
+    values = {name: getattr(conditions, name) for name in by_state}
     return replace(
-        circumstances, motion=some, **{name: None if value is None else value[chosen] for name, value in values.items()}
+        conditions, motion=some, **{name: None if value is None else value[chosen] for name, value in values.items()}
     )
 
 
-def with_springs(circumstances, compliance, mass_corrections):
+def with_springs(conditions, compliance, mass_corrections):
     """The same states with other joint compliances (n,) and other errors of the declared masses (4 m,)."""
-    same = np.array_equal(mass_corrections, circumstances.mass_corrections)
-    if same and np.array_equal(compliance, circumstances.compliance):
-        return circumstances
-    changed = replace(circumstances, compliance=compliance, mass_corrections=mass_corrections)
+    same = np.array_equal(mass_corrections, conditions.mass_corrections)
+    if same and np.array_equal(compliance, conditions.compliance):
+        return conditions
+    changed = replace(conditions, compliance=compliance, mass_corrections=mass_corrections)
     # What is known of the loads stays so: they do not depend on the springs but by way of the motion.
     for name in ("load", "gravity", "total", "mass_torques", "_falling", "end_jacobian", "weight"):
-        if name in vars(circumstances) and (same or name not in ("gravity", "total")):
-            vars(changed)[name] = vars(circumstances)[name]
+        if name in vars(conditions) and (same or name not in ("gravity", "total")):
+            vars(changed)[name] = vars(conditions)[name]
     return changed
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from synthetic import made_states
 
-from elastocal.effects.circumstances import progress_of
+from elastocal.effects.conditions import progress_of
 
 
 def test_progress_counts_rows_of_the_campaign_or_else_poses():

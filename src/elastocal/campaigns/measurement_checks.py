@@ -1,4 +1,4 @@
-"""Checks of readings as a whole: what can be told wrong of them without fitting anything."""
+"""Checks of measurements as a whole: what can be told wrong of them without fitting anything."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.errors import InputError
 
-# Readings of one pose share their joint angles up to what a controller's servo error can differ.
+# Measurements of one pose share their joint angles up to what a controller's servo error can differ.
 _SAME_POSE_RAD = 0.02
 # No joint of a serial arm reports more than one and a half turns unless its limits say so.
 _FARTHEST_RAD = 3.0 * np.pi
@@ -27,7 +27,7 @@ def check_angles(reported, table, robot):
     ----------
     reported : ndarray (N, n)
         Joint angles as the controller reports them.
-    table : Measurements
+    table : MeasurementFile
     robot : Robot
 
     Raises
@@ -54,13 +54,13 @@ def check_angles(reported, table, robot):
         raise table.cell_fault(index, table.angles[joint], f"{reported[index, joint]:g}", allowed)
 
 
-def check_readings(readings, table, robot, targets, source):
-    """Refuse readings that cannot be of one campaign in the units of the format.
+def check_measurements(measurements, table, robot, targets, source):
+    """Refuse measurements that cannot be of one campaign in the units of the format.
 
     Parameters
     ----------
-    readings : Readings
-    table : Measurements
+    measurements : Measurements
+    table : MeasurementFile
         Where they were read from.
     robot : Robot
     targets : tuple of Target
@@ -70,24 +70,29 @@ def check_readings(readings, table, robot, targets, source):
     Raises
     ------
     InputError
-        The first fault: a reading that is there twice, a load that contradicts its wrench, a pose at two places, millimetres or
-        degrees, a target without a reading.
+        The first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places,
+        millimetres or degrees, a target without a measurement.
     """
-    _check_duplicates(readings, table, targets)
-    _check_loads(readings, table)
-    _check_poses(readings, table)
-    _check_units(readings, table, robot, targets)
+    _check_duplicates(measurements, table, targets)
+    _check_loads(measurements, table)
+    _check_poses(measurements, table)
+    _check_units(measurements, table, robot, targets)
     for index, target in enumerate(targets):
-        if not (readings.target == index).any():
+        if not (measurements.target == index).any():
             raise InputError(
-                source, f"targets.{target.name}", "no reading of it", f"targets that {Path(table.path).name} has readings of"
+                source,
+                f"targets.{target.name}",
+                "no measurement of it",
+                f"targets that {Path(table.path).name} has measurements of",
             )
 
 
-def _check_duplicates(readings, table, targets):
-    key = np.column_stack([readings.session, readings.pose, readings.load, readings.repeat, readings.target])
+def _check_duplicates(measurements, table, targets):
+    key = np.column_stack(
+        [measurements.session, measurements.pose, measurements.load, measurements.repeat, measurements.target]
+    )
     first, group = groups_of(key)
-    again = first[group] != np.arange(len(readings))
+    again = first[group] != np.arange(len(measurements))
     if again.any():
         index = int(np.argmax(again))
         session, pose, load, repeat, target = key[index]
@@ -97,25 +102,25 @@ def _check_duplicates(readings, table, targets):
         raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
 
 
-def _check_loads(readings, table):
-    unloaded = readings.load == 0
+def _check_loads(measurements, table):
+    unloaded = measurements.load == 0
     if not table.has(table.wrench) and not unloaded.all():
         index = int(np.argmin(unloaded))
         raise table.cell_fault(
-            index, "load", str(readings.load[index]), f"0 where there are no columns {', '.join(table.wrench)}"
+            index, "load", str(measurements.load[index]), f"0 where there are no columns {', '.join(table.wrench)}"
         )
-    wrong = unloaded[:, None] & (readings.wrench != 0)
+    wrong = unloaded[:, None] & (measurements.wrench != 0)
     if wrong.any():
         index, component = np.argwhere(wrong)[0]
         raise table.cell_fault(
-            index, table.wrench[component], f"{readings.wrench[index, component]:g} with load 0", "0 where load is 0"
+            index, table.wrench[component], f"{measurements.wrench[index, component]:g} with load 0", "0 where load is 0"
         )
 
 
-def _check_poses(readings, table):
-    pairs, pose_of = measured_poses(readings)
-    first = np.full(len(pairs), len(readings))
-    np.minimum.at(first, pose_of, np.arange(len(readings)))
+def _check_poses(measurements, table):
+    pairs, pose_of = measured_poses(measurements)
+    first = np.full(len(pairs), len(measurements))
+    np.minimum.at(first, pose_of, np.arange(len(measurements)))
     reported = table.numbers(table.angles)
     away = np.abs(reported - reported[first[pose_of]])
     wrong = away > _SAME_POSE_RAD
@@ -123,24 +128,24 @@ def _check_poses(readings, table):
         index, joint = np.argwhere(wrong)[0]
         earlier = table.rows[first[pose_of[index]]]
         found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
-        raise table.cell_fault(index, table.angles[joint], found, f"readings of one pose within {_SAME_POSE_RAD} rad")
+        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {_SAME_POSE_RAD} rad")
 
 
-def _check_units(readings, table, robot, targets):
+def _check_units(measurements, table, robot, targets):
     tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
     reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
-    for session in np.unique(readings.session):
-        members = np.flatnonzero(readings.session == session)
-        position = readings.position[members]
+    for session in np.unique(measurements.session):
+        members = np.flatnonzero(measurements.session == session)
+        position = measurements.position[members]
         away = np.abs(position - np.median(position, axis=0))
         if away.max() > _FARTHEST_REACHES * reach:
             index, axis = np.unravel_index(np.argmax(away), away.shape)
-            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the readings"
+            found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
             raise table.cell_fault(
                 members[index], "xyz"[axis], found, f"metres, not millimetres; the robot reaches {reach:.3g} m"
             )
-    if readings.rotation_vector is not None:
-        angle = np.linalg.norm(readings.rotation_vector, axis=1)
+    if measurements.rotation_vector is not None:
+        angle = np.linalg.norm(measurements.rotation_vector, axis=1)
         if angle.max() > _FARTHEST_RAD:
             index = int(np.argmax(angle))
             raise table.cell_fault(

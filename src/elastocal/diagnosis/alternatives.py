@@ -1,8 +1,9 @@
-"""Models that are left after the present readings, and what an experiment would tell of them.
+"""Models that are left after the present measurements, and what an experiment would tell of them.
 
 Models of the posterior are linear in their coefficients, so that what an experiment tells is one matrix, its information G on
-declared parameters and units together. A model j that present readings leave with coefficients N(m_j, P_j^-1) expects readings
-with mean A_j m_j and covariance I + A_j P_j^-1 A_j', A'A = G. If readings come from coefficients t instead, then on average
+declared parameters and units together. A model j that present measurements leave with coefficients N(m_j, P_j^-1) expects
+measurements with mean A_j m_j and covariance I + A_j P_j^-1 A_j', A'A = G. If measurements come from coefficients t instead,
+then on average
 
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
@@ -30,7 +31,7 @@ _DRAWS = 4
 
 @dataclass(frozen=True)
 class Members:
-    """Models as they are after the present readings; M of them.
+    """Models as they are after the present measurements; M of them.
 
     Attributes
     ----------
@@ -136,7 +137,7 @@ def members_of(evidence, kept, instrument, lead, factor):
 
 
 def _misfits(members, information, truths):
-    """-2 ln p_j on average, but for what is common to all models, for readings that true coefficients make.
+    """-2 ln p_j on average, but for what is common to all models, for measurements that true coefficients make.
 
     Parameters
     ----------
