@@ -1,4 +1,4 @@
-"""Code, messages, reports and pages use the words of the field; a word of the private dialect of earlier versions fails here."""
+"""Code, messages, reports and pages use the words of the field; a word of the private dialect of earlier versions fails."""
 
 import re
 from pathlib import Path

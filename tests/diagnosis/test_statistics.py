@@ -7,7 +7,7 @@ import pytest
 from made_problems import made_rows
 from scipy.stats import chi2, ks_2samp, kstest
 
-from elastocal.diagnosis.statistics import null_draws, pose_error_unit, statistics_of
+from elastocal.diagnosis.statistics import null_draws, statistics_of
 
 TAU = np.array([0.0, 0.1, 0.7, 5.0])
 CASES = {
@@ -123,15 +123,6 @@ def test_at_takes_some_sizes_of_the_pose_error():
     np.testing.assert_array_equal(some.pose_error_rad, TAU[[1, 3]])
     for name in ("gram", "along", "squares", "log_likelihood"):
         np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[[1, 3]])
-
-
-def test_unit_of_the_pose_error_is_the_standard_error_of_an_angle_from_one_pose():
-    """For a Jacobian of orthogonal columns of norm h, one over h."""
-    rows = made_rows(8, poses=3, size=(4, 4), joints=2)
-    jacobian = np.empty((12, 2))
-    for number in range(3):
-        jacobian[rows.pose == number] = 5.0 * np.linalg.qr(np.random.default_rng(number).standard_normal((4, 2)))[0]
-    assert pose_error_unit(replace(rows, jacobian=jacobian).products) == pytest.approx(0.2)
 
 
 # Moments are compared at 5 standard errors: each test fails by chance once in some ten thousand seeds, and sees with a power of

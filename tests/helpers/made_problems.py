@@ -8,7 +8,7 @@ from elastocal.diagnosis.hypotheses import OTHER, Unit, prior_of
 from elastocal.diagnosis.other import OWN, Competitor
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
-from elastocal.diagnosis.statistics import pose_error_unit, products_of, statistics_of
+from elastocal.diagnosis.statistics import products_of, statistics_of
 
 
 @dataclass(frozen=True)
@@ -89,5 +89,9 @@ def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=No
 def made_problem(rows, units, settings=None, tau=None):
     """The problem of some rows, at the engine's own sizes of the pose error unless told, and its products."""
     settings, products = settings or Settings(), rows.products
-    tau = pose_error_unit(products) * np.array(settings.pose_steps) if tau is None else np.asarray(tau, float)
+    if tau is None:
+        # In standard errors with which the measurements of one pose determine a joint angle.
+        information = np.median(np.trace(products.pose_gram, axis1=1, axis2=2)) / products.pose_gram.shape[1]
+        tau = np.array(settings.pose_steps) / np.sqrt(information)
+    tau = np.asarray(tau, float)
     return Problem(statistics_of(products, tau), tuple(units), prior_of(units, settings), settings), products

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support import OTHER_CHAINS, chain_of, random_angles, random_loads
@@ -14,7 +13,6 @@ from elastocal.mechanics.elastostatics import (
     generalized_forces,
     joint_torques,
     regressor,
-    transport_wrench,
     wrench_of_offset_force,
 )
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
@@ -45,6 +43,12 @@ def test_generalized_forces_are_the_transposed_jacobian_times_the_wrench():
     np.testing.assert_allclose(generalized_forces(jacobian, wrench), expected, rtol=0, atol=1e-14)
 
 
+def transported(wrench, from_position, to_position):
+    """A wrench stated at another point of the same rigid body: M' = M + (p - p') x F."""
+    force, moment = wrench[..., :3], wrench[..., 3:]
+    return np.concatenate([force, moment + np.cross(from_position - to_position, force)], axis=-1)
+
+
 def test_wrench_at_a_partial_point_gives_the_torques_of_the_end_effector_jacobian(robot):
     loads = random_loads(robot, 2, 4)
     end = robot.chain.end_effector
@@ -52,8 +56,7 @@ def test_wrench_at_a_partial_point_gives_the_torques_of_the_end_effector_jacobia
     at_end = poses(robot.chain, loads.joint_angles, end)[0]
     for point in robot.chain.points:
         there = poses(robot.chain, loads.joint_angles, point)[0]
-        transported = transport_wrench(loads.wrench, at_end, there)
-        found = joint_torques(robot.chain, loads.joint_angles, transported, point)
+        found = joint_torques(robot.chain, loads.joint_angles, transported(loads.wrench, at_end, there), point)
         before = len(robot.chain.moved_by(point))
         np.testing.assert_allclose(found[..., :before], torques[..., :before], rtol=0, atol=1e-9)
         assert (found[..., before:] == 0).all()
@@ -66,32 +69,11 @@ def test_untransported_wrench_gives_other_torques_at_a_partial_point(kuka):
     assert np.abs(partial - torques)[..., :2].max() > 100.0
 
 
-@given(wrenches, vectors, vectors, vectors)
-def test_transport_by_way_of_another_point_is_direct_transport(wrench, a, b, c):
-    # Metres up to 1e3 times newtons up to 1e3.
-    there = transport_wrench(transport_wrench(wrench, a, b), b, c)
-    np.testing.assert_allclose(there, transport_wrench(wrench, a, c), rtol=0, atol=1e-8)
-    np.testing.assert_allclose(transport_wrench(there, c, a), wrench, rtol=0, atol=1e-8)
-
-
-@given(wrenches, vectors, vectors)
-def test_transport_keeps_the_force_and_the_moment_along_it(wrench, a, b):
-    there = transport_wrench(wrench, a, b)
-    np.testing.assert_array_equal(there[:3], wrench[:3])
-    assert there[:3] @ there[3:] == pytest.approx(wrench[:3] @ wrench[3:], rel=0, abs=1e-4)
-
-
-def test_transported_force_has_the_moment_of_its_lever():
-    # 10 N upwards at x = 2 turns about -y as seen from the origin.
-    there = transport_wrench(np.array([0.0, 0.0, 10.0, 0.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]), np.zeros(3))
-    np.testing.assert_array_equal(there, [0.0, 0.0, 10.0, 0.0, -20.0, 0.0])
-
-
 def test_force_with_an_offset_along_base_axes_is_that_force_transported():
     rng = np.random.default_rng(3)
     force, offset = rng.standard_normal((4, 5, 3)), np.array([0.1, 0.5, -0.2])
     at_point = np.concatenate([force, np.zeros_like(force)], axis=-1)
-    expected = transport_wrench(at_point, offset, np.zeros(3))
+    expected = transported(at_point, offset, np.zeros(3))
     np.testing.assert_allclose(wrench_of_offset_force(force, offset), expected, rtol=0, atol=1e-15)
 
 

@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import pinocchio as pin
 import pytest
-from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, PinocchioPoint, chain_of, homogeneous, random_angles
+from support import ODD_CHAINS, OTHER_CHAINS, PARALLELOGRAM, TRACK, chain_of, homogeneous, random_angles
 
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.pose_differences import pose_differences
@@ -176,25 +175,6 @@ def test_shoulder_is_the_first_joint_that_carries_weight(name, shoulder, request
 
 def test_arm_that_turns_about_the_vertical_only_has_no_shoulder():
     assert sites_of(chain_of("Tz(0.3) Rz(q1) Tx(0.5) Rz(q2) Tx(0.5) [end]")).shoulder is None
-
-
-def test_lever_of_weight_is_the_gravity_torque_of_pinocchio(chain):
-    sites, angles = sites_of(chain), random_angles(np.random.default_rng(6), chain, 4)
-    joints = [index for index, t in enumerate(chain.transforms) if t.coordinate is not None]
-    ends = [*joints, len(chain.transforms)]
-    for link in range(1, sites.joints + 1):
-        one = PinocchioPoint(chain, replace(chain.points[0], after=ends[link], offset_m=(0, 0, 0)))
-        frame = one.model.frames[one.frame]
-        one.model.appendBodyToJoint(
-            frame.parentJoint, pin.Inertia(1.0, frame.placement.translation, np.zeros((3, 3))), pin.SE3.Identity()
-        )
-        one.model.gravity.linear = np.array([0.0, 0.0, -1.0])
-        data = one.model.createData()
-        for joint in range(sites.joints):
-            found = sites.lever_of_weight(angles, joint, link)
-            held = [pin.computeGeneralizedGravity(one.model, data, q[one.order]) for q in angles]
-            expected = [-h[one.order.index(joint)] if joint in one.order else 0.0 for h in held]
-            np.testing.assert_allclose(found, expected, rtol=0, atol=ROUNDING)
 
 
 def test_sites_of_a_robot_on_a_track_and_of_one_with_a_parallelogram():

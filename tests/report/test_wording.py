@@ -7,7 +7,6 @@ from elastocal.report.wording import (
     counted,
     length,
     members_words,
-    p_words,
     plain,
     probability_words,
     scaled,
@@ -61,7 +60,6 @@ def test_lengths_and_counts():
     assert length(None) == "unknown"
     assert counted(1, "pose") == "1 pose" and counted(12000, "pose") == "12\u2009000 poses"
     assert plain(0.000123) == "0.000123" and plain(1234.5) == "1234"
-    assert p_words(0.0004997).endswith("0.0005") and p_words(0.0).endswith("0.0001") and p_words(None) == "p unknown"
 
 
 def test_lists_are_sentences():

@@ -6,6 +6,7 @@ No NAMES: what the faults of loads have in common.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.constants import g, pound_force
 
 from elastocal.data_checks.placement import rms, robust_sigma, robustly_placed, spread
 from elastocal.fitting.identifiability import solve_identifiable
@@ -13,7 +14,6 @@ from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
-_GRAVITY, _POUND = 9.80665, 4.4482216
 _MANY_POSES = 150
 # Compliances of a robot and those of its data sheet differ by no more; all together by less.
 _RATIO, _MEAN_RATIO = 1.7, 1.35
@@ -49,15 +49,15 @@ class Unit:
 
 UNITS = (
     Unit(1.0, 1.0, ""),
-    Unit(_GRAVITY, _GRAVITY, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),
-    Unit(1 / _GRAVITY, 1 / _GRAVITY, "measurements fit the written loads over 9.81, as if they had been converted twice"),
+    Unit(g, g, "the loads look like kilogram-force: measurements fit 9.81 times the written loads"),
+    Unit(1 / g, 1 / g, "measurements fit the written loads over 9.81, as if they had been converted twice"),
     Unit(1e3, 1e3, "the loads look like kilonewtons: measurements fit 1000 times the written loads"),
     Unit(1e-3, 1e-3, "the loads look like millinewtons: measurements fit a thousandth of the written loads"),
-    Unit(_POUND, _POUND, "the loads look like pounds-force: measurements fit 4.45 times the written loads"),
-    Unit(1 / _POUND, 1 / _POUND, "measurements fit the written loads over 4.45, as if they had been converted twice"),
+    Unit(pound_force, pound_force, "the loads look like pounds-force: measurements fit 4.45 times the written loads"),
+    Unit(1 / pound_force, 1 / pound_force, "measurements fit the written loads over 4.45, as if they had been converted twice"),
     Unit(1.0, 1e-3, "the moments look like newton millimetres: measurements fit a thousandth of the written moments"),
     Unit(1e3, 1.0, "the forces look like kilonewtons: measurements fit 1000 times the written forces"),
-    Unit(_GRAVITY, 1.0, "the forces look like kilogram-force: measurements fit 9.81 times the written forces"),
+    Unit(g, 1.0, "the forces look like kilogram-force: measurements fit 9.81 times the written forces"),
 )
 
 

@@ -6,8 +6,8 @@ Faults are looked for by the modules of this package, each with
 - ``AFTER``, the modules whose decisive faults make it meaningless to look for these;
 - ``find(campaign, measurements)``, which lists the faults of these names that the measurements show.
 
-Nothing else knows the faults by name: a new module is new faults. Where it is ambiguous none is found: a false alarm stops a trace that
-was right, a miss only leaves it to what comes after.
+Nothing else knows the faults by name: a new module is new faults. Where it is ambiguous none is found: a false alarm stops a
+trace that was right, a miss only leaves it to what comes after.
 """
 
 from dataclasses import dataclass

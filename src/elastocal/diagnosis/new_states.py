@@ -10,6 +10,7 @@ than a pose close by.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.constants import g as standard_gravity
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Target
@@ -19,7 +20,6 @@ from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.whitening import whitening
-from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 # Without a ladder of loads: each pose without its load and under it, and under the opposite one where the campaign has such.
 WITHOUT_AND_WITH, BOTH_SENSES = (0.0, 1.0), (0.0, 1.0, -1.0)
@@ -132,7 +132,7 @@ def reach_of(states, robot, joint_limits, ladder, weights):
     along = force[loaded] / size[loaded, None]
     cosines = along @ along.T
     free = bool(loaded.any()) and np.linalg.eigvalsh(along.T @ along / len(along))[0] > _FREE_DIRECTIONS
-    rated = (robot.payload_kg or 0.0) * STANDARD_GRAVITY
+    rated = (robot.payload_kg or 0.0) * standard_gravity
     gravity = np.asarray(robot.gravity_m_s2, float)
     either = bool(cosines.min(initial=0.0) < -0.5)
     shares = ladder if ladder is not None else BOTH_SENSES if either else WITHOUT_AND_WITH

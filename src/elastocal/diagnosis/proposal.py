@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+from scipy.constants import g as standard_gravity
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.mechanics.components import WRENCH_NAMES
-from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 # Said where nothing within reach helps.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
@@ -141,7 +141,7 @@ def table_of(proposal, robot):
     if proposal.approach is not None:
         columns |= {f"approach{joint + 1}": proposal.approach[:, joint] for joint in range(joints)}
     if proposal.reference_weight.any():
-        mass = np.linalg.norm(proposal.wrench[:, :3], axis=1) / STANDARD_GRAVITY
+        mass = np.linalg.norm(proposal.wrench[:, :3], axis=1) / standard_gravity
         columns["reference_weight_kg"] = np.where(proposal.reference_weight, mass, 0.0)
     return pd.DataFrame(columns)
 

@@ -202,12 +202,6 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
     )
 
 
-def pose_error_unit(products):
-    """Standard error, rad, with which the measurements of one pose determine a joint angle: the unit of the grid of tau."""
-    information = np.median(np.trace(products.pose_gram, axis1=1, axis2=2)) / products.pose_gram.shape[1]
-    return float(1.0 / np.sqrt(information))
-
-
 def statistics_of(products, pose_error_rad):
     """Sufficient statistics at some sizes of the pose error.
 

@@ -73,9 +73,7 @@ def _frames(placed, measured, session, count):
     for number in range(count):
         mask = session == number
         centre, seen = placed[mask].mean(axis=0), measured[mask].mean(axis=0)
-        left, _, right = np.linalg.svd((measured[mask] - seen).T @ (placed[mask] - centre))
-        # A reflection would fit as well where all points lie in a plane.
-        rotation[number] = left @ np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))]) @ right
+        rotation[number] = Rotation.align_vectors(measured[mask] - seen, placed[mask] - centre)[0].as_matrix()
         position[number] = seen - rotation[number] @ centre
     return rotation, position
 

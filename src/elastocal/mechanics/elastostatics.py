@@ -34,22 +34,6 @@ def wrench_of_offset_force(force, offset_m, rotation=None):
     return np.concatenate([force, np.cross(lever, force)], axis=-1)
 
 
-def transport_wrench(wrench, from_position, to_position):
-    """State a wrench at another point of the same rigid body: M' = M + (p - p') x F.
-
-    Parameters
-    ----------
-    wrench : ndarray (..., 6)
-    from_position, to_position : ndarray (..., 3)
-
-    Returns
-    -------
-    ndarray (..., 6)
-    """
-    force, moment = wrench[..., :3], wrench[..., 3:]
-    return np.concatenate([force, moment + np.cross(from_position - to_position, force)], axis=-1)
-
-
 def generalized_forces(jacobian, wrench):
     """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
 

@@ -95,32 +95,6 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
 
 
-def poses_and_jacobians_of_points(chain, coordinates, points):
-    """Poses and Jacobians of several measuring points in one walk along the chain.
-
-    Parameters
-    ----------
-    chain, coordinates
-        As in `poses_and_jacobians`.
-    points : sequence of MeasuringPoint
-
-    Returns
-    -------
-    position : ndarray (T, ..., 3)
-    rotation : ndarray (T, ..., 3, 3)
-    jacobian : ndarray (T, ..., 6, n)
-    """
-    components, batch = _component_first(coordinates)
-    size, shapes = components.shape[1], ((3,), (3, 3), (6, chain.coordinates))
-    position, rotation, jacobian = (np.empty((len(points), *shape, size)) for shape in shapes)
-    for part in blocks(size):
-        frames, screws = sweep(chain, components[:, part], points)
-        for number, (axes, origin) in enumerate(frames):
-            store_pose(axes, origin, position[number, :, part], rotation[number, :, :, part])
-            _store_twists(screws, points[number].after, origin, jacobian[number, :, :, part])
-    return tuple(_each_batch_first(array, batch) for array in (position, rotation, jacobian))
-
-
 def jacobians(chain, coordinates, point):
     """Geometric Jacobian of a measuring point, where its pose is not needed.
 

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.constants import g as standard_gravity
 
 from elastocal.mechanics.chain import Chain
 
 # Standard acceleration (ISO 80000-3), on a floor.
-STANDARD_GRAVITY = 9.80665
-STANDING = (0.0, 0.0, -STANDARD_GRAVITY)
+STANDING = (0.0, 0.0, -standard_gravity)
 
 
 @dataclass(frozen=True)

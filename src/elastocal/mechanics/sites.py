@@ -72,30 +72,6 @@ class Sites:
     compensator: Compensator | None = None
     payload_kg: float | None = None
 
-    def lever_of_weight(self, joint_angles, joint, link):
-        """Torque on a joint per newton of weight at the far end of a link.
-
-        Parameters
-        ----------
-        joint_angles : ndarray (..., n)
-            rad.
-        joint : int
-            From 0.
-        link : int
-            0 is the column.
-
-        Returns
-        -------
-        ndarray (...,)
-            N m / N.
-        """
-        coordinates = np.zeros((np.size(joint_angles) // self.joints, self.chain.coordinates))
-        coordinates[:, : self.joints] = np.reshape(joint_angles, (-1, self.joints))
-        end = self.far_end(link)
-        moved = motion(self.chain, coordinates, [end])
-        jacobian = moved.jacobian(end.after, moved.position[0], rows=3)
-        return (self.down @ jacobian[:, joint]).reshape(np.shape(joint_angles)[:-1])
-
     def far_end(self, link):
         """The far end of a link, 0 for the column, as a measuring point."""
         return MeasuringPoint("far end", self._behind(self.link_end[link][-1]))

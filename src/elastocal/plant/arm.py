@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from scipy.constants import g as standard_gravity
 
 from elastocal.errors import InputError
 
-STANDARD_GRAVITY = 9.80665
 _RELATIVE_STD = 0.1
 # What counts as heavy, and gears as stiff as a heavy arm's.
 _USUAL_RATIOS = (191.25, 171.74, 153.4, 129.6, 118.9, 101.0, 101.0)
@@ -114,7 +114,7 @@ class Arm:
     reported_matrix: np.ndarray
     reported_offset: np.ndarray
     masses: tuple = ()
-    gravity_m_s2: tuple = (0.0, 0.0, -STANDARD_GRAVITY)
+    gravity_m_s2: tuple = (0.0, 0.0, -standard_gravity)
     rated_kg: float | None = None
     compensated: bool = True
     ratios: tuple = ()
@@ -228,7 +228,7 @@ def arm_from_document(document, source="robot"):
         np.array(shown.get("matrix", np.eye(n)), float),
         np.radians(np.array(shown.get("offset_deg", np.zeros(n)), float)),
         tuple(_link_mass(entry) for entry in document.get("masses", ())),
-        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -STANDARD_GRAVITY)))),
+        tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
         document.get("payload_kg"),
         # A file that tells nothing of weights tells nothing of a compensator either.
         "compensator" in document or "masses" not in document,

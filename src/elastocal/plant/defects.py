@@ -10,10 +10,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
+from scipy.constants import g as standard_gravity
 
 from elastocal.errors import InputError
 from elastocal.plant import drives, gears
-from elastocal.plant.arm import STANDARD_GRAVITY, Arm
+from elastocal.plant.arm import Arm
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.structure import Compensator, Mass, TaperedTube
 from elastocal.plant.tracker import Drift, EccentricNest, Move
@@ -173,7 +174,7 @@ def _shoulder(arm):
 
 def _turned_by(arm, masses):
     """Joints, from 1, that weights turn where the arm stands upright."""
-    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -STANDARD_GRAVITY))
+    torque = usual_gravity_torque(arm, masses, (0.0, 0.0, -standard_gravity))
     return tuple(int(joint) + 1 for joint in np.flatnonzero(torque > _NO_TORQUE * torque.max()))
 
 

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-
-from elastocal.plant.arm import STANDARD_GRAVITY
+from scipy.constants import g as standard_gravity
 
 
 @dataclass(frozen=True)
@@ -108,4 +107,4 @@ class Structure:
     compensator: Compensator | None = None
     wrong_vectors_m: dict = field(default_factory=dict)
     wrong_turns: dict = field(default_factory=dict)
-    gravity_m_s2: tuple = (0.0, 0.0, -STANDARD_GRAVITY)
+    gravity_m_s2: tuple = (0.0, 0.0, -standard_gravity)

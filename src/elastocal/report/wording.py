@@ -110,13 +110,6 @@ def probability_words(probability):
     return percent(probability)
 
 
-def p_words(p_value):
-    """A p-value with its relation."""
-    if p_value is None:
-        return "p unknown"
-    return f"p{_TIED}={_TIED}{p_value:.2g}" if p_value >= 1e-4 else f"p{_TIED}<{_TIED}0.0001"
-
-
 def scaled(value, error, unit):
     """A value with its standard error in a unit that suits it.
 
