@@ -10,6 +10,8 @@ from itertools import product
 import pytest
 from study_folder import NOISE, REPOSITORY, ROBOTS, STRATEGIES
 
+from import_closure import closure
+
 SCRIPTS = sorted(
     path.name
     for path in (REPOSITORY / "workflow" / "scripts").glob("*.py")
@@ -251,45 +253,11 @@ def loaded(small_study):
     return {script: json.loads(files) for script, files in (line.split(" ", 1) for line in done.stdout.splitlines())}
 
 
-@pytest.fixture(scope="module")
-def closure():
-    folder = str(REPOSITORY / "workflow" / "rules")
-    sys.path.insert(0, folder)
-    try:
-        from import_closure import closure
-    finally:
-        sys.path.remove(folder)
-    return closure
-
-
 @pytest.mark.parametrize("script", SCRIPTS)
-def test_the_import_closure_is_what_a_script_loads(script, small_study, loaded, closure):
+def test_the_import_closure_is_what_a_script_loads(script, small_study, loaded):
     scripts = small_study.path("workflow/scripts")
-    found = closure(scripts / script, [small_study.path("src"), scripts])
+    found = closure(scripts / script, small_study.path("src"))
     assert [file.relative_to(small_study.folder).as_posix() for file in found] == loaded[script]
-
-
-@pytest.mark.parametrize(
-    "statements",
-    [
-        "import json, deep.found as other",
-        "from deep import (\n    found,\n)",
-        "def later():\n    if True: import json; from deep.found import anything",
-        "if True:\n    pass\nelif False:\n    import deep.found",
-        "for _ in ():\n    pass\nelse:\n    import deep.found",
-        "try:\n    import json\nexcept ImportError:\n    import deep.found",
-        "try:\n    import json\nfinally:\n    import deep.found",
-        "class Other:\n    with open('') as file:\n        import deep.found",
-        "match 1:\n    case 1:\n        import deep.found",
-    ],
-)
-def test_an_import_at_any_depth_is_in_the_closure(statements, closure, tmp_path):
-    for name in ("deep/__init__.py", "deep/found.py", "deep/other.py", "json_files.py"):
-        tmp_path.joinpath(name).parent.mkdir(exist_ok=True)
-        tmp_path.joinpath(name).touch()
-    script = tmp_path / "script.py"
-    script.write_text(f"{statements}\n", encoding="utf-8")
-    assert closure(script, [tmp_path]) == [tmp_path / "deep" / "__init__.py", tmp_path / "deep" / "found.py"]
 
 
 def test_the_identification_job_runs_on_numpy_and_pyarrow_alone(finished):

@@ -48,7 +48,7 @@ wildcard_constraints:
 def sources(script):
     """A script and the package modules that it runs: an edit of one reruns the jobs that depend on it, and no others."""
     path = ROOT / "workflow" / "scripts" / script
-    files = [path, *closure(path, [ROOT / "src", ROOT / "workflow" / "scripts"])]
+    files = [path, *closure(path, ROOT / "src")]
     return [file.relative_to(ROOT).as_posix() for file in files]
 
 

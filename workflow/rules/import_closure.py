@@ -3,59 +3,60 @@
 import ast
 from functools import cache
 from itertools import accumulate
-from pathlib import Path
+
+import grimp
+
+PACKAGE = "elastocal"
 
 
-def closure(script, roots):
+def closure(script, source):
     """Source files that a script imports, directly or not.
 
     Parameters
     ----------
     script : Path
-    roots : sequence of Path
-        Folders in which modules are looked up; imports that are in none of them are somebody else's.
+        Imports modules of the package and of its own folder.
+    source : Path
+        Folder of the package.
 
     Returns
     -------
     list of Path
         Sorted, without the script itself.
     """
-    found, waiting = set(), [Path(script)]
-    while waiting:
-        for file in _imported(waiting.pop(), tuple(roots)) - found:
-            found.add(file)
-            waiting.append(file)
-    return sorted(found)
+    own, modules = _imports(script), set()
+    files = {file for name in own if (file := script.with_name(f"{name}.py")).is_file()}
+    for file in (script, *files):
+        modules |= _imports(file) & _graph().modules
+    modules |= {found for name in modules for found in _graph().find_upstream_modules(name)}
+    # With a module come the packages above it.
+    names = {package for name in modules for package in accumulate(name.split("."), "{}.{}".format)}
+    return sorted(files | {_file(name, source) for name in names if name.split(".")[0] == PACKAGE})
 
 
 @cache
-def _imported(file, roots):
+def _graph():
+    graph = grimp.build_graph(PACKAGE, include_external_packages=True, cache_dir=None)
+    # A catalogue looks up the modules beside it by itself.
+    for catalogue in graph.find_modules_that_directly_import("pkgutil"):
+        for module in graph.find_children(catalogue.rpartition(".")[0]):
+            if module != catalogue:
+                graph.add_import(importer=catalogue, imported=module)
+    return graph
+
+
+@cache
+def _imports(file):
+    """Names that a file imports: of modules, or of what is in them."""
     names = set()
-    for node in _statements(ast.parse(file.read_bytes())):
+    for node in ast.walk(ast.parse(file.read_bytes())):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+        elif isinstance(node, ast.ImportFrom):
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
-    modules = _modules(roots)
-    # With a module come the packages above it.
-    above = {package for name in names for package in accumulate(name.split("."), "{}.{}".format)}
-    found = {modules[name] for name in above & modules.keys()}
-    # A catalogue looks up the modules beside it by itself.
-    return frozenset(found | set(file.parent.glob("*.py")) if "pkgutil" in names else found)
+    return frozenset(names)
 
 
-def _statements(tree):
-    """Statements at any depth. No expression holds one, so none is looked into: they are nearly all of a tree."""
-    waiting = [tree]
-    while waiting:
-        for node in ast.iter_child_nodes(waiting.pop()):
-            if isinstance(node, ast.stmt | ast.excepthandler | ast.match_case):
-                waiting.append(node)
-                yield node
-
-
-@cache
-def _modules(roots):
-    """Files of all modules below `roots`, by name: one listing is quicker than a look for each name."""
-    files = [(path, path.relative_to(root).with_suffix("").parts) for root in roots for path in root.rglob("*.py")]
-    return {".".join(parts[:-1] if parts[-1] == "__init__" else parts): path for path, parts in files}
+def _file(module, source):
+    path = source.joinpath(*module.split("."))
+    return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
