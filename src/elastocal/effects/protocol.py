@@ -2,7 +2,7 @@
 
 An effect is a module of this package with
 
-- ``NAME`` and ``FAMILY``, as in the design's table;
+- ``NAME`` and ``FAMILY``, by which the report groups them;
 - ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
   ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
   behind them;
