@@ -2,7 +2,7 @@
 
 Faults are looked for by the modules of this package, each with
 
-- ``NAMES`` of the faults that it may find and their ``FAMILY``, by which the report groups them;
+- ``NAMES`` of the faults that it may find and their ``FAMILY``;
 - ``AFTER``, the modules whose decisive faults make it meaningless to look for these;
 - ``find(campaign, measurements)``, which lists the faults of these names that the measurements show.
 

@@ -1,6 +1,9 @@
-"""A force that acts elsewhere than was written down: J c J^T (0, dr x F).
+"""A force that acts elsewhere than was recorded: the pull or the weight is fixed to the tool at another place.
 
-Catalogue row 22. The shift dr is fixed in base axes, or in the flange where the load hangs on the tool.
+theta = diag(c) J^T (0, dr x F), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of
+the loaded point, F the force (N) and dr the shift of its point of application (m), fixed in base axes, or in the flange where
+the load hangs on the tool. Derived here: a force that is moved by dr has the further moment dr x F, and a wrench w loads the
+joints by J^T w.
 """
 
 from elastocal.effects.protocol import Parameter

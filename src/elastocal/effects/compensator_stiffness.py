@@ -1,8 +1,16 @@
-"""Stiffness that a gravity compensator adds to the shoulder: c (u_1 cos q + v_1 sin q + u_2 cos 2q + v_2 sin 2q) per torque.
+"""Stiffness that a gravity compensator adds to the shoulder: its spring resists a small turn more in some poses than in others.
 
-Catalogue row 11: K(q) = K_0 + K a L [cos u - (s0/s) (cos u - a L sin^2 u / s^2)], the second derivative of the spring's energy,
-whose first is the torque of `compensator_torque`: where the crank is short, orders 1 and 2 with unknown phases. With order 1
-alone it is the same as a shoulder whose own stiffness depends on its angle.
+k = -dT/dq = K a L [(s0/s) (cos p + a L sin^2 p / s^2) - cos p], p = alpha + q,
+
+is what the spring [1]_ adds (N m/rad), with T and its symbols as in `compensator_torque`, and -c^2 k is what that adds to the
+compliance c of the joint. For a short crank it is theta = tau (u_1 cos q + v_1 sin q + u_2 cos 2q + v_2 sin 2q), with theta in
+rad, tau the torque of load and declared masses (N m), u and v in rad/(N m). With order 1 alone it is the same as a shoulder
+whose own stiffness depends on its angle.
+
+References
+----------
+.. [1] A. Klimchik, Y. Wu, C. Dumas, S. Caro, B. Furet and A. Pashkevich, Identification of geometrical and elastostatic
+   parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
 """
 
 from elastocal.effects import compensator_torque

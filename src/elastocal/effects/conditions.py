@@ -1,4 +1,11 @@
-"""What effects may depend on in each state of the robot: its loads, its motion, the approach, time and temperature."""
+"""What effects may depend on in each state of the robot: its loads, its motion, the approach, time and temperature.
+
+The load on each coordinate is the generalized force J^T w of a wrench w (N, N m) by the principle of virtual work [1]_.
+
+References
+----------
+.. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
+"""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +25,7 @@ class Conditions:
     """Everything that an effect may depend on, for S states of the robot.
 
     Loads are taken where the robot has yielded to them: at the displaced coordinates behind `motion`, not at the commanded ones
-    (the term K_C of Chen and Kao 2000).
+    (the term K_C of the conservative congruence transformation [1]_).
 
     Attributes
     ----------
@@ -40,6 +47,11 @@ class Conditions:
     temperature_c : ndarray (S,) or None
     progress : ndarray (S,)
         How far the campaign had come, from 0 at its first row to 1 at its last: see `progress_of`.
+
+    References
+    ----------
+    .. [1] S.-F. Chen and I. Kao, Conservative congruence transformation for joint and Cartesian stiffness matrices of robotic
+       hands and fingers, International Journal of Robotics Research 19, 2000.
     """
 
     sites: Sites
@@ -264,7 +276,8 @@ def offered(sites, states):
     -------
     frozenset of str
         "load": an external load, or declared masses, whose weight loads the joints too; "external load", without which
-        nothing tells the compliances; "approach", where it is known somewhere; "time" and "temperature", where they change.
+        the compliances are not identifiable; "approach", where it is known somewhere; "time" and "temperature", where they
+        change.
     """
     there = {
         "load": bool(sites.masses) or bool(states.wrench.any()),

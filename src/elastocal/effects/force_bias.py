@@ -1,6 +1,9 @@
-"""A force sensor that shows a force where there is none: J c J^T b wherever the robot is loaded.
+"""A force sensor that shows a force where there is none: its zero was not set before the pull, or has moved since.
 
-Catalogue row 21. The bias is fixed in base axes, or in the flange where the sensor turns with the tool.
+theta = diag(c) J^T (b, 0) wherever a load is recorded, or (b, r x b) in a pull with the lever r (m); theta are the turns of
+the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded point, and b the force that acts beyond the
+recorded one (N), which is minus what the sensor shows at zero. It is fixed in base axes, or in the flange where the sensor
+turns with the tool. Derived here: a wrench w loads the joints by J^T w, so that its error dw turns them by diag(c) J^T dw.
 """
 
 from elastocal.effects.protocol import Parameter

@@ -1,7 +1,12 @@
-"""A force sensor that is mounted askew: the force turned by a small angle phi, J c J^T (phi x F).
+"""A force sensor that is mounted askew: it shows the right force in a wrong direction.
 
-Catalogue row 20. The angle is fixed in base axes, or in the flange where the sensor turns with the tool. A sensor in the line
-of a pull tells the force alone, so that the moment that this makes at its lever is wrong, too.
+theta = diag(c) J^T (phi x F, 0), or diag(c) J^T (phi x F, r x (phi x F)) in a pull,
+
+with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded point, F the recorded
+force (N) and phi the small angle from it to the one that acts (rad), fixed in base axes, or in the flange where the sensor
+turns with the tool. A sensor in the line of a pull measures the force alone, so that the moment about its lever r (m) is
+wrong, too; elsewhere the moments are as recorded. Derived here: a small turn adds phi x F, and an error dw of the wrench loads
+by J^T dw.
 """
 
 from elastocal.effects.protocol import Parameter

@@ -1,6 +1,9 @@
-"""A force sensor that shows too much or too little: J c J^T (s w).
+"""A force sensor that shows too much or too little: its sensitivity differs from the one of its calibration.
 
-Catalogue row 19: an exact alias of the compliances, so that where they are identified only a reference weight can find it.
+theta = diag(c) J^T (s w), with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the
+loaded point, w the recorded wrench (N, N m) and s the share by which the one that acts is larger. Derived here: the error s w
+of the wrench loads the joints by J^T (s w). Where all compliances are identified and no declared masses load the joints it is
+exactly an alias of them, so that only a reference weight can find it.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter

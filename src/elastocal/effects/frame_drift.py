@@ -1,6 +1,7 @@
-"""A tracker or a foot that wanders: a rigid motion of all measurements, linear in the time since the campaign began.
+"""A tracker or a robot's foot that drifts: stand, floor or bolts settle, and all measurements move as one rigid body.
 
-Catalogue row 23.
+u = t (d, r) at the foot in base axes, with t the time since the first measurement (h), d in m/h and r in rad/h; a point p (m)
+moves by t (d + r x p). Derived here: to first order in time a slow rigid motion is its velocity times t.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter

@@ -1,4 +1,8 @@
-"""The load under which gears are looked at: a pull at the end of the outstretched arm, and the weight of its links."""
+"""Load by which the laws of gears are scaled: a pull at the end of the outstretched arm, and the weight of its links.
+
+tau = F l + tau_w (N m), with F the weight of the rated payload, or 1 kN (N), l the length of the arm beyond the joint, at least
+that of a tool (m), and tau_w the torque of the declared masses (N m). Derived here: each force acts at its longest lever.
+"""
 
 import numpy as np
 

@@ -1,6 +1,8 @@
-"""A joint compliance that changes with the angle of the joint: J_i tau_i (u cos q_i + v sin q_i).
+"""A joint compliance that changes with the angle of the joint: teeth, rollers and housing are not equally stiff all round.
 
-Catalogue row 16.
+theta_i = tau_i (u cos q_i + v sin q_i), with theta_i and the joint angle q_i in rad, tau_i the torque of load and declared
+masses (N m), u and v in rad/(N m). Derived here: c_i(q_i) is periodic, and u and v are order 1 of its Fourier series, beside
+the mean, which is the compliance of the model.
 """
 
 import numpy as np

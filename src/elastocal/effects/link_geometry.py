@@ -1,7 +1,12 @@
-"""Wrong dimensions of a link: a constant displacement and turn at its far end, in the frame of the chain there.
+"""Wrong dimensions of a link: machining and assembly leave its far end shifted and turned from where the drawing has it.
 
-Catalogue row 2: what Denavit-Hartenberg (or Hayati) parameters can be wrong by, to first order, without their singularities.
-Components that other links, the base or the tool make as well are not identifiable and are held by the fit.
+u = (d, r), the same at every pose, in the frame of the chain at the far end, d in m and r in rad: to first order all that
+Denavit-Hartenberg or Hayati parameters [1]_ can be wrong by, without their singularities. Components that other links, the
+base or the tool make as well are not identifiable and are held by the fit.
+
+References
+----------
+.. [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
 """
 
 import numpy as np

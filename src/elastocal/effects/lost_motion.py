@@ -1,11 +1,12 @@
-"""Play that the gear crosses where the torque changes its sign: J_i D_i tanh(tau_i / tau_0).
+"""Play that the gear crosses where the torque changes its sign: teeth leave one flank and touch the other.
 
-Catalogue row 13. Linear in the play D, not in the torque tau_0 at which it is taken up: makers of gears read lost motion at 3 %
-of the rated torque [1]_.
+theta_i = D_i tanh(tau_i / tau_0), with theta_i in rad, tau_i the torque of load and declared masses (N m), D_i half the play
+(rad) and tau_0 the torque at which it is taken up (N m). Linear in D_i, not in tau_0: makers of gears measure lost motion at
+3 % of the rated torque [1]_. Derived here: tanh is a smooth step from one flank, -D_i, to the other, +D_i.
 
 References
 ----------
-.. [1] Nabtesco, "Precision reduction gear RV", glossary: lost motion, the torsion angle at 3 % of the rated torque.
+.. [1] Nabtesco, Precision Reduction Gear RV, catalogue, glossary: lost motion, the torsion angle at 3 % of the rated torque.
 """
 
 import numpy as np

@@ -1,8 +1,15 @@
 """A reflector whose centre is off the axis of its nest at the flange: it circles as the last joint turns.
 
-Spherically mounted reflectors are centred to some hundredths of a millimetre at best (Muralikrishnan, Phillips and Sawyer
-2016), worn or magnetic nests less well. What circles once a turn is like a target elsewhere or a link of other dimensions;
-twice a turn, seen from the flange, is what the reflector does that keeps looking at the tracker.
+d = sum_e e (a_e cos 2q + b_e sin 2q) over the two axes e across the last joint, in the frame that turns with it; d, a_e and
+b_e in m, q the angle of that joint in rad. Derived here: of the Fourier series of d, order 0 is a target elsewhere and order
+1, if it circles against the joint, a link of other dimensions; order 2 is the lowest of which neither makes a part, as of an
+oval ball or nest in which the reflector turns to face the tracker. How well reflectors are centred is one of the errors of
+trackers [1]_.
+
+References
+----------
+.. [1] B. Muralikrishnan, S. Phillips and D. Sawyer, Laser trackers for large-scale dimensional metrology: a review, Precision
+   Engineering 44, 2016.
 """
 
 import numpy as np

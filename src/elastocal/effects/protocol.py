@@ -2,7 +2,7 @@
 
 An effect is a module of this package with
 
-- ``NAME`` and ``FAMILY``, by which the report groups them;
+- ``NAME``, by which keys and tables call it, and ``FAMILY``, the kind of its physics, such as elastic or gearbox;
 - ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
   ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
   behind them;
@@ -28,14 +28,19 @@ class Parameter:
         Magnitude that such an effect can reach on a real robot; one that the data cannot distinguish from zero even at this
         size is not estimated.
     prior_std : float or None
-        Standard deviation of a normal prior about zero, for series whose terms the data tell from each other only in part.
-        None, as nearly everywhere, for no prior. Reported with the estimate.
+        Standard deviation of a normal prior about zero, for series whose terms the data distinguish only in part, as
+        in ridge regression [1]_. None, as nearly everywhere, for no prior. Reported with the estimate.
     sign : {-1, 0, 1}
         That such an effect has by its physics; 0 where it may have either.
     order : int
         Of a harmonic, whose plausible size falls with it; 1 elsewhere.
     sized : bool
         Whether the prior's standard deviation was estimated from the measurements, not known beforehand.
+
+    References
+    ----------
+    .. [1] A. E. Hoerl and R. W. Kennard, Ridge regression: biased estimation for nonorthogonal problems,
+       Technometrics 12, 1970.
     """
 
     name: str
@@ -83,7 +88,7 @@ class Shape:
         return (np.linspace if self.tried else np.geomspace)(below, above, count + 2)[1:-1]
 
     def shares(self, values):
-        """How much of the range each of some values stands for: the part nearest to it, ndarray of sum one."""
+        """How much of the range each of some values stands for: the part nearest to it (Voronoi cell), ndarray of sum one."""
         scale = (lambda value: value) if self.tried else np.log
         places = scale(np.asarray(values, float))
         order = np.argsort(places)

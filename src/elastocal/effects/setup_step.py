@@ -1,7 +1,9 @@
 """A tracker, a nest or a foot that was moved between two rows: a rigid motion of all measurements from there on.
 
-A step needs no clock: the rows stand in the order in which they were read, and where the rows are not known the poses count by
-their numbers. Where in the campaign it happens is a shape: 0 is its first row, 1 its last.
+u = (d, r) at the foot in base axes from the share w of the campaign on, zero before; d in m, r in rad, and a point p (m) moves
+by d + r x p. Where it happens is a shape: w = 0 is the first row of the campaign, 1 its last. A step needs no clock: the rows
+stand in the order in which they were read, and where the rows are not known the poses count by their numbers. Derived here:
+a small rigid motion times a unit step.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter, Shape

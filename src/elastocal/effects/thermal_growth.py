@@ -1,7 +1,13 @@
-"""Column and links that grow as they warm up: alpha dT along each.
+"""Column and links that grow as they warm up: motors, gears and the air warm the castings, which expand.
 
-Catalogue row 18. With a measured temperature dT is counted from 20 °C, at which dimensions are stated (ISO 1); with the time
-alone it is the rise of a first order lag since the campaign began, 1 - exp(-t / t_0).
+dl = alpha dT l for each length l (m). With a measured temperature alpha is the expansion (1/K) and dT the temperature above 20
+°C, at which dimensions are stated [1]_; with the time t (s) alone dl = g (1 - exp(-t / t_0)) l, with g the final growth (m/m)
+and t_0 (s) the lag of a body that has one temperature throughout [2]_.
+
+References
+----------
+.. [1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
+.. [2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter

@@ -1,8 +1,9 @@
-"""Wrong ratio of a gear, or coupling from a joint before it: theta_i = e_i q_i + e_ih q_h.
+"""Wrong ratio of a gear, or coupling from a joint before it: the controller divides the motor's angle by a wrong number.
 
-Catalogue row 17, kinematic part: linear in the angle and not periodic. Any joint may be coupled to the one before it. In a
-wrist whose last two motors sit in the forearm and drive through hollow shafts both follow the first wrist joint: the last one
-is coupled to the joint two before it.
+theta_i = e_i q_i + e_ih q_h, h = i - 1, with theta and q in rad and e in rad/rad (m and m/m for prismatic joints): linear in
+the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, so that errors of both numbers turn the joint by
+-(dN_i q_i + dN_ih q_h) / N_i. In a wrist whose last two motors sit in the forearm and drive through hollow shafts both joints
+follow the first wrist joint: as an alternative theta_i = e_ih q_h alone, with h that joint.
 """
 
 from elastocal.effects.protocol import Candidate, Parameter

@@ -1,4 +1,13 @@
-"""What effects of warmth have in common: by how much the robot is warmer, by the temperature or by the time."""
+"""What effects of warmth have in common: by how much the robot is warmer, by the temperature or by the time.
+
+By the temperature T (°C) it is T - 20, counted from that at which dimensions are stated [1]_, in K; by the time t since the
+campaign began (s) it is the share 1 - exp(-t / t_0) of the final warmth, the first-order lag of a lumped capacitance [2]_.
+
+References
+----------
+.. [1] ISO 1, Geometrical product specifications: standard reference temperature, 2016.
+.. [2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
+"""
 
 import numpy as np
 

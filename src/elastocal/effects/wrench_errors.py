@@ -1,4 +1,12 @@
-"""What errors of the load have in common: a changed wrench, which the joint compliances turn into angles."""
+"""What errors of the load have in common: a changed wrench, which the joint compliances turn into angles.
+
+theta = diag(c) J^T dw, with theta the turns of the joints (rad), c their compliances (rad/(N m)), J the Jacobian of the loaded
+point and dw the error of the wrench (N, N m): J^T dw are its torques by the principle of virtual work [1]_.
+
+References
+----------
+.. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
+"""
 
 from dataclasses import dataclass
 
