@@ -87,7 +87,7 @@ def is_true(mechanisms, truth):
 
 
 def credible(ranked):
-    """The smallest set of hypotheses that reaches 95 %; all of them where they do not.
+    """The smallest set of hypotheses that reaches 95 %, that of highest posterior probability; all of them where they do not.
 
     Parameters
     ----------
@@ -135,8 +135,15 @@ def expected_calibration_error(probability, correct, bins=_BINS):
 
     Notes
     -----
-    Naeini, Cooper and Hauskrecht, "Obtaining well calibrated probabilities using Bayesian binning", AAAI 2015. Even of verdicts
-    that are calibrated it is not 0 but what `by_chance` tells, for the share of few cases scatters.
+    As defined in [1]_ and [2]_. Even of verdicts that are calibrated it is not 0 but what `by_chance` tells, for the share of
+    few cases scatters.
+
+    References
+    ----------
+    .. [1] Naeini, M. P., Cooper, G. F. and Hauskrecht, M., Obtaining well calibrated probabilities using Bayesian binning, AAAI
+       Conference on Artificial Intelligence, 2015.
+    .. [2] Guo, C., Pleiss, G., Sun, Y. and Weinberger, K. Q., On calibration of modern neural networks, International
+       Conference on Machine Learning, 2017.
     """
     probability, correct = np.broadcast_arrays(np.asarray(probability, float), np.asarray(correct, float))
     if probability.shape[-1] == 0:
@@ -146,14 +153,21 @@ def expected_calibration_error(probability, correct, bins=_BINS):
 
 
 def by_chance(probability, draws, bins=_BINS):
-    """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities, float."""
+    """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities, float.
+
+    Outcomes are drawn by what is stated, as in consistency resampling [1]_, where what is stated is drawn too.
+
+    References
+    ----------
+    .. [1] Bröcker, J. and Smith, L. A., Increasing the reliability of reliability diagrams, Weather and Forecasting 22, 2007.
+    """
     probability = np.asarray(probability, float)
     so = draws.random((_RESAMPLES, len(probability))) < probability
     return float(expected_calibration_error(probability, so, bins).mean()) if len(probability) else float("nan")
 
 
 def calibration_error(rows, seed):
-    """Expected calibration error with a bootstrap interval of 95 % over cases.
+    """Expected calibration error with a basic bootstrap interval [1]_ of 95 % over cases.
 
     Parameters
     ----------
@@ -165,6 +179,11 @@ def calibration_error(rows, seed):
     -------
     dict
         ``hits`` (None), ``cases``, ``rate``, ``low``, ``high`` as `rates.rate` has them, and ``by_chance``.
+
+    References
+    ----------
+    .. [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 5.2, Cambridge University Press,
+       1997.
     """
     probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
     found = {"hits": None, "cases": len(rows), "rate": float(expected_calibration_error(probability, correct))}
@@ -179,7 +198,7 @@ def calibration_error(rows, seed):
 
 
 def reliability(rows, bins=_BINS):
-    """Data of the reliability diagram.
+    """Data of the reliability diagram [1]_.
 
     Parameters
     ----------
@@ -193,6 +212,11 @@ def reliability(rows, bins=_BINS):
     pandas.DataFrame
         One row for each kind of robots, group of cases (``all`` for all of them) and bin that has a case: its ends, the mean of
         what was stated and the share that was so, with a Clopper-Pearson interval.
+
+    References
+    ----------
+    .. [1] Murphy, A. H. and Winkler, R. L., Reliability of subjective probability forecasts of precipitation and temperature,
+       Applied Statistics 26, 1977.
     """
     found = []
     for robots in (PROOF, TUNED):

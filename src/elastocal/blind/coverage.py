@@ -20,6 +20,8 @@ _OTHER_LAW = ("lost_motion", "hysteresis")
 def intervals_of(truth, verdict):
     """Every interval of a verdict that has a true value to hold.
 
+    Wald intervals, with quantiles of Student's t where the noise has degrees of freedom.
+
     Parameters
     ----------
     truth : dict

@@ -106,7 +106,7 @@ def promises_kept(cases):
 
 
 def rates(cases):
-    """How often the name is right, with Clopper-Pearson intervals.
+    """How often the name is right, with Clopper-Pearson intervals [1]_.
 
     Parameters
     ----------
@@ -117,6 +117,11 @@ def rates(cases):
     -------
     pandas.DataFrame
         Columns right_name to high are shares of the cases, the others counts.
+
+    References
+    ----------
+    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+       Biometrika 26, 1934.
     """
     rows = []
     for key, part in cases.groupby(["robots", "arm", "poses_added"]):

@@ -39,11 +39,17 @@ def oracle(truth, verdict, folder, robots_folder, seed):
     Returns
     -------
     dict or None
-        ``candidates`` that the model was given; ``p_value`` of a Wald test of all their coefficients at once (chi-squared, with
-        the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the p-value is
-        multiplied by the number of variants), 1 where these data can tell none of them; ``detected`` at 5 %; ``heldout``,
-        errors on the held-out poses as in verdict.json. None where an effect is outside of the catalogue: no model of it has
-        that effect.
+        ``candidates`` that the model was given; ``p_value`` of a Wald test [1]_ of all their coefficients at once (chi-squared,
+        with the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the p-value is
+        multiplied by the number of variants, a Bonferroni correction [2]_), 1 where these data can tell none of them;
+        ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is outside of
+        the catalogue: no model of it has that effect.
+
+    References
+    ----------
+    .. [1] Wald, A., Tests of statistical hypotheses concerning several parameters when the number of observations is large,
+       Transactions of the American Mathematical Society 54, 1943.
+    .. [2] Dunn, O. J., Multiple comparisons among means, Journal of the American Statistical Association 56, 1961.
     """
     effects = [(defect["effect"], tuple(defect["joints"])) for defect in truth["defects"]]
     if any(effect.startswith(OUTSIDE) for effect, _ in effects):

@@ -4,7 +4,7 @@ from statsmodels.stats.proportion import proportion_confint
 
 
 def rate(hits):
-    """A share with its Clopper-Pearson interval of 95 %.
+    """A share with its Clopper-Pearson interval [1]_ of 95 %.
 
     Parameters
     ----------
@@ -15,6 +15,11 @@ def rate(hits):
     -------
     dict
         ``hits``, ``cases``, ``rate``, ``low``, ``high``; without cases the rate is not a number and the interval all there is.
+
+    References
+    ----------
+    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+       Biometrika 26, 1934.
     """
     hits = [bool(hit) for hit in hits]
     count, cases = sum(hits), len(hits)

@@ -15,6 +15,8 @@ SILENT = (ADEQUATE, NOT_TESTABLE)
 def outcome(truth, verdict):
     """What a verdict is worth, given the truth.
 
+    Whether each true effect is held by another one of those found is an assignment problem [1]_.
+
     Parameters
     ----------
     truth : dict
@@ -29,6 +31,10 @@ def outcome(truth, verdict):
         ``named_right`` that this was said without another name beside it, ``holds_truth`` that as many effects were found as
         were made and each true one is the name of another of them or among its alternatives, ``wrong_name`` that one wrong
         name was said alone.
+
+    References
+    ----------
+    .. [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
     case, said = truth["case"], verdict["verdict"]
     names, true = [effect["name"] for effect in verdict["effects"]], list(case["effects"])

@@ -58,7 +58,12 @@ def against_angle(cases):
     Returns
     -------
     pandas.DataFrame
-        With Clopper-Pearson intervals.
+        With Clopper-Pearson intervals [1]_.
+
+    References
+    ----------
+    .. [1] Clopper, C. J. and Pearson, E. S., The use of confidence or fiducial limits illustrated in the case of the binomial,
+       Biometrika 26, 1934.
     """
     bins = np.array(ANGLES)[np.minimum(np.searchsorted(ANGLES, cases["angle_deg"]), len(ANGLES) - 1)]
     columns = ["pair", "angle_up_to_deg", "cases", *(f"{name}{end}" for name in OUTCOMES for end in ("", "_low", "_high"))]

@@ -87,9 +87,13 @@ def summarized(cases, intervals, statements, seed):
     Returns
     -------
     pandas.DataFrame
-        One row for each kind of robots and figure: rates with Clopper-Pearson intervals, ratios with bootstrap intervals over
-        cases. ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty where there is no
-        target or no case.
+        One row for each kind of robots and figure: rates with Clopper-Pearson intervals, ratios with percentile bootstrap
+        intervals [1]_ over cases. ``target_low`` and ``target_high`` are the range that the target leaves; ``holds`` is empty
+        where there is no target or no case.
+
+    References
+    ----------
+    .. [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
     rows = []
     for robots in (PROOF, TUNED):

@@ -12,9 +12,9 @@ _LEVEL = 0.05
 def blocks(joint_angles, count):
     """Poses parted into blocks of neighbours whose sizes differ by one at most.
 
-    Bisecting k-means (Steinbach, Karypis and Kumar 2000) with parts of given size: a block is cut across the direction in
-    which it is widest (Boley 1998), then across the line between the means of its parts until these stay. No draw decides, and
-    no block is too small to be held out. Joints count alike, by the cosine and sine of their angles over their spread.
+    Bisecting k-means [1]_ with parts of given size: a block is cut across its principal direction [2]_, then across the line
+    between the means of its parts until these stay. No draw decides, and no block is too small to be held out. Joints count
+    alike, by the cosine and sine of their angles over their spread.
 
     Parameters
     ----------
@@ -27,6 +27,12 @@ def blocks(joint_angles, count):
     -------
     ndarray of int (P,)
         0 .. count-1.
+
+    References
+    ----------
+    .. [1] Steinbach, M., Karypis, G. and Kumar, V., A comparison of document clustering techniques, KDD Workshop on Text
+       Mining, 2000.
+    .. [2] Boley, D., Principal direction divisive partitioning, Data Mining and Knowledge Discovery 2, 1998.
     """
     circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
@@ -59,9 +65,9 @@ def beyond_range(fitted_angles, joint_angles):
     """Poses at which a joint stands farther beyond those of other poses than chance explains.
 
     Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that
-    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics (David and
-    Nagaraja 2003, section 6.4). The margin is the t that makes this 5 %, or what measurements of one pose may differ: without
-    one, half of the random poses beside 20 others would be called outside.
+    range with probability 2 n (1 + t)^(1-P) / (P + 1) at most, from the spacings of uniform order statistics [1]_. The margin
+    is the t that makes this 5 %, or what measurements of one pose may differ: without one, half of the random poses beside 20
+    others would be called outside.
 
     Parameters
     ----------
@@ -73,6 +79,10 @@ def beyond_range(fitted_angles, joint_angles):
     Returns
     -------
     ndarray of bool (S,)
+
+    References
+    ----------
+    .. [1] David, H. A. and Nagaraja, H. N., Order Statistics, section 6.4, Wiley, 2003.
     """
     poses, joints = fitted_angles.shape
     low, high = fitted_angles.min(axis=0), fitted_angles.max(axis=0)

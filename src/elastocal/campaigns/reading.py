@@ -166,6 +166,8 @@ def held_out_campaign(campaign, folder, robots_folder, effects=None):
 def folds_of(folder, robots_folder, number, of):
     """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
 
+    Of K-fold cross-validation [1]_ by whole poses.
+
     Parameters
     ----------
     folder, robots_folder : str or Path
@@ -178,6 +180,11 @@ def folds_of(folder, robots_folder, number, of):
     Returns
     -------
     dict
+
+    References
+    ----------
+    .. [1] Geisser, S., The predictive sample reuse method with applications, Journal of the American Statistical Association
+       70, 1975.
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}

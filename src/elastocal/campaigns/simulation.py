@@ -47,6 +47,8 @@ class Plan:
 def simulated_measurements(robot, plan, seed, name):
     """Measurements of a robot with elastic joints and, where it has them, elastic links.
 
+    Springs yield by the virtual joint method, see `mechanics.elastostatics`; poses are exact.
+
     Parameters
     ----------
     robot : Robot

@@ -56,6 +56,6 @@ def find(campaign, measurements):
 
 
 def _extents(points):
-    """Standard deviations of points along their main axes, rising, ndarray (3,), m."""
+    """Standard deviations of points along their principal axes, rising, ndarray (3,), m."""
     off = points - points.mean(axis=0)
     return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))

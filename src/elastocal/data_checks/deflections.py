@@ -106,6 +106,9 @@ class UnitFound:
 def deflections(campaign, measurements):
     """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
 
+    Frames, targets and geometry are taken off as means of each target in each pose (within transformation) or, where the loads
+    of a pose do not differ, by projection (Frisch-Waugh-Lovell theorem [1]_).
+
     Parameters
     ----------
     campaign : Campaign
@@ -115,6 +118,11 @@ def deflections(campaign, measurements):
     -------
     Deflections or None
         None without loads, or with too few poses.
+
+    References
+    ----------
+    .. [1] Lovell, M. C., Seasonal adjustment of economic time series and multiple regression analysis, Journal of the American
+       Statistical Association 58, 1963.
     """
     if not measurements.wrench.any():
         return None
@@ -298,7 +306,7 @@ def state_deflections(campaign, measurements):
 
 
 def _ratios(deflected, expected):
-    """Compliance over nominal of the joints that are well known, the rows that agree, and their RMS residual."""
+    """Compliance over nominal of the joints that are well known, rows left by sigma clipping, and their RMS residual."""
     joints = expected.shape[1]
     kept = np.ones(len(deflected.seen), bool)
     for _ in range(_REJECTIONS):

@@ -43,6 +43,8 @@ _ALIKE = 1e-3
 def find(campaign, measurements):
     """Measurements far from the declared model.
 
+    Lengths of residuals against their robust standard deviation, see `placement.robust_sigma`.
+
     Parameters
     ----------
     campaign : Campaign

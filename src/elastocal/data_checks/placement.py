@@ -81,6 +81,9 @@ def placed(campaign, measurements):
 def robustly_placed(campaign, measurements):
     """Fit frames and targets to the measurements that agree with each other.
 
+    Least trimmed squares by concentration steps [1]_ from the fit to all, trimmed for each target in each session; then one
+    reweighted fit.
+
     Parameters
     ----------
     campaign : Campaign
@@ -89,6 +92,11 @@ def robustly_placed(campaign, measurements):
     Returns
     -------
     Placement
+
+    References
+    ----------
+    .. [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge
+       Discovery 12, 2006.
     """
     found = placed(campaign, measurements)
     if campaign.frame == "base" and all(target.offset_m is not None for target in campaign.targets):
@@ -186,7 +194,15 @@ def trimmed_rms(distance):
 
 
 def robust_sigma(distance, components):
-    """Standard deviation of each component of vectors, from the median of their lengths."""
+    """Standard deviation of each component of vectors, from the median of their lengths.
+
+    The median absolute deviation [1]_ for vectors: divided by the median of the chi distribution.
+
+    References
+    ----------
+    .. [1] Hampel, F. R., The influence curve and its role in robust estimation, Journal of the American Statistical Association
+       69, 1974.
+    """
     return float(np.median(distance) / np.sqrt(chi2.median(components)))
 
 

@@ -1,15 +1,18 @@
-"""Is anything missing at all? One test, exact by simulation.
+"""Is anything missing at all? One Monte Carlo test.
 
-The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing". Its null
-distribution is that of simulated measurements of the same design, at the pose error that fits best, with the pose error
-averaged over anew in each draw; the p-value counts how many draws reach the statistic of the measurements [1]_. No Bonferroni
-correction and no choice of a test: competitors that the measurements cannot show have a Bayes factor of one in every draw.
-Sizes begin a step below those of the posterior: what lies between may be seen, and its probability does not matter to a test.
+The statistic is the log of the average Bayes factor, over all units and all whole mechanisms, against "nothing": a Bayes factor
+as the statistic of a test, the Bayes/non-Bayes compromise [1]_. Its null distribution is that of simulated measurements of the
+same design, at the pose error that fits best, with the pose error averaged over anew in each draw; the p-value counts how many
+draws reach the statistic of the measurements. With noise and pose error known that is exact; with a fitted pose error it is a
+parametric bootstrap [2]_. No Bonferroni correction and no choice of a test: competitors that the measurements cannot show have
+a Bayes factor of one in every draw. Sizes begin a step below those of the posterior: what lies between may be seen, and its
+probability does not matter to a test.
 
 References
 ----------
-.. [1] Davison, A. C. and Hinkley, D. V. (1997). Bootstrap methods and their application, section 4.2.
-.. [2] Good, I. J. (1992). The Bayes/non-Bayes compromise: a brief review. JASA 87, 597-606.
+.. [1] Good, I. J., The Bayes/non-Bayes compromise: a brief review, Journal of the American Statistical Association 87, 1992.
+.. [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
+   1997.
 """
 
 from dataclasses import dataclass, replace

@@ -7,15 +7,17 @@ then on average
 
     -2 ln p_j = u'G u - u'G_j (P_j + G_jj)^-1 G_j'u + tr((P_j + G_jj)^-1 P_j) + ln |P_j + G_jj| - ln |P_j| - d_j + const,
 
-with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is twice the
-divergence of Box and Hill [1]_, the *separation*. The sum of all divergences never has enough of two models that are far apart
-already; the expected fall of the entropy does, and is bounded from below by the same pairwise quantities through
-exp(-separation / 8) [2]_.
+with u = t - m_j and d_j coefficients, and the difference between two models, drawn over the posterior of t, is the
+*separation*: twice the Kullback-Leibler divergence of which Box and Hill add up all pairs [1]_. Such a sum never has enough of
+two models that are far apart already; the expected fall of the entropy [2]_ does. Of models with one covariance it is bounded
+from below through exp(-separation / 8), their Bhattacharyya coefficient [3]_; here, where covariances differ and each draw of t
+has its separations, that is an approximation.
 
 References
 ----------
-.. [1] Box, G. E. P. and Hill, W. J. (1967). Discrimination among mechanistic models. Technometrics 9, 57-71.
-.. [2] Kolchinsky, A. and Tracey, B. D. (2017). Estimating mixture entropy with pairwise distances. Entropy 19, 361.
+.. [1] Box, G. E. P. and Hill, W. J., Discrimination among mechanistic models, Technometrics 9, 1967.
+.. [2] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
+.. [3] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
 """
 
 from dataclasses import dataclass

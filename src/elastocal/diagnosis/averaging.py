@@ -1,13 +1,14 @@
 """Parameters averaged over models, so that values and intervals are honest after selection.
 
-The exact fit is that of the most probable model at its most probable sizes. What the others say differently is taken from the
-linearised problem: the mean over models moves the estimate, and their spread widens its standard error (law of total variance).
-Parameters of the declared model are averaged over all models; those of an effect over its sizes and the models that have it, so
-that they answer how large it is if it is there.
+Bayesian model averaging [1]_. The exact fit is that of the most probable model at its most probable sizes. What the others say
+differently is taken from the linearised problem: the mean over models moves the estimate, and their spread widens its standard
+error (law of total variance). Parameters of the declared model are averaged over all models; those of an effect over its sizes
+and the models that have it, so that they answer how large it is if it is there.
 
 References
 ----------
-.. [1] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
+.. [1] Hoeting, J. A., Madigan, D., Raftery, A. E. and Volinsky, C. T., Bayesian model averaging: a tutorial, Statistical
+   Science 14, 1999.
 """
 
 from dataclasses import dataclass
@@ -75,8 +76,9 @@ def averaged(linearized, posterior, best, owners):
 def expected_to_help(problem, posterior, model):
     """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
 
-    With d the displacement that a model predicts and E d its mean over all models, the expected square of the error falls from
-    E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds d'd. Measurements that were held out take no part.
+    By the posterior expectation of squared error: with d the displacement that a model predicts and E d its mean over all
+    models, the expected square of the error falls from E d'd to E d'd - 2 d'E d + d'd where d is added: where 2 d'E d exceeds
+    d'd. Measurements that were held out take no part.
 
     Parameters
     ----------

@@ -1,10 +1,11 @@
 """Angles between what candidates contribute beyond the declared model: which of them these data distinguish.
 
-Smallest principal angle between two subspaces, from Gram matrices alone.
+Smallest principal angle between two subspaces [1]_, from Gram matrices alone.
 
 References
 ----------
-.. [1] Björck, Å. and Golub, G. H. (1973). Numerical methods for computing angles between linear subspaces. Math. Comp. 27.
+.. [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of Computation
+   27, 1973.
 """
 
 import numpy as np

@@ -1,17 +1,30 @@
-"""Bayes factors of models from sufficient statistics.
+"""Bayes factors of models [1]_ from sufficient statistics.
 
-Coefficients of a unit are normal about zero with standard deviation s times their plausible size, one size s for the unit. With
-D the diagonal of all s^2,
+Coefficients of a unit are normal about zero with standard deviation s times their plausible size, one size s for the unit: a
+local prior [2]_ beside the probability that the unit is not there, spike and slab [3]_. With D the diagonal of all s^2,
 
     ln p(y | model, s, tau) = -1/2 ln |I + D^1/2 G D^1/2| + l(y'My - b'(G + D^-1)^-1 b),
 
 where l(rss) = -nu/2 ln sigma^2 - rss / (2 sigma^2) at sigma^2 = max(rss / nu, 1): the noise is at least what repeats or the
-campaign say, or else a smooth competitor could interpolate. Sizes and tau are averaged over, never maximised.
+campaign say, or else a smooth competitor could interpolate. Above one it is profiled [4]_, and the priors widen with it as
+conjugate ones do. Sizes and tau are averaged over, never maximised, as g is in mixtures of g priors [5]_.
+
+Where physics gives a coefficient its sign, the prior is half-normal: the Bayes factor of the normal one times twice the
+posterior probability of that sign, as against an encompassing model [6]_; of several such coefficients as if they were
+independent.
 
 References
 ----------
-.. [1] Kass, R. E. and Raftery, A. E. (1995). Bayes factors. JASA 90, 773-795.
-.. [2] Liang, F. et al. (2008). Mixtures of g priors for Bayesian variable selection. JASA 103, 410-423.
+.. [1] Kass, R. E. and Raftery, A. E., Bayes factors, Journal of the American Statistical Association 90, 1995.
+.. [2] Johnson, V. E. and Rossell, D., On the use of non-local prior densities in Bayesian hypothesis tests, Journal of the
+   Royal Statistical Society B 72, 2010.
+.. [3] Mitchell, T. J. and Beauchamp, J. J., Bayesian variable selection in linear regression, Journal of the American
+   Statistical Association 83, 1988.
+.. [4] Murphy, S. A. and van der Vaart, A. W., On profile likelihood, Journal of the American Statistical Association 95, 2000.
+.. [5] Liang, F. et al., Mixtures of g priors for Bayesian variable selection, Journal of the American Statistical Association
+   103, 2008.
+.. [6] Klugkist, I., Laudy, O. and Hoijtink, H., Inequality constrained analysis of variance: a Bayesian approach, Psychological
+   Methods 10, 2005.
 """
 
 from dataclasses import dataclass
@@ -298,9 +311,9 @@ def evaluate(statistics, units, grid, log_pose, start):
     """Evidence of one model, averaged over the sizes of its units.
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
-    unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent, all units at once
-    where that raises the density and else the one that gains most. One inverse gives what every unit sees given all others:
-    with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
+    unit, and where sizes are independent given the measurements. The mode is found by coordinate ascent (iterated conditional
+    modes [1]_), all units at once where that raises the density and else the one that gains most. One inverse gives what every
+    unit sees given all others: with C the posterior covariance of the scaled coefficients, C_uu^-1 = I + s^2 G_uu|rest.
 
     Parameters
     ----------
@@ -315,6 +328,10 @@ def evaluate(statistics, units, grid, log_pose, start):
     Returns
     -------
     Evaluated
+
+    References
+    ----------
+    .. [1] Besag, J., On the statistical analysis of dirty pictures, Journal of the Royal Statistical Society B 48, 1986.
     """
     base = statistics.log_likelihood + log_pose
     if not units:

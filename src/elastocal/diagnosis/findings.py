@@ -169,6 +169,8 @@ def _product(entry, model):
 def sag_entries(name, members, final, observations):
     """How far weight lets a target sag at most, where the measurements tell no masses.
 
+    Its standard error is by the delta method.
+
     Parameters
     ----------
     name : str

@@ -62,7 +62,7 @@ class Prior:
     """Prior probability of every model: a set of units.
 
     A mechanism is there with a small probability; given that, the number of its locations is geometric and all sets of so many
-    locations are equally likely.
+    locations are equally likely, which allows for their multiplicity [1]_.
 
     Attributes
     ----------
@@ -70,6 +70,11 @@ class Prior:
         Of each mechanism.
     log_counts : dict of str to ndarray (L + 1,)
         Logarithm of the probability of one given set of k locations of a mechanism that has L, given that it is there.
+
+    References
+    ----------
+    .. [1] Scott, J. G. and Berger, J. O., Bayes and empirical-Bayes multiplicity adjustment in the variable-selection problem,
+       Annals of Statistics 38, 2010.
     """
 
     log_odds: dict

@@ -164,9 +164,10 @@ def has_prior(fitted):
 
 
 def declared_size(fitted, parameters, owners, triangle, count, present, settings):
-    """Size of declared geometry that makes the measurements most probable (type II maximum likelihood, one number for all).
+    """Size of declared geometry that makes the measurements most probable by type II maximum likelihood [1]_.
 
-    At the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the measurements.
+    One number for all, at the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the
+    measurements.
 
     Parameters
     ----------
@@ -179,6 +180,10 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
     -------
     float
         1 where no geometry is declared.
+
+    References
+    ----------
+    .. [1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
     """
     if not declared_geometry(fitted.model):
         return 1.0
@@ -198,8 +203,8 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
 def smallest_shown(statistics, units, settings):
     """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
-    A test for one direction among all units reaches that where the non-centrality is the critical value. A smaller effect is
-    there or not, and the measurements are the same: it counts as not there.
+    A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
+    value. A smaller effect is there or not, and the measurements are the same: it counts as not there.
 
     Parameters
     ----------

@@ -287,7 +287,7 @@ class Instrument:
         return int(self.declared.sum()) + len(self.columns) + int(self.added.sum())
 
     def information(self, entries, targets):
-        """Information on all unknowns in each entry, ndarray (E, U, U).
+        """Fisher information on all unknowns in each entry, ndarray (E, U, U).
 
         Parameters
         ----------

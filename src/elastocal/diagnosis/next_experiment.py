@@ -1,11 +1,15 @@
 """The next experiment: poses and loads after which the measurements, most probably, say which hypothesis holds.
 
-The experiment that leaves the least entropy between the models of the posterior (`alternatives`) is looked for greedily, then
-by exchange [1]_, then by ascent in the angles. What is promised of it is simulated (`promise`).
+The experiment that leaves the least entropy between the models of the posterior ([1]_, `alternatives`) is looked for greedily,
+then by Fedorov's exchange [2]_ in its modified form, each pose in turn against all of a short list [3]_, then by random local
+search in angles, directions of loads and approaches. What is promised of it is simulated (`promise`).
 
 References
 ----------
-.. [1] Fedorov, V. V. (1972). Theory of optimal experiments. Academic Press.
+.. [1] Lindley, D. V., On a measure of the information provided by an experiment, Annals of Mathematical Statistics 27, 1956.
+.. [2] Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
+.. [3] Cook, R. D. and Nachtsheim, C. J., A comparison of algorithms for constructing exact D-optimal designs, Technometrics 22,
+   1980.
 """
 
 from dataclasses import replace

@@ -1,17 +1,23 @@
 """A competitor for effects that the catalogue does not have: smooth random displacements of each joint and of the base.
 
 A displacement is a random function of a few inputs, a sum of random Fourier features [1]_ with normal coefficients: an
-approximate Gaussian process. What is constant of it, or at a joint straight in its angle, is taken off: a zero offset, a frame
-that is fitted and a transmission ratio have names. A function of everything at once would fit nothing better than chance does,
-so that each law has the inputs of one cause, as terms of an additive model have [2]_: a joint's own angle, torque and approach;
-the angles of the joints beside it; time and temperature; the load on the base along each of its axes; the place of the end.
-Half of the features are multiplied by the load, so that they vanish without it. Alone it means that the residual is
-*unexplained*; beside a mechanism, that a *related* one acts. It names nothing and is not used to predict.
+approximate Gaussian process. Such a discrepancy [2]_ should leave to the model what the model explains [3]_: what is constant
+of it, or at a joint straight in its angle, is taken off, for a zero offset, a frame that is fitted and a transmission ratio
+have names. A function of everything at once would fit nothing better than chance does, so that each law has the inputs of one
+cause, as terms of an additive Gaussian process have [4]_: a joint's own angle, torque and approach; the angles of the joints
+beside it; time and temperature; the load on the base along each of its axes; the place of the end. Half of the features are
+multiplied by the load, so that they vanish without it. Alone it means that the residual is *unexplained*; beside a mechanism,
+that a *related* one acts. It names nothing and is not used to predict.
 
 References
 ----------
-.. [1] Rahimi, A. and Recht, B. (2007). Random features for large-scale kernel machines. NIPS 20.
-.. [2] Duvenaud, D., Nickisch, H. and Rasmussen, C. E. (2011). Additive Gaussian processes. NIPS 24.
+.. [1] Rahimi, A. and Recht, B., Random features for large-scale kernel machines, Advances in Neural Information Processing
+   Systems 20, 2007.
+.. [2] Kennedy, M. C. and O'Hagan, A., Bayesian calibration of computer models, Journal of the Royal Statistical Society B 63,
+   2001.
+.. [3] Plumlee, M., Bayesian calibration of inexact computer models, Journal of the American Statistical Association 112, 2017.
+.. [4] Duvenaud, D., Nickisch, H. and Rasmussen, C. E., Additive Gaussian processes, Advances in Neural Information Processing
+   Systems 24, 2011.
 """
 
 from dataclasses import dataclass

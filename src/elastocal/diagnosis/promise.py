@@ -1,7 +1,11 @@
 """What an experiment promises: simulated, with coefficients from the posterior and measurements of the whole experiment.
 
-Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6, 16 and 21; where they may
-turn out small, the separation that is stated is the one for which this holds.
+Preposterior analysis [1]_. Where coefficients are known, odds of 19:1 are reached with 50, 90 and 95 % if the separation is 6,
+16 and 21; where they may turn out small, the separation that is stated is the one for which this holds.
+
+References
+----------
+.. [1] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
 """
 
 import numpy as np
@@ -17,7 +21,14 @@ PROMISE_DRAWS = 600
 
 
 class Promise:
-    """What an experiment brings, by simulation with the same random numbers for every experiment."""
+    """What an experiment brings, by simulation with the same random numbers for every experiment.
+
+    Common random numbers [1]_: experiments differ by what they tell, not by luck.
+
+    References
+    ----------
+    .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
+    """
 
     def __init__(self, members, stream):
         self.members = members
@@ -78,6 +89,8 @@ class Promise:
 def separation_resolved(probability):
     """Separation of two fixed hypotheses with which one gets odds of 19:1 so often: ln 19 = lambda / 2 - z sqrt(lambda).
 
+    The log Bayes factor of two normal distributions with one covariance is normal, with mean lambda / 2 and variance lambda.
+
     Parameters
     ----------
     probability : float
@@ -92,6 +105,8 @@ def separation_resolved(probability):
 
 def poses_needed(promise, total, resolved):
     """Poses after which 90 % are resolved: of those proposed, or as many more as tell the same.
+
+    By bisection in the number of poses.
 
     Parameters
     ----------

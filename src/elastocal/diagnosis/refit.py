@@ -1,12 +1,12 @@
 """The exact fit of a selected model: same priors, exact kinematics.
 
-Coefficients keep the normal priors under which they were selected, so that what the measurements do not determine stays at
-zero; the noise is that which the selected model leaves.
+Maximum a posteriori, a generalized ridge regression [1]_: coefficients keep the normal priors under which they were selected,
+half-normal ones as normal, so that what the measurements do not determine stays at zero; the noise is that which the selected
+model leaves.
 
 References
 ----------
-.. [1] Hoerl, A. E. and Kennard, R. W. (1970). Ridge regression: biased estimation for nonorthogonal problems. Technometrics 12.
-.. [2] Hoeting, J. A. et al. (1999). Bayesian model averaging: a tutorial. Statistical Science 14, 382-417.
+.. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
 """
 
 from dataclasses import dataclass, replace

@@ -1,12 +1,15 @@
-"""Posterior over models: extend the best models of each size, drop what is not needed, weigh all that were met.
+"""Posterior over models: extend the best, drop what is not needed, weigh all that were met.
 
-A model is a set of units. From the declared model on, the best few of each size are extended by every unit (stochastic-free
-shotgun search, [1]_), by all locations of a mechanism at once, and shrunk by each of theirs; what holds nearly all of the
-probability is evaluated in full.
+A model is a set of units. From the declared model on, and from each mechanism at all its locations, the best few models met are
+extended by every unit and shrunk by each of theirs: a beam search over the neighbours of shotgun stochastic search [1]_,
+without its draws and its exchanges. What lies in Occam's window [2]_ is evaluated in full.
 
 References
 ----------
-.. [1] Hans, C., Dobra, A. and West, M. (2007). Shotgun stochastic search for "large p" regression. JASA 102, 507-516.
+.. [1] Hans, C., Dobra, A. and West, M., Shotgun stochastic search for "large p" regression, Journal of the American Statistical
+   Association 102, 2007.
+.. [2] Madigan, D. and Raftery, A. E., Model selection and accounting for model uncertainty in graphical models using Occam's
+   window, Journal of the American Statistical Association 89, 1994.
 """
 
 from dataclasses import dataclass

@@ -3,17 +3,19 @@
 Measurements y = X beta + W gamma + e, with X the declared model's sensitivities and W those of all candidates, both whitened by
 the noise of the measurements. The measurements of a pose may have an error in common as well: that of the joints when the pose
 was taken, of variance Lambda(tau) = tau^2 I (+ Sigma_q where one approach serves a whole pose), seen through the Jacobian. By
-the matrix inversion lemma
+the matrix inversion lemma (Woodbury's identity [1]_)
 
     Z' Sigma(tau)^-1 Z = Z'Z - sum over poses B_p' (Lambda^-1 + C_p)^-1 B_p,   B_p = J_p' Z_p,   C_p = J_p' J_p,   Z = [X W y],
 
 so that one pass over the measurements serves every tau. Columns are first made orthogonal to X by a QR decomposition of the
-scaled rows: no condition number is squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
-(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML).
+scaled rows: the condition number of X is not squared. Marginalising beta gives W'MW, W'My, y'My with M = Sigma^-1 - Sigma^-1 X
+(X'Sigma^-1 X)^-1 X'Sigma^-1 and the determinants of restricted maximum likelihood (REML [2]_).
 
 References
 ----------
-.. [1] Harville, D. A. (1977). Maximum likelihood approaches to variance component estimation. JASA 72, 320-338.
+.. [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
+.. [2] Harville, D. A., Maximum likelihood approaches to variance component estimation and to related problems, Journal of the
+   American Statistical Association 72, 1977.
 """
 
 import contextlib
@@ -157,6 +159,17 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
     Returns
     -------
     Products
+
+    Notes
+    -----
+    Projection is repeated once, which restores orthogonality to rounding [1]_. What the declared model fits are its effective
+    degrees of freedom, the trace of its hat matrix [2]_.
+
+    References
+    ----------
+    .. [1] Giraud, L., Langou, J. and Rozložník, M., The loss of orthogonality in the Gram-Schmidt orthogonalization process,
+       Computers & Mathematics with Applications 50, 2005.
+    .. [2] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
     """
     count = declared.shape[1]
     prior_rows = np.diag(1.0 / prior_std)
@@ -250,6 +263,8 @@ def normal_equations(products, tau):
 def null_draws(products, tau, pose_error_rad, count, stream):
     """Statistics of simulated measurements of the declared model, in which nothing is missing.
 
+    A parametric bootstrap [1]_ of the statistics themselves, without drawing measurements.
+
     Parameters
     ----------
     products : Products or Sums
@@ -265,6 +280,11 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     along : ndarray (T, K, N)
     squares : ndarray (T, N)
         As in `Statistics`, for N draws of unit variance.
+
+    References
+    ----------
+    .. [1] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge University Press,
+       1997.
     """
     if isinstance(products, Sums):
         gram = _marginal(normal_equations(products, tau)[0], products.declared)[0]
@@ -323,7 +343,7 @@ def _root(covariance, rows):
 
 
 def _pseudo_inverse(grams):
-    """Directions that are not rounding (G, n), pseudo-inverse and square root (G, n, n), of symmetric positive matrices."""
+    """Directions that are not rounding (G, n), Moore-Penrose inverse and root (G, n, n), of symmetric positive matrices."""
     values, vectors = np.linalg.eigh(grams)
     kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
     values = np.where(kept, values, 1.0)

@@ -1,8 +1,9 @@
 """Sufficient statistics of measurements that are too many to be held whitened: one pass over blocks of whole poses.
 
 Z'Sigma(tau)^-1 Z is summed at every size of the pose error that is likely, in memory that does not grow with the measurements.
-No condition number is squared: candidates and residual come with what the declared parameters explain of them in a sample of
-the measurements taken off, so that what is summed is of the size of what is left; the rest is exact algebra.
+The condition number of the declared part is not squared: candidates and residual come with what the declared parameters explain
+of them in a sample of the measurements taken off, so that what is summed is of the size of what is left; the rest is exact
+algebra.
 """
 
 from dataclasses import dataclass
@@ -88,7 +89,7 @@ def rows_at_once(columns):
 
 
 def triangle_of(blocks):
-    """Triangular factor of rows that come in blocks (Demmel et al. 2012, TSQR).
+    """Triangular factor of rows that come in blocks: sequential TSQR [1]_.
 
     Parameters
     ----------
@@ -97,6 +98,11 @@ def triangle_of(blocks):
     Returns
     -------
     ndarray (k, k) or fewer rows
+
+    References
+    ----------
+    .. [1] Demmel, J., Grigori, L., Hoemmen, M. and Langou, J., Communication-optimal parallel and sequential QR and LU
+       factorizations, SIAM Journal on Scientific Computing 34, 2012.
     """
     triangle = None
     for block in blocks:
@@ -173,7 +179,8 @@ def _whitened(every, jacobian, pose, tau):
 def null_draws_of(sums, gram, count, stream):
     """Statistics of simulated measurements of the declared model, at the size of the pose error with which they are simulated.
 
-    b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left.
+    b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left
+    (Cochran's theorem [1]_).
 
     Parameters
     ----------
@@ -187,6 +194,11 @@ def null_draws_of(sums, gram, count, stream):
     -------
     along : ndarray (K, N)
     squares : ndarray (N,)
+
+    References
+    ----------
+    .. [1] Cochran, W. G., The distribution of quadratic forms in a normal system, with applications to the analysis of
+       covariance, Proceedings of the Cambridge Philosophical Society 30, 1934.
     """
     scale = np.sqrt(np.clip(np.diag(gram), 1e-300, None))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))

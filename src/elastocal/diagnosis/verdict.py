@@ -2,6 +2,14 @@
 
 A hypothesis is a set of mechanisms, whatever their locations. `OTHER` beside a mechanism means that a related mechanism acts;
 `OTHER` alone, that the catalogue does not have what acts.
+
+A class lists the credible set of highest posterior probability [1]_ and what the measurements alone favour; the probability of
+a mechanism is its posterior inclusion probability [2]_, summed over hypotheses.
+
+References
+----------
+.. [1] Box, G. E. P. and Tiao, G. C., Bayesian Inference in Statistical Analysis, Addison-Wesley, 1973.
+.. [2] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
 """
 
 from dataclasses import dataclass

@@ -13,6 +13,8 @@ _PASSES = 2
 def conditions(model, estimate, states, coordinates=None):
     """What the effects of a model may depend on, in some states.
 
+    By fixed-point iteration: loads at the displaced pose, then the displacement under these loads.
+
     Parameters
     ----------
     model : Model

@@ -26,7 +26,8 @@ class Fit:
     held : ndarray of bool (P,)
         Parameters that are not identifiable from the data.
     covariance : ndarray (P, P)
-        Of the parameters; zero where held.
+        Of the parameters: inverse of the normal matrix of the last step, which approximates the Hessian (Gauss-Newton); with
+        priors as in Laplace's approximation [1]_. Zero where held.
     weights : ndarray (M,)
         Robust weight of each observation.
     whitener : Whitening
@@ -38,6 +39,11 @@ class Fit:
         Of the states fitted; None where these are too many to keep it.
     converged : bool
         Whether the last step was below a thousandth of a standard error in every parameter, so that the estimate is a minimum.
+
+    References
+    ----------
+    .. [1] Tierney, L. and Kadane, J. B., Accurate approximations for posterior moments and marginal densities, Journal of the
+       American Statistical Association 81, 1986.
     """
 
     model: object

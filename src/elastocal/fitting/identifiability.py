@@ -11,7 +11,7 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     """Least squares over the parameters that the data can tell.
 
     A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
-    its value. Nothing is regularised but what carries a prior.
+    its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1]_.
 
     Parameters
     ----------
@@ -36,6 +36,11 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
         Zero where held.
     covariance : ndarray (P, P)
     held : ndarray of bool (P,)
+
+    References
+    ----------
+    .. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12,
+       1970.
     """
     scaled = left * plausible
     return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, nonlinear)
@@ -70,6 +75,8 @@ def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0,
 
 def identifiable(gram, frozen, nonlinear):
     """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
+
+    Forward selection in the order given, by the pivots of a sequential Cholesky decomposition, then backward elimination.
 
     Parameters
     ----------

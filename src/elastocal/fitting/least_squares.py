@@ -17,7 +17,7 @@ _MOST_STARTED_FROM = 30_000
 
 
 def fit(model, observations, noise, start=None, reweighted=False, settled=SETTLED):
-    """Fit a model.
+    """Fit a model by robust generalized least squares [1]_ and Gauss-Newton steps [2]_, see `robust.robustly`.
 
     Parameters
     ----------
@@ -34,6 +34,12 @@ def fit(model, observations, noise, start=None, reweighted=False, settled=SETTLE
     Returns
     -------
     Fit
+
+    References
+    ----------
+    .. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
+       55, 1935.
+    .. [2] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
     """
     few = sample_of(observations, _MOST_STARTED_FROM)
     if len(few) < len(observations):

@@ -43,6 +43,9 @@ class Linearization:
 def linearize(model, estimate, observations, conditions):
     """Residuals of a model and their sensitivities.
 
+    Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
+    differences).
+
     Parameters
     ----------
     model, estimate, observations, conditions

@@ -162,7 +162,15 @@ class Parts:
 
 
 def _of_rotation_vectors(sensitivities, residual):
-    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2)."""
+    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2).
+
+    Bortz's equation [1]_.
+
+    References
+    ----------
+    .. [1] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
+       Electronic Systems AES-7, 1971.
+    """
     if residual.shape[1] == 3:
         return sensitivities
     turned = sensitivities[:, 3:]

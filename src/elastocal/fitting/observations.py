@@ -132,8 +132,8 @@ def each_approach(measurements):
 def without_outlying_repeats(measurements):
     """Measurements without those that are far from the other repeats of their state and target.
 
-    An outlier would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is
-    outlying.
+    Hampel's identifier [1]_: distances from the median, here in units of the median absolute deviation of all repeats. An
+    outlier would be taken for noise, and would move the mean of its repeats. Of two repeats nothing tells which is outlying.
 
     Parameters
     ----------
@@ -142,6 +142,11 @@ def without_outlying_repeats(measurements):
     Returns
     -------
     Measurements
+
+    References
+    ----------
+    .. [1] Davies, L. and Gather, U., The identification of multiple outliers, Journal of the American Statistical Association
+       88, 1993.
     """
     group = groups_of(np.column_stack([_approached_alike(measurements), measurements.target]))[1]
     off = np.abs(measurements.position - _medians(measurements.position, group)[group])
@@ -318,7 +323,15 @@ def _means(values, group):
 
 
 def _mean_rotations(rotations, group):
-    """Mean of rotations close to each other: the mean turn from the first of each group."""
+    """Mean of rotations close to each other: the mean turn from the first of each group.
+
+    The first step towards the Riemannian mean [1]_.
+
+    References
+    ----------
+    .. [1] Moakher, M., Means and averaging in the group of rotations, SIAM Journal on Matrix Analysis and Applications 24,
+       2002.
+    """
     first = np.unique(group, return_index=True)[1]
     reference = rotations[first]
     turns = (rotations * reference[group].inv()).as_rotvec()

@@ -16,6 +16,9 @@ _SETTLED_M = 1e-9
 def registered(model, observations):
     """Frames and targets of a model that its nominal kinematics explain best, by alternating closed-form steps.
 
+    Block coordinate descent: frames by the Kabsch algorithm [1]_ for Wahba's problem [2]_, given the targets; positions of
+    targets as means, given the frames. The turn of a target is the chordal mean of rotations [3]_.
+
     Parameters
     ----------
     model : Model
@@ -25,6 +28,13 @@ def registered(model, observations):
     -------
     Estimate
         With all effects at zero, except that joint compliances start at their nominal values.
+
+    References
+    ----------
+    .. [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+    .. [2] Wahba, G., A least squares estimate of satellite attitude, SIAM Review 7, 1965.
+    .. [3] Markley, F. L., Cheng, Y., Crassidis, J. L. and Oshman, Y., Averaging quaternions, Journal of Guidance, Control, and
+       Dynamics 30, 2007.
     """
     observations = sample_of(observations, _MOST)
     chain, states = model.sites.chain, observations.states

@@ -22,15 +22,15 @@ _HUBER_QUANTILE = 0.99
 
 
 def robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False, settled=SETTLED):
-    """Iteratively reweighted least squares by Gauss-Newton steps, each halved until the weighted squares do not rise.
+    """Iteratively reweighted least squares with Huber's weights [1]_ by Gauss-Newton steps, each halved until it helps enough.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
-    (Huber and Ronchetti 2009, 7.8), so that it falls with them. Where measurements have errors in common there is none: weights
-    come before whitening, which would carry an outlier into the measurements beside it, and the estimate solves the weighted
-    equations (Preisser and Qaqish 1999). A whitening belongs to the axes in which a step begins: residuals after the step
-    are turned into these, or a fit would turn frame and robot together on and on. Against curvature a step is backtracked
-    (Nocedal and Wright 2006, 3.1). The first step gives all observations one weight, unless the start comes of reweighted
-    steps already.
+    [2]_, so that it falls with them. Where measurements have errors in common there is none: weights come before whitening,
+    which would carry an outlier into the measurements beside it, and the estimate solves the weighted equations [3]_. A
+    whitening belongs to the axes in which a step begins: residuals after the step are turned into these, or a fit would turn
+    frame and robot together on and on. Against curvature a step is backtracked until weighted squares and priors fall by
+    Armijo's condition [4]_. The first step gives all observations one weight, unless the start comes of reweighted steps
+    already.
 
     Parameters
     ----------
@@ -50,6 +50,15 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
     Returns
     -------
     Fit
+
+    References
+    ----------
+    .. [1] Holland, P. W. and Welsch, R. E., Robust regression using iteratively reweighted least-squares, Communications in
+       Statistics A6, 1977.
+    .. [2] Huber, P. J. and Ronchetti, E. M., Robust Statistics, section 7.8, Wiley, 2009.
+    .. [3] Preisser, J. S. and Qaqish, B. F., Robust regression for clustered data with application to binary responses,
+       Biometrics 55, 1999.
+    .. [4] Nocedal, J. and Wright, S. J., Numerical Optimization, section 3.1, Springer, 2006.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))

@@ -41,6 +41,8 @@ class Whitening:
 def whitening(observations, jacobian, noise):
     """Whitening of averaged observations.
 
+    For generalized least squares [1]_: inverse Cholesky factors of the covariance of what errs together.
+
     Parameters
     ----------
     observations : Observations
@@ -52,6 +54,11 @@ def whitening(observations, jacobian, noise):
     Returns
     -------
     Whitening
+
+    References
+    ----------
+    .. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
+       55, 1935.
     """
     if not noise.pose_rad and not noise.joint_rad.any():
         return Whitening(tuple(_of_sensor_alone(observations, noise)))

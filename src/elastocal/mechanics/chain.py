@@ -9,6 +9,13 @@ length, a joint ``q1 .. qn``, or a number (metres in ``T``, ``deg`` in ``R``), e
 ``[NAME]`` marks a measuring point. ``T.(q3)`` is a prismatic joint: its coordinate is in metres, and so are its limits and its
 offset; its compliance is in µm/N. A joint that stands in several places, such as ``Ry(q2) Tz(l) Ry(-q2)``, moves all of them:
 what a parallelogram or another coupling does. It is where it stands first; behind a later place a passive joint turns.
+
+Such a product is an elementary transform sequence [1]_.
+
+References
+----------
+.. [1] Corke, P. I., A simple and systematic approach to assigning Denavit-Hartenberg parameters, IEEE Transactions on Robotics
+   23, 2007.
 """
 
 import math

@@ -1,6 +1,12 @@
 """One walk along a chain: the frames of its points, and the screws of all that moves.
 
 Entries of the frame that a chain leaves at 0 or 1 for every configuration stay plain numbers and cost nothing.
+
+The forward recursion of the product of transforms; the axis of a moving one and a point of it make its screw [1]_.
+
+References
+----------
+.. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
 """
 
 import math
@@ -127,7 +133,7 @@ def _cosines_and_sines(coordinates, rotations):
 
 
 def _cosines_and_sines_of_arrays(angles, size):
-    """By the tangent of half the angle, which is faster in numpy than either of them."""
+    """By the tangent of half the angle (Weierstrass substitution), which is faster in numpy than either of them."""
     tangent = np.empty((len(angles), size))
     for half, angle in zip(tangent, angles, strict=True):
         np.multiply(0.5, angle, out=half)

@@ -2,6 +2,16 @@
 
 Wrenches are (force, moment) in N and N m at the end-effector, base axes. Deflections are (displacement, rotation vector) in m
 and rad, base axes. Compliances of rotary springs are in rad/(N m).
+
+The virtual joint method: elastic joints, and six-dimensional springs at the ends of links, are joints that yield to the
+generalized forces of the wrench [1]_, [2]_. Forces are taken at the unloaded pose.
+
+References
+----------
+.. [1] Salisbury, J. K., Active stiffness control of a manipulator in Cartesian coordinates, IEEE Conference on Decision and
+   Control, 1980.
+.. [2] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
+   Machine Theory 44, 2009.
 """
 
 from dataclasses import replace
@@ -37,6 +47,8 @@ def wrench_of_offset_force(force, offset_m, rotation=None):
 def generalized_forces(jacobian, wrench):
     """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
 
+    The principle of virtual work, by which statics is dual to kinematics [1]_.
+
     Parameters
     ----------
     jacobian : ndarray (..., 6, n)
@@ -46,6 +58,10 @@ def generalized_forces(jacobian, wrench):
     Returns
     -------
     ndarray (..., n)
+
+    References
+    ----------
+    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
     return sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6))
 

@@ -1,4 +1,4 @@
-"""Equations 1-4: poses and geometric Jacobians of any measuring point, by screw theory, batched over any leading axes.
+"""Equations 1-4: poses of any measuring point by elementary transforms, its geometric Jacobian by screws; batched.
 
 Arrays come and go with the batch in front, ``(..., 6, n)``, but lie in memory component first, so that every arithmetic step
 runs along the batch; slices such as ``jacobian[..., 0, 2]`` are contiguous.
@@ -78,7 +78,14 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
 
     Notes
     -----
-    The twist of a revolute coordinate with axis z through o is (z x (p - o), z), of a prismatic one (z, 0): screw theory.
+    The twist of a revolute coordinate with axis z through o is (z x (p - o), z), of a prismatic one (z, 0): the columns of the
+    geometric Jacobian [1]_, which are those of the spatial one [2]_ at the point.
+
+    References
+    ----------
+    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
+    .. [2] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
+       1994.
     """
     components, batch = _component_first(coordinates)
     size = components.shape[1]

@@ -8,7 +8,7 @@ from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
 
 def tube_compliance(tube, length_m):
-    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending, St Venant torsion).
+    """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending [1]_, St Venant torsion [2]_).
 
     Parameters
     ----------
@@ -19,6 +19,11 @@ def tube_compliance(tube, length_m):
     -------
     ndarray (6, 6)
         Deflection (m, rad) per wrench (N, N m), both at the tip, in the frame of the beam.
+
+    References
+    ----------
+    .. [1] Przemieniecki, J. S., Theory of Matrix Structural Analysis, McGraw-Hill, 1968.
+    .. [2] Timoshenko, S. P. and Goodier, J. N., Theory of Elasticity, McGraw-Hill, 1970.
     """
     outer, inner, length = tube.outer_diameter_m, tube.outer_diameter_m - 2 * tube.wall_m, length_m
     area = np.pi * (outer**2 - inner**2) / 4
@@ -61,6 +66,8 @@ def link_compliance(link):
 def extended_chain(robot):
     """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link.
 
+    Links of the virtual joint method: each yields in a six-dimensional virtual joint [1]_.
+
     Parameters
     ----------
     robot : Robot
@@ -69,6 +76,11 @@ def extended_chain(robot):
     -------
     Chain
         Coordinates 0..n-1 are the joints as before, then six for each link in turn.
+
+    References
+    ----------
+    .. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism
+       and Machine Theory 44, 2009.
     """
     transforms, count, new_index = [], robot.joints, {}
     ends = {link.after for link in robot.links}

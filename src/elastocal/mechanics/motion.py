@@ -22,10 +22,14 @@ class Motion:
     rotation : ndarray (T, 3, 3, S)
     twist : ndarray (6, K, S)
         For each moving transform, in the order of their coordinates, the velocity of what lies behind it, per unit of the
-        coordinate: of the body's point at the base's origin, then the angular one (the spatial twist of Murray, Li and Sastry
-        1994, 3.4).
+        coordinate: of the body's point at the base's origin, then the angular one (the spatial twist [1]_).
     place, coordinate : ndarray of int (K,)
         How many transforms come before each, and the coordinate that moves it.
+
+    References
+    ----------
+    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, section 3.4, CRC Press,
+       1994.
     """
 
     position: np.ndarray

@@ -30,6 +30,8 @@ def pose_differences(position, rotation, position_0, rotation_0):
 def rotation_vectors(rotation):
     """Rotation vectors of rotation matrices, for angles below pi.
 
+    The logarithm on SO(3) [1]_, by the arctangent of sine and cosine, so that small angles keep their digits.
+
     Parameters
     ----------
     rotation : ndarray (..., 3, 3)
@@ -38,6 +40,10 @@ def rotation_vectors(rotation):
     -------
     ndarray (..., 3)
         rad.
+
+    References
+    ----------
+    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
     skew = 0.5 * np.stack(
         [

@@ -2,6 +2,13 @@
 
 Every physical effect moves the robot through some of these coordinates. The chain that holds them all gives exact poses, and
 its Jacobian the sensitivity of a measured point to each of them.
+
+They are virtual joints of the virtual joint method [1]_, whether a spring yields in them or an error of geometry is one.
+
+References
+----------
+.. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism and
+   Machine Theory 44, 2009.
 """
 
 from dataclasses import dataclass, replace

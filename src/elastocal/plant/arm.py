@@ -264,7 +264,7 @@ def link_frames(arm, angles):
 
 
 def turned(vector):
-    """Rotation matrix of a rotation vector by Rodrigues' formula, R = I + sin a K + (1 - cos a) K^2.
+    """Rotation matrix of a rotation vector by Rodrigues' formula [1]_, R = I + sin a K + (1 - cos a) K^2.
 
     Parameters
     ----------
@@ -274,6 +274,10 @@ def turned(vector):
     Returns
     -------
     ndarray (..., 3, 3)
+
+    References
+    ----------
+    .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
     """
     vector = np.asarray(vector, float)
     angle = np.linalg.norm(vector, axis=-1)[..., None, None]

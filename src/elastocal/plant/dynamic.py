@@ -53,6 +53,8 @@ def moving_angles(arm, time_s, seed):
 def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
     """Columns of the file of measurements of one uninterrupted path.
 
+    Deflections between knots are interpolated by cubic splines [1]_.
+
     Parameters
     ----------
     robot : PhysicalRobot
@@ -65,6 +67,10 @@ def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
     -------
     dict of str to ndarray
         As `campaigns.measured_table` has them: pose, load, repeat, target, angles, wrench (nothing), position, time.
+
+    References
+    ----------
+    .. [1] de Boor, C., A Practical Guide to Splines, Springer, 1978.
     """
     arm, time = robot.arm, np.arange(1, measurements + 1) / rate_hz
     angle = moving_angles(arm, time, seed)

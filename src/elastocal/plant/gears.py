@@ -181,9 +181,10 @@ class Coupling:
 class BoucWen(_AtJoint):
     """Friction that remembers: theta = -h z, dz = (d tau / tau_h) (1 - |z|^m (beta sign(z d tau) + 1 - beta)).
 
-    Friction holds back: an arm that came in the sense s stays behind its drive, z = s with all of its friction wound up. Each
-    change of the load then moves z along a loop that depends on the order of loads and not on their speed, the deflection
-    lagging behind the torque. h / tau_h must be less than the gear's compliance, or the arm would recede from a push.
+    The Bouc-Wen model of hysteresis [1]_. Friction holds back: an arm that came in the sense s stays behind its drive, z = s
+    with all of its friction wound up. Each change of the load then moves z along a loop that depends on the order of loads and
+    not on their speed, the deflection lagging behind the torque. h / tau_h must be less than the gear's compliance, or the arm
+    would recede from a push.
 
     Attributes
     ----------
@@ -195,6 +196,11 @@ class BoucWen(_AtJoint):
         m.
     beta : float
         1/2: unloading starts along the straight line of slope 1 / tau_h.
+
+    References
+    ----------
+    .. [1] Wen, Y.-K., Method for random vibration of hysteretic systems, Journal of the Engineering Mechanics Division ASCE
+       102, 1976.
     """
 
     half_width_rad: float
@@ -215,7 +221,7 @@ class BoucWen(_AtJoint):
         return -self.half_width_rad * z
 
     def moved(self, z, change):
-        """z after the torque has changed steadily by `change` (S,), by the midpoint rule."""
+        """z after the torque has changed steadily by `change` (S,), by the explicit midpoint method."""
         step = change / (self.torque_Nm * _HISTORY_STEPS)
         for _ in range(_HISTORY_STEPS):
             middle = z + 0.5 * step * self._slope(z, step)

@@ -55,6 +55,8 @@ class LoadCell:
     def felt(self, force, lever, flange_rotation):
         """Wrench on the flange.
 
+        By fixed-point iteration: what the display lacks is pulled more.
+
         Parameters
         ----------
         force : ndarray (S, 3)

@@ -2,6 +2,15 @@
 
 Structural springs (foot, bearings, link segments) are joints of the same tree. The springs' stiffnesses stand in the model too,
 so that MuJoCo's own inverse dynamics can judge an equilibrium that was found without them.
+
+The tree moves by the kinematics of MuJoCo [1]_; elastic links are Timoshenko beams [2]_ lumped into segments.
+
+References
+----------
+.. [1] Todorov, E., Erez, T. and Tassa, Y., MuJoCo: a physics engine for model-based control, IEEE/RSJ International Conference
+   on Intelligent Robots and Systems, 2012.
+.. [2] Timoshenko, S. P., On the correction for shear of the differential equation for transverse vibrations of prismatic bars,
+   Philosophical Magazine 41, 1921.
 """
 
 from dataclasses import dataclass

@@ -7,7 +7,13 @@ declared with a standard deviation each, is
 
     min over b, w of |d - X b - V w|^2 + |w|^2,
 
-V in its standard deviations: what a test can find where the weights are known so well and no better.
+V in its standard deviations: what a test can find where the weights are known so well and no better. The weights come in as
+prior information of mixed estimation [1]_ does.
+
+References
+----------
+.. [1] Theil, H. and Goldberger, A. S., On pure and mixed statistical estimation in economics, International Economic Review 2,
+   1961.
 """
 
 from dataclasses import dataclass
@@ -105,7 +111,7 @@ class Yardstick:
         return self._left_of(self.change(robot)[self.schedule.training].ravel())
 
     def angle_deg(self, robot, others):
-        """Angle between what is left of a robot and all that others make together, in any proportion.
+        """Principal angle [1]_ between what is left of a robot and all that others make together, in any proportion.
 
         Parameters
         ----------
@@ -117,6 +123,11 @@ class Yardstick:
         -------
         float
             90 where all others are left with nothing.
+
+        References
+        ----------
+        .. [1] Björck, Å. and Golub, G. H., Numerical methods for computing angles between linear subspaces, Mathematics of
+           Computation 27, 1973.
         """
         mine, theirs = self.left(robot), np.array([self.left(other) for other in others])
         theirs = theirs[theirs.any(axis=1)]

@@ -1,8 +1,9 @@
-"""Static equilibrium: which deflections the springs take under MuJoCo's forces.
+"""Static equilibrium: which deflections the springs take under load and weight, by MuJoCo's kinematics.
 
 At rest the generalized force on every sprung coordinate, tau = J^T w + gravity + compensator, is what its spring transmits, and
 theta = law(tau). The forces depend on the deflections only through the geometry, by the share (force times arm) / stiffness, a
-thousandth or so, so that Newton's iteration with the springs' own tangent gains about three digits a sweep.
+thousandth or so, so that fixed-point iteration gains about three digits a sweep. With linear springs it is the modified Newton
+method with their stiffness as tangent.
 """
 
 from dataclasses import dataclass, field
@@ -144,7 +145,7 @@ def places(machine, coordinates, growth):
 
 
 def generalized_forces(machine, coordinates, loading):
-    """Forces on all coordinates by the principle of virtual work, and where everything is.
+    """Forces on all coordinates by the principle of virtual work [1]_, and where everything is.
 
     Parameters
     ----------
@@ -157,6 +158,10 @@ def generalized_forces(machine, coordinates, loading):
     force : ndarray (S, coordinates)
         N m, N: a . (M + (p - o) x F + sum (x_k - o) x m_k g) about the axis a through o, of masses m_k at x_k beyond it.
     where : Places
+
+    References
+    ----------
+    .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
     model, where = machine.model, places(machine, coordinates, loading.growth)
     flange = where.position[:, list(machine.sites).index(machine.flange), None]
@@ -193,7 +198,7 @@ def _pull(machine, where):
 
 
 def equilibrium(machine, loading, gear_deflection, structure_laws=(), start=None):
-    """Where the arm comes to rest.
+    """Where the arm comes to rest, by fixed-point iteration.
 
     Parameters
     ----------

@@ -173,6 +173,8 @@ class EccentricNest:
 def rotation_vector(rotation):
     """Rotation vectors of rotation matrices by way of quaternions, rad; angles up to and at a half turn.
 
+    Quaternions by Shepperd's method [1]_.
+
     Parameters
     ----------
     rotation : ndarray (..., 3, 3)
@@ -180,6 +182,10 @@ def rotation_vector(rotation):
     Returns
     -------
     ndarray (..., 3)
+
+    References
+    ----------
+    .. [1] Shepperd, S. W., Quaternion from rotation matrix, Journal of Guidance and Control 1, 1978.
     """
     r = rotation
     trace = np.trace(r, axis1=-2, axis2=-1)

@@ -8,8 +8,8 @@ from elastocal.random_streams import draw
 def bootstrap_weights(seed, key, data_sets, replicates):
     """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
 
-    Independent weights of mean one are the bootstrap that does not need to know how many there are. They are the same for every
-    noise level and strategy, so that replicates of two of them may be compared one by one.
+    The Poisson bootstrap [1]_, whose independent weights of mean one do not need to know how many data sets there are. They are
+    the same for every noise level and strategy, so that replicates of two of them may be compared one by one.
 
     Parameters
     ----------
@@ -21,6 +21,11 @@ def bootstrap_weights(seed, key, data_sets, replicates):
     Returns
     -------
     ndarray (1 + replicates, sets)
+
+    References
+    ----------
+    .. [1] Hanley, J. A. and MacGibbon, B., Creating non-parametric bootstrap samples using Poisson frequencies, Computer
+       Methods and Programs in Biomedicine 83, 2006.
     """
     counts = draw(seed, key, "bootstrap", data_sets, lambda stream: stream.poisson(1.0, replicates))
     return np.vstack([np.ones(len(counts)), counts.T])

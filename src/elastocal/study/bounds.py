@@ -6,7 +6,7 @@ from elastocal.study.identification import cholesky_triangles, inverse_triangles
 
 
 def squared_error_bounds(information, moment):
-    """Bound of the mean squared end-effector position error, for measurements of unit variance.
+    """Cramér-Rao bound of the mean squared end-effector position error, for normal measurements of unit variance [1]_, [2]_.
 
     Parameters
     ----------
@@ -22,7 +22,15 @@ def squared_error_bounds(information, moment):
 
     Notes
     -----
-    With N = R^T R the trace is that of X^T M X, where X = R^-1.
+    With N = R^T R the trace is that of X^T M X, where X = R^-1. As a criterion for designs it is V-optimality [3]_.
+
+    References
+    ----------
+    .. [1] Rao, C. R., Information and the accuracy attainable in the estimation of statistical parameters, Bulletin of the
+       Calcutta Mathematical Society 37, 1945.
+    .. [2] Cramér, H., Mathematical Methods of Statistics, Princeton University Press, 1946.
+    .. [3] Atkinson, A. C., Donev, A. N. and Tobias, R. D., Optimum Experimental Designs, with SAS, Oxford University Press,
+       2007.
     """
     inverse = inverse_triangles(cholesky_triangles(information))
     rows = inverse.reshape(*inverse.shape[:2], -1)

@@ -46,6 +46,9 @@ class Averages:
 def average(blocks, judge, method, deviation_of, test_weights):
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
+    A replicate multiplies weights of data sets by independent weights of test configurations: the product-weight bootstrap of
+    crossed factors [1]_.
+
     Parameters
     ----------
     blocks : iterable of (compliance, weights)
@@ -57,10 +60,15 @@ def average(blocks, judge, method, deviation_of, test_weights):
         Whether equation 15 scores the averaged model or averages the scores of the data sets (interpretation R8).
     test_weights : ndarray (1 + replicates, tests)
         From `bootstrap.bootstrap_test_weights`: the error of equation 15 is one over data sets and over test configurations.
+        Where each data set is scored, the deviation has the weights of data sets alone.
 
     Returns
     -------
     Averages
+
+    References
+    ----------
+    .. [1] Owen, A. B. and Eckles, D., Bootstrapping data arrays of arbitrary order, Annals of Applied Statistics 6, 2012.
     """
     if method == "median":
         compliances, weights = zip(*blocks, strict=True)
@@ -164,6 +172,8 @@ def accuracy_sums(compliance, judge):
 
 def accuracy_table(sums, lengths):
     """Columns of the accuracy table: what one data set gives, averaged over data sets.
+
+    Standard errors of roots are by the delta method.
 
     Parameters
     ----------

@@ -1,6 +1,15 @@
 """Identification on the exact kinematics: Gauss-Newton steps on the pose at q + c J^T w, where equation 11 is linear.
 
 Only an iterative solver gives a meaning to a strategy that "uses the estimate as initial condition".
+
+Steps are whole ones, each by the normal equations of the problem linearised at the last estimate [1]_; a rotation vector moves
+by Bortz's equation, to first order in the vector [2]_.
+
+References
+----------
+.. [1] Björck, Å., Numerical Methods for Least Squares Problems, SIAM, 1996.
+.. [2] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
+   Electronic Systems AES-7, 1971.
 """
 
 import numpy as np

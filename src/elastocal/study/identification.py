@@ -1,6 +1,6 @@
 """Equation 11 for every prefix of many data sets in one pass, one strategy at a time.
 
-The least-squares problem of the first k configurations, for every k, is solved by orthogonal elimination that takes one
+The least-squares problem of the first k configurations, for every k, is solved by a QR decomposition that takes one
 configuration after the other and all data sets at once. It gives the solution of the normal equations of equation 11 without
 forming them, so that prefixes of one or two configurations keep their digits.
 
@@ -152,6 +152,9 @@ def estimate_compliance(strategy, measurements, joints):
 def covariance(strategy, measurements, triangles):
     """Covariance of the estimates for measurements of unit variance, through all stages, also where stages share measurements.
 
+    That of a multi-step estimator, whose later stages take over what earlier ones have estimated [1]_; exact here, since every
+    stage is linear.
+
     Parameters
     ----------
     strategy, measurements
@@ -168,6 +171,11 @@ def covariance(strategy, measurements, triangles):
     A stage with triangle R solves R_II c_I = z - R_IH c_H, I the joints identified and H those held, where the reduced
     measurements z = Q^T y have unit covariance. So the estimates are linear in the z of all stages, and what is left is the
     covariance of the z of two stages that share points: R_s^-T (sum of A_s^T A_t over the shared measurements) R_t^-1.
+
+    References
+    ----------
+    .. [1] Murphy, K. M. and Topel, R. H., Estimation and inference in two-step econometric models, Journal of Business &
+       Economic Statistics 3, 1985.
     """
     joints = next(iter(measurements.values())).regressor.shape[1]
     stages, gains, inverses = without_forgotten_stages(strategy, joints).stages, [], []
@@ -194,6 +202,8 @@ def covariance(strategy, measurements, triangles):
 def condition_numbers(strategy, triangles):
     """2-norm condition number of the identification Jacobian, the largest of the stages.
 
+    Its inverse is an observability index of calibration [1]_.
+
     Parameters
     ----------
     strategy : Strategy
@@ -204,6 +214,11 @@ def condition_numbers(strategy, triangles):
     -------
     ndarray (configurations, sets)
         Infinite where the smallest singular value is zero to rounding.
+
+    References
+    ----------
+    .. [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
+       Journal of Robotic Systems 7, 1990.
     """
     largest = 1.0
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
@@ -215,7 +230,7 @@ def condition_numbers(strategy, triangles):
 
 
 def prefix_triangles(systems, configurations, pivots):
-    """Triangular factor of the first k configurations, for every k, by Householder reflections.
+    """Triangular factor of the first k configurations, for every k, by Householder reflections [1]_.
 
     Parameters
     ----------
@@ -234,8 +249,13 @@ def prefix_triangles(systems, configurations, pivots):
 
     Notes
     -----
-    The factor of k configurations on top of the rows of the next one is again reduced to a triangle; a reflection touches one
-    row of the triangle and the new rows only.
+    Sequential accumulation [2]_: the factor of k configurations on top of the rows of the next one is again reduced to a
+    triangle; a reflection touches one row of the triangle and the new rows only.
+
+    References
+    ----------
+    .. [1] Householder, A. S., Unitary triangularization of a nonsymmetric matrix, Journal of the ACM 5, 1958.
+    .. [2] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
     triangles = None
     for index, new in enumerate(systems):
@@ -260,7 +280,7 @@ def prefix_triangles(systems, configurations, pivots):
 
 
 def inverse_triangles(triangle):
-    """Inverses of upper triangular matrices.
+    """Inverses of upper triangular matrices by back substitution.
 
     Parameters
     ----------
@@ -283,7 +303,7 @@ def inverse_triangles(triangle):
 
 
 def cholesky_triangles(information):
-    """Upper triangular factors R of symmetric matrices R^T R.
+    """Upper triangular Cholesky factors R of symmetric matrices R^T R.
 
     Parameters
     ----------

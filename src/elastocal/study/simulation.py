@@ -39,6 +39,8 @@ class Loading:
 def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, configurations):
     """Random configurations and wrenches.
 
+    Forces have the directions of normal vectors, which are uniform on the sphere [1]_.
+
     Parameters
     ----------
     chain : Chain
@@ -57,6 +59,11 @@ def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, co
     Returns
     -------
     Experiments
+
+    References
+    ----------
+    .. [1] Muller, M. E., A note on a method for generating points uniformly on n-dimensional spheres, Communications of the ACM
+       2, 1959.
     """
     n = chain.coordinates
     turns = draw(seed, key, f"{purpose}/joint angles", data_sets, lambda stream: stream.random((configurations, n)))
@@ -70,6 +77,8 @@ def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, co
 
 def true_deflections(robot, experiments, point, wrench_at):
     """Deflection of a measuring point: theta from equation 7, then the exact kinematics of all springs.
+
+    The virtual joint method, see `mechanics.elastostatics`.
 
     Parameters
     ----------
@@ -98,7 +107,7 @@ def true_deflections(robot, experiments, point, wrench_at):
 def measurement_noise(seed, key, point_name, data_sets, configurations):
     """Standard normal noise of the six components at one measuring point; times the noise level it is the measurement error.
 
-    The same numbers serve every noise level, so that levels differ by scale alone.
+    The same numbers serve every noise level, so that levels differ by scale alone: common random numbers [1]_.
 
     Parameters
     ----------
@@ -111,5 +120,9 @@ def measurement_noise(seed, key, point_name, data_sets, configurations):
     Returns
     -------
     ndarray (sets, configurations, 6)
+
+    References
+    ----------
+    .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
     """
     return draw(seed, key, f"noise/{point_name}", data_sets, lambda stream: stream.standard_normal((configurations, 6)))

@@ -12,6 +12,8 @@ from elastocal.study.simulation import true_deflections
 def diameter_for_mean_deflection(robot, experiments, target_m, between_m=(0.1, 0.8)):
     """Outer diameter of the tubes, at the wall that they have, for which the mean end-effector deflection comes out.
 
+    By Brent's method [1]_.
+
     Parameters
     ----------
     robot : Robot
@@ -26,6 +28,10 @@ def diameter_for_mean_deflection(robot, experiments, target_m, between_m=(0.1, 0
     -------
     float
         m.
+
+    References
+    ----------
+    .. [1] Brent, R. P., Algorithms for Minimization without Derivatives, Prentice-Hall, 1973.
     """
 
     def excess(diameter):

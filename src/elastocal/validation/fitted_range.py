@@ -15,7 +15,8 @@ def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=N
     Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
     predicts the position less surely than it would have predicted any pose it was fitted to, had that pose been left out. The
     second finds what ranges joint by joint miss: corners between the poses, loads, times and temperatures beyond those fitted.
-    Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1), as all are exchangeable.
+    Poses drawn like the fitted ones pass that maximum with probability 1 / (P + 1) at most, as all are exchangeable: the
+    argument of conformal prediction [1]_.
 
     Parameters
     ----------
@@ -27,6 +28,10 @@ def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=N
     Returns
     -------
     ndarray of bool (S,)
+
+    References
+    ----------
+    .. [1] Vovk, V., Gammerman, A. and Shafer, G., Algorithmic Learning in a Random World, Springer, 2005.
     """
     # Loads and repeats of a pose share its angles.
     _, first = np.unique(state_clusters(fitted_states), return_index=True)
@@ -40,6 +45,9 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
     The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
     measurements do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look
     sure.
+
+    The variance of a prediction is its leverage, here in m². Poses are left out by case deletion [1]_ with Woodbury's identity
+    [2]_.
 
     Parameters
     ----------
@@ -57,6 +65,11 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
         m², of the least sure reading of each pose.
     other : ndarray (S,)
         m², of the least sure reading of each state.
+
+    References
+    ----------
+    .. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, Chapman and Hall, 1982.
+    .. [2] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
     """
     listed = fitted.parameters
     shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)

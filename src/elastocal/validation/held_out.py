@@ -139,11 +139,12 @@ def intervals(errors, replicates, stream, reference=0):
     """95 % intervals of the summary, for as few poses as a campaign holds out.
 
     Poses are the independent units; measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have
-    bootstrap-t intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale (Efron and
-    Tibshirani 1993, sections 11.3 and 12.5; Cameron, Gelbach and Miller 2008 for clusters). The 95th percentile has the
-    interval of Woodruff (1952) at the effective number of measurements of Korn and Graubard (1998), open above where that is
-    less than 72. The maximum of a sample has no interval that a bootstrap could give: not a number, see `share_below_largest`.
-    Why these, and what they cover: ``docs/held_out_intervals.md``.
+    bootstrap-t intervals over poses, studentized by the delete-one-pose jackknife on the logarithmic scale ([1]_; [2]_ for
+    clusters), and those of Student's t with the same standard error where poses are very few or many. The 95th percentile has
+    the interval of Woodruff [3]_ at an effective number of measurements as by Korn and Graubard [4]_, without their correction
+    for degrees of freedom; it is open above where that is less than 72. The maximum of a sample has no interval that a
+    bootstrap could give [5]_: not a number, see `share_below_largest`. Why these, and what they cover:
+    ``docs/held_out_intervals.md``.
 
     Parameters
     ----------
@@ -160,6 +161,17 @@ def intervals(errors, replicates, stream, reference=0):
         For each of `errors`, m. Not a number with a single pose.
     reductions : list of Reduction
         From the reference to each.
+
+    References
+    ----------
+    .. [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, sections 11.3 and 12.5, Chapman and Hall, 1993.
+    .. [2] Cameron, A. C., Gelbach, J. B. and Miller, D. L., Bootstrap-based improvements for inference with clustered errors,
+       Review of Economics and Statistics 90, 2008.
+    .. [3] Woodruff, R. S., Confidence intervals for medians and other position measures, Journal of the American Statistical
+       Association 47, 1952.
+    .. [4] Korn, E. L. and Graubard, B. I., Confidence intervals for proportions with small expected number of positive counts
+       estimated from survey data, Survey Methodology 24, 1998.
+    .. [5] Bickel, P. J. and Freedman, D. A., Some asymptotic theory for the bootstrap, Annals of Statistics 9, 1981.
     """
     cluster, poses = errors[0].cluster, errors[0].poses
     weights = _drawn_poses(poses, replicates, stream)
@@ -181,7 +193,7 @@ def intervals(errors, replicates, stream, reference=0):
 def share_below_largest(poses):
     """Share of all poses whose errors stay below the largest error seen, at 95 % confidence; free of any distribution.
 
-    Wilks (1941), the one-sided tolerance limit of a sample's maximum.
+    The one-sided tolerance limit of a sample's maximum [1]_.
 
     Parameters
     ----------
@@ -191,6 +203,10 @@ def share_below_largest(poses):
     Returns
     -------
     float
+
+    References
+    ----------
+    .. [1] Wilks, S. S., Determination of sample sizes for setting tolerance limits, Annals of Mathematical Statistics 12, 1941.
     """
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 

@@ -1,8 +1,13 @@
 """Cross-validation over blocks of joint space and over sessions: how far a model carries, from the training poses alone.
 
 Poses drawn at random have neighbours among those fitted, so their errors say how well a model interpolates; whole blocks of
-joint space left out say how well it extrapolates (Roberts et al. 2017, cross-validation for structured data). The effects stay
-those that were chosen with all training poses: what is refitted is their size, so the errors carry the selection's optimism.
+joint space left out say how well it extrapolates (block cross-validation [1]_). The effects stay those that were chosen with
+all training poses: what is refitted is their size, so the errors carry the selection's optimism.
+
+References
+----------
+.. [1] Roberts, D. R. et al., Cross-validation strategies for data with temporal, spatial, hierarchical, or phylogenetic
+   structure, Ecography 40, 2017.
 """
 
 from dataclasses import dataclass, replace
@@ -66,9 +71,9 @@ def splits_of(states):
 def cross_validated(fitted, observations, part):
     """Position errors of observations, each predicted by a refit without the part that it belongs to.
 
-    A refit starts from the nominal robot, so that a parameter that only the part left out can tell does not keep its value, and
-    keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see
-    `held_out.placed_estimate`.
+    Leave-one-block-out cross-validation. A refit starts from the nominal robot, so that a parameter that only the part left out
+    can tell does not keep its value, and keeps the shapes of the fit. A session that is left out has its frame fitted to
+    itself, see `held_out.placed_estimate`.
 
     Parameters
     ----------
@@ -109,7 +114,12 @@ def split_rows(declared, final, observations, replicates, stream):
     -------
     list of dict
         Rows of splits.csv: each part of each split, and "all" parts together. Intervals take poses as independent, which refits
-        that share most of their poses make only nearly true (Bengio and Grandvalet 2004).
+        that share most of their poses make only nearly true [1]_.
+
+    References
+    ----------
+    .. [1] Bengio, Y. and Grandvalet, Y., No unbiased estimator of the variance of K-fold cross-validation, Journal of Machine
+       Learning Research 5, 2004.
     """
     rows = []
     for split in splits_of(observations.states):
