@@ -6,10 +6,9 @@ from elastocal.blind.cases import impossible_on
 from elastocal.blind.scores import outcome
 from elastocal.plant.defects import KINDS
 
-# Effects that lie wholly within another effect or the joint compliances. The source is the list of exact aliases in section 1.2
-# of the methods brief; those of it are left out that a known frame, known targets and points at the elbow and wrist resolve:
-# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm. By effect
-# and joints of the truth, with what it is not distinguishable from.
+# Effects that lie wholly within another effect or the joint compliances, by effect and joints of the ground truth, with what it
+# is not distinguishable from. Left out are aliases that a known frame, known targets and points at the elbow and wrist resolve:
+# offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm.
 EXACT_ALIASES = {
     ("force_scale", ()): "joint_compliance",
     ("compensator_torque", (2,)): "transmission_harmonic",

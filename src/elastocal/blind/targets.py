@@ -1,4 +1,4 @@
-"""The figures of the proof, each beside its target; targets as issue 10 sets them."""
+"""The figures of the proof, each beside its target."""
 
 from dataclasses import dataclass
 
