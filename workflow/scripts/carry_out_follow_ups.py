@@ -15,7 +15,9 @@ def carry_out_follow_ups(job):
     Path(job.output.campaigns).mkdir(parents=True, exist_ok=True)
     cases = {case.name: case for case in cases_of(SIZES[job.params.size], job.params.seed)}
     for name, states in pd.read_csv(job.input.proposals).groupby("case"):
-        shown, wrench = states.filter(regex=r"^q\d+$").to_numpy(), states[list(WRENCH_NAMES)].to_numpy()
+        # A block has arms of six joints and of seven.
+        shown = states.filter(regex=r"^q\d+$").dropna(axis=1).to_numpy()
+        wrench = states[list(WRENCH_NAMES)].to_numpy()
         carry_out(cases[name], shown, wrench, job.output.campaigns, "config/robots")
 
 
