@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from made_cells import DOCUMENT, POSES, Cell
 from support import refused
 
-from elastocal.campaigns.holdout import split
+from elastocal.campaigns.holdout import measured_poses, split
 
 
 def poses_of(measurements):
@@ -96,6 +96,89 @@ def test_named_poses_are_held_out_in_every_session_or_in_one(cell):
     training, held_out = split(cell.read())
     assert poses_of(held_out) == {(0, 4), (7, 4), (7, 2)}
     assert poses_of(training).isdisjoint(poses_of(held_out))
+
+
+@pytest.mark.parametrize(
+    ("holdout", "fitted", "held_out"),
+    [
+        ({"poses": [0, 2, 4, 6, 8]}, 5, 5),
+        ({"poses": [3, 9]}, 8, 2),
+        ({"fraction": 0.5}, 5, 5),
+        ({"fraction": 0.2}, 8, 2),
+        # Rounded to whole poses.
+        ({"fraction": 0.16}, 8, 2),
+        ({"fraction": 0.54}, 5, 5),
+        ({"blocks": 2}, 5, 5),
+        ({"blocks": 5}, 8, 2),
+    ],
+)
+def test_five_poses_to_fit_and_two_held_out_are_enough(cell, holdout, fitted, held_out):
+    cell.document["holdout"] = holdout
+    training, testing = split(cell.read())
+    assert (len(poses_of(training)), len(poses_of(testing))) == (fitted, held_out)
+
+
+@pytest.mark.parametrize(("poses", "enough"), [(6, False), (7, True)])
+def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell, poses, enough):
+    """Of the first so many poses, two were measured in a session of their own."""
+    kept = [n for n, pose in enumerate(cell.table["pose"]) if pose < poses]
+    cell.table = {name: [column[n] for n in kept] for name, column in cell.table.items()}
+    later = np.array(cell.table["pose"]) < 2
+    cell.table["session"] = later.astype(int).tolist()
+    cell.table["target"] = [f"{name}2" if late else name for name, late in zip(cell.table["target"], later, strict=True)]
+    cell.document["targets"] = cell.document["targets"] | {"A2": DOCUMENT["targets"]["A"], "B2": DOCUMENT["targets"]["B"]}
+    cell.document["holdout"] = {"session": 1}
+    if enough:
+        training, held_out = split(cell.read())
+        assert poses_of(held_out) == {(1, 0), (1, 1)} and len(poses_of(training)) == 5
+    else:
+        with refused(cell.source, "holdout", "4 poses to fit and 2 held out"):
+            cell.read()
+
+
+def test_as_many_blocks_as_poses_are_blocks_of_one_pose_of_which_one_is_too_few(cell):
+    cell.document["holdout"] = {"blocks": POSES}
+    with refused(cell.source, "holdout", f"{POSES - 1} poses to fit and 1 held out"):
+        cell.read()
+
+
+def test_a_block_goes_by_where_a_pose_stands_and_not_by_how_often_it_was_measured(cell):
+    cell.document["holdout"] = {"blocks": 3, "seed": 2}
+    before = poses_of(split(cell.read())[1])
+    again = {name: list(column) for name, column in cell.table.items()}
+    for number in range(20):
+        more = [n for n, pose in enumerate(cell.table["pose"]) if pose == 3 and cell.table["repeat"][n] == 0]
+        for name, column in cell.table.items():
+            again[name] += [column[n] if name != "repeat" else 2 + number for n in more]
+    cell.table = again
+    assert poses_of(split(cell.read())[1]) == before
+
+
+def test_a_seed_holds_out_another_block_and_is_kept(cell):
+    found = set()
+    for seed in range(5):
+        cell.document["holdout"] = {"blocks": 2, "seed": seed}
+        campaign = cell.read()
+        assert campaign.holdout == {"blocks": 2, "seed": seed}
+        found.add(frozenset(poses_of(split(campaign)[1])))
+    assert len(found) == 2
+
+
+def test_poses_are_numbered_by_session_and_then_by_pose_wherever_their_rows_are(cell):
+    with_sessions(cell)
+    order = np.random.default_rng(3).permutation(len(cell.table["pose"]))
+    cell.table = {name: [column[index] for index in order] for name, column in cell.table.items()}
+    measurements = cell.read().measurements
+    pairs, index = measured_poses(measurements)
+    assert pairs.tolist() == [[session, pose] for session in (0, 7) for pose in range(POSES)]
+    np.testing.assert_array_equal(pairs[index], np.column_stack([measurements.session, measurements.pose]))
+
+
+def test_a_session_that_was_not_measured_is_refused_beside_one_that_was(cell):
+    with_sessions(cell)
+    cell.document["holdout"] = {"session": [7, 8]}
+    with refused(cell.source, "holdout.session", "found 8", "sessions that were measured: 0, 7"):
+        cell.read()
 
 
 def test_other_campaign_that_is_not_there_is_refused(cell):

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from elastocal.campaigns.joint_space import beyond_range, blocks
 
@@ -56,3 +57,47 @@ def test_a_joint_far_beyond_is_told_whichever_it_is():
 def test_a_joint_that_stood_still_may_stand_as_exactly_as_a_pose_is_repeated():
     angles = np.random.default_rng(6).uniform(-1, 1, (30, 2)) * [1, 0]
     assert beyond_range(angles, np.array([[0.0, 0.01], [0.0, 0.1]])).tolist() == [False, True]
+
+
+@pytest.mark.parametrize(("poses", "joints"), [(2, 1), (5, 6), (20, 2), (60, 6)])
+def test_a_pose_is_beyond_the_range_from_the_margin_on_that_chance_leaves_once_in_twenty(poses, joints):
+    """Of poses from a box: 2 n (1 + t)^(1 - P) / (P + 1) = 0.05, solved for the share t of the range."""
+    share = brentq(lambda t: 2 * joints * (1 + t) ** (1 - poses) / (poses + 1) - 0.05, 1e-6, 1e4)
+    angles = np.random.default_rng(poses).uniform(-1, 1, (poses, joints)) * np.arange(1, joints + 1)
+    low, high = angles.min(axis=0), angles.max(axis=0)
+    assert (share * (high - low) > 0.02).all()
+    for joint in range(joints):
+        for edge, sign in ((low, -1), (high, 1)):
+            for factor, beyond in ((1 - 1e-9, False), (1 + 1e-9, True)):
+                pose = 0.5 * (low + high)
+                pose[joint] = edge[joint] + factor * sign * share * (high[joint] - low[joint])
+                assert beyond_range(angles, pose[None]).tolist() == [beyond], (joint, sign)
+
+
+@pytest.mark.parametrize("poses", [1, 10, 1000])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_joint_that_stood_still_is_beyond_its_range_from_a_fiftieth_of_a_radian_on(poses, sign):
+    """Whether there is one pose, a few, or so many that chance leaves their range less than once in twenty."""
+    angles = np.full((poses, 1), 0.5)
+    assert beyond_range(angles, 0.5 + sign * np.array([[0.01999], [0.02001]])).tolist() == [False, True]
+
+
+def test_many_poses_leave_no_margin_but_that_of_one_pose():
+    angles = np.linspace(-1, 1, 2001)[:, None]
+    assert beyond_range(angles, np.array([[1.01999], [1.02001], [-1.01999], [-1.02001]])).tolist() == [False, True] * 2
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 5])
+def test_blocks_of_poses_along_a_line_are_its_pieces(count):
+    """One joint moves over half a turn: neighbours stay together, in as many pieces as there are blocks."""
+    angles = np.column_stack([np.linspace(-0.5, 0.5, 30), np.zeros(30)])
+    order = np.random.default_rng(7).permutation(30)
+    found = np.empty(30, int)
+    found[order] = blocks(angles[order], count)
+    assert np.count_nonzero(np.diff(found)) == count - 1 and len(set(found)) == count
+
+
+def test_joints_count_alike_whatever_their_range():
+    """A joint that moves a tenth as far parts the poses just as well: its spread is its unit."""
+    angles = np.random.default_rng(8).uniform(-0.5, 0.5, (24, 3))
+    np.testing.assert_array_equal(blocks(angles * [1.0, 0.1, 1.0], 4), blocks(angles, 4))

@@ -7,7 +7,7 @@ from support import refused
 
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.holdout import split
-from elastocal.campaigns.reading import held_out_campaign, read_campaign
+from elastocal.campaigns.reading import folds_of, held_out_campaign, read_campaign
 from elastocal.campaigns.writing import write_campaign
 
 
@@ -109,6 +109,64 @@ def test_two_campaigns_may_test_each_other(cell, tmp_path):
 
 def test_campaign_that_holds_out_its_own_poses_has_no_other(cell):
     assert held_out_campaign(cell.read(), cell.folder, cell.robots) is None
+
+
+def some_poses(table, count):
+    """Rows of the first poses of a table."""
+    kept = [index for index, pose in enumerate(table["pose"]) if pose < count]
+    return {name: [column[index] for index in kept] for name, column in table.items()}
+
+
+@pytest.mark.parametrize("poses", [4, 5])
+def test_five_poses_are_the_fewest_that_another_campaign_may_test(cell, tmp_path, poses):
+    other_campaign(cell, tmp_path)
+    cell.table = some_poses(cell.table, poses)
+    if poses < 5:
+        with refused(cell.source, "holdout", "4 poses to fit", "5 or more poses"):
+            cell.read()
+    else:
+        training, held_out = split(cell.read())
+        assert set(training.pose.tolist()) == set(range(5)) and len(held_out) == 0
+
+
+def test_all_of_another_campaign_is_the_test_even_where_that_one_holds_out_poses_of_its_own(cell, tmp_path):
+    other_campaign(cell, tmp_path, holdout={"poses": [0, 1]})
+    other = held_out_campaign(cell.read(), cell.folder, cell.robots)
+    assert set(other.measurements.pose.tolist()) == set(range(POSES))
+
+
+def with_sessions(cell):
+    """The same poses again in session 7, and pose 3 of session 0 alone is not there."""
+    count = len(cell.table["pose"])
+    twice = {name: 2 * column for name, column in cell.table.items()} | {"session": [0] * count + [7] * count}
+    twice["target"] = cell.table["target"] + [f"{name}2" for name in cell.table["target"]]
+    targets = cell.document["targets"]
+    cell.document["targets"] = targets | {"A2": targets["A"], "B2": targets["B"]}
+    kept = [n for n in range(2 * count) if (twice["session"][n], twice["pose"][n]) != (0, 3)]
+    cell.table = {name: [column[n] for n in kept] for name, column in twice.items()}
+
+
+@pytest.mark.parametrize("of", [1, 2, 3, 4, 7])
+def test_folds_hold_every_pose_of_every_session_once_and_are_of_one_size(cell, of):
+    with_sessions(cell)
+    cell.write()
+    folds = [folds_of(cell.folder, cell.robots, number, of)["poses"] for number in range(1, of + 1)]
+    there = [(0, pose) for pose in range(POSES) if pose != 3] + [(7, pose) for pose in range(POSES)]
+    assert sorted(tuple(pair) for fold in folds for pair in fold) == there
+    assert max(map(len, folds)) - min(map(len, folds)) <= 1
+    # Dealt out in turn, so that each fold is spread over the campaign.
+    assert [tuple(folds[n % of][n // of]) for n in range(len(there))] == there
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_fold_is_a_holdout_that_holds_out_just_its_poses(cell, number):
+    with_sessions(cell)
+    cell.write()
+    fold = folds_of(cell.folder, cell.robots, number, 3)
+    cell.document["holdout"] = fold
+    training, held_out = split(cell.read())
+    found = [set(zip(some.session.tolist(), some.pose.tolist(), strict=True)) for some in (training, held_out)]
+    assert found[1] == {tuple(pair) for pair in fold["poses"]} and not found[0] & found[1]
 
 
 def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):

@@ -1,11 +1,15 @@
 """Gearboxes and transmissions: laws of a joint's own torque, angle and approach, by their formulas."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from support import OTHER_CHAINS, PinocchioPoint, chain_of
-from synthetic import candidate_on, circumstances_on, displacements, made_states
+from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
+from synthetic import candidate_on, circumstances_on, displacements, equipped, made_states
 
 from elastocal.effects.catalogue import candidates_on
+from elastocal.effects.full_load import full_torque_Nm, lever_m
+from elastocal.mechanics.robot import Mass
 
 COUNT = 6
 
@@ -122,3 +126,124 @@ def test_ratio_is_linear_in_the_angle_of_the_joint_and_of_the_one_before(case):
         assert [p.name for p in candidate.parameters] == [f"per_q{source + 1}" for source in sources]
         for column, source in zip(displacements(candidate, around), sources, strict=True):
             assert_only(column, joint, around.joint_angles[:, source])
+
+
+# An arm of two metres that turns about the vertical: its full torque is that of a kilonewton, 2000 N m.
+TURNTABLE, FULL_NM = "Rz(q1) Tx(2) [hand]", 2000.0
+
+
+def under(torques, approach=None):
+    """Conditions in which the one joint of the turntable bears exactly these torques, N m."""
+    chain, torques = chain_of(TURNTABLE), np.asarray(torques, float)
+    states = made_states(1, len(torques), seed=3)
+    wrench = np.zeros((len(torques), 6))
+    wrench[:, 5] = torques
+    sense = states.approach if approach is None else np.asarray(approach, float)[:, None]
+    return circumstances_on(chain, replace(states, wrench=wrench, approach=sense))
+
+
+def law_of(key, torques, *shapes):
+    """What the unit of a law makes of the joint of the turntable."""
+    return displacements(candidate_on(chain_of(TURNTABLE), key), under(torques), *shapes)[0, :, 0]
+
+
+@pytest.mark.parametrize("taken_up", [6.0, 60.0, 200.0])
+def test_lost_motion_is_three_quarters_taken_up_at_its_torque_and_a_straight_line_below(taken_up):
+    knee = (np.e**2 - 1) / (np.e**2 + 1)
+    torques = taken_up * np.array([-30.0, -1.0, -1e-4, 0.0, 1e-4, 1.0, 30.0])
+    np.testing.assert_allclose(
+        law_of("lost_motion@1", torques, taken_up), [-1.0, -knee, -1e-4, 0.0, 1e-4, knee, 1.0], rtol=1e-7, atol=1e-15
+    )
+
+
+def test_two_slopes_meet_at_their_torque_without_a_step_and_differ_by_one_unit_of_slope():
+    near = 1e-6
+    torques = 300.0 * np.array([-2.0, -1.0 - near, -1.0, -1.0 + near, 0.0, 1.0 - near, 1.0, 1.0 + near, 2.0])
+    expected = 300.0 * np.array([-1.0, -near, 0.0, 0.0, 0.0, 0.0, 0.0, near, 1.0])
+    np.testing.assert_allclose(law_of("stiffening@1[two slopes]", torques, 300.0), expected, rtol=0, atol=1e-9)
+
+
+def test_smooth_stiffening_leaves_a_quarter_of_the_torque_at_which_the_slopes_meet():
+    """At the knee tau - tau tanh(1); far beyond it the torque less that of the knee."""
+    left = 2 / (np.e**2 + 1)
+    torques = 300.0 * np.array([-40.0, -1.0, 0.0, 1.0, 40.0])
+    expected = 300.0 * np.array([-39.0, -left, 0.0, left, 39.0])
+    np.testing.assert_allclose(law_of("stiffening@1", torques, 300.0), expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("key", ["lost_motion@1", "stiffening@1", "stiffening@1[two slopes]"])
+@pytest.mark.parametrize("shape", [5.0, 300.0, 1600.0])
+def test_laws_of_torque_change_their_sign_with_it_and_never_fall(key, shape):
+    torques = np.sort(np.random.default_rng(4).uniform(-3000.0, 3000.0, 200))
+    torques = np.concatenate([torques, 1e-3 * torques, [shape, -shape, 0.0]])
+    made, mirrored = law_of(key, torques, shape), law_of(key, -torques, shape)
+    np.testing.assert_array_equal(mirrored, -made)
+    assert (np.diff(made[np.argsort(torques)]) >= -1e-9).all()
+    # Play is never crossed by more than all of it; a gear never yields by more than its torque.
+    assert (np.abs(made) <= (1.0 if key.startswith("lost") else np.abs(torques))).all()
+
+
+@pytest.mark.parametrize(
+    ("key", "lowest", "start", "highest"),
+    [
+        ("lost_motion@1", 0.003, 0.03, 0.1),
+        ("stiffening@1", 0.05, 0.3, 0.8),
+        ("stiffening@1[two slopes]", 0.05, 0.3, 0.8),
+    ],
+)
+@pytest.mark.parametrize("payload_kg", [None, 100.0])
+def test_torques_of_laws_are_shares_of_the_full_torque_of_the_joint(key, lowest, start, highest, payload_kg):
+    """Lost motion is read at 3 % of it. Of a kilonewton, or of the rated payload, two metres away."""
+    sites = replace(equipped(chain_of(TURNTABLE)), payload_kg=payload_kg)
+    (shape,) = candidates_on(sites)[key].shapes
+    full = FULL_NM if payload_kg is None else 2.0 * payload_kg * np.linalg.norm(sites.gravity_m_s2)
+    assert (shape.lowest, shape.start, shape.highest) == pytest.approx((lowest * full, start * full, highest * full))
+    assert (shape.name, shape.unit, shape.tried) == ("torque", "N m", 0)
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "unit", "plausible", "sign", "needs"),
+    [
+        # Play opens with the torque and a gear gets stiffer with it; friction may hold back either way.
+        ("lost_motion@1", "half_play", "rad", 1e-4, 1, {"load"}),
+        ("stiffening@1", "beyond", "rad/(N m)", 5e-3 / 2.0 / FULL_NM, -1, {"load"}),
+        ("stiffening@1[two slopes]", "beyond", "rad/(N m)", 5e-3 / 2.0 / FULL_NM, -1, {"load"}),
+        ("hysteresis@1", "half_width", "rad", 1e-4, 0, {"approach"}),
+    ],
+)
+def test_each_law_of_a_gear_has_one_parameter_of_known_size_and_sign(key, name, unit, plausible, sign, needs):
+    candidate = candidate_on(chain_of(TURNTABLE), key)
+    (parameter,) = candidate.parameters
+    assert (parameter.name, parameter.unit, parameter.sign) == (name, unit, sign)
+    assert parameter.plausible == pytest.approx(plausible) and parameter.prior_std is None
+    assert candidate.needs == needs and candidate.joints == (1,) and candidate.family == "gearbox"
+
+
+def test_hysteresis_has_the_sign_of_the_approach_and_is_nothing_where_a_joint_was_not_moved():
+    chain, senses = chain_of(TURNTABLE), [-1.0, 0.0, 1.0]
+    made = displacements(candidate_on(chain, "hysteresis@1"), under([100.0, -50.0, 0.0], senses))
+    np.testing.assert_array_equal(made[0, :, 0], senses)
+
+
+def test_a_track_has_friction_in_metres_and_no_gear_that_turns():
+    found = candidates_on(equipped(chain_of(TRACK)))
+    units = {key: c.parameters[0].unit for key, c in found.items() if c.effect == "hysteresis"}
+    assert units == {"hysteresis@1": "m"} | {f"hysteresis@{joint}": "rad" for joint in (2, 3, 4)}
+    assert found["hysteresis@1"].parameters[0].plausible == 2e-5
+    for effect, count in (("lost_motion", 1), ("stiffening", 2)):
+        joints = [c.joints for c in found.values() if c.effect == effect]
+        assert joints == [(2,), (3,), (4,)] * count
+
+
+def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_the_joint():
+    """Levers of the outstretched arm, by hand; the weight of a mass half way along its link."""
+    sites = equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]"))
+    assert [lever_m(sites, joint) for joint in range(3)] == pytest.approx([3.1, 2.1, 0.5])
+    assert [full_torque_Nm(sites, joint) for joint in range(3)] == pytest.approx([3100.0, 2100.0, 500.0])
+    g = np.linalg.norm(sites.gravity_m_s2)
+    loaded = replace(sites, payload_kg=10.0, masses=(Mass(2, 30.0, (-1.0, 0.0, 0.0), 0.1),))
+    # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all; it is before joint 3.
+    found = [full_torque_Nm(loaded, joint) for joint in range(3)]
+    assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
+    # The longest lever is that of some poses, so almost that of the arm outstretched.
+    assert 0.98 * 30 * g < found[1] - 21 * g <= 30 * g

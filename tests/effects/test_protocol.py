@@ -1,9 +1,9 @@
-"""Shapes of laws: the values that a search tries."""
+"""Shapes of laws: the values that a search tries. Candidates: their names and places."""
 
 import numpy as np
 import pytest
 
-from elastocal.effects.protocol import Shape
+from elastocal.effects.protocol import Candidate, Parameter, Shape, effect_of
 
 TRIED = Shape("when", "1", 0.5, 0.0, 1.0, tried=11), Shape("lag", "s", 3600.0, 900.0, 36000.0)
 
@@ -29,3 +29,49 @@ def test_shapes_between_two_are_inside_and_evenly_spread_with_the_middle_among_t
     assert len(found) == 7 and ends[0] < found[0] and found[-1] < ends[1]
     np.testing.assert_allclose(steps, steps[0])
     np.testing.assert_allclose(found[3], ends[2])
+
+
+def test_a_shape_that_must_be_tried_often_is_tried_evenly_from_end_to_end():
+    np.testing.assert_allclose(TRIED[0].values(3), np.linspace(0.0, 1.0, 11), atol=1e-15)
+
+
+@pytest.mark.parametrize("few", [1, 2, 3, 7])
+def test_a_few_values_of_a_shape_grow_by_one_factor_from_the_lowest_and_on_to_the_highest(few):
+    """900 s to 36000 s is a factor of 40: a few values part it in so many and one more equal factors, without the ends."""
+    expected = 900.0 * 40.0 ** (np.arange(1, few + 1) / (few + 1))
+    np.testing.assert_allclose(TRIED[1].values(few), expected, rtol=1e-12)
+
+
+def test_a_shape_that_is_tried_once_is_tried_where_it_starts():
+    assert Shape("taper", "1", 0.3, 0.0, 0.6, tried=1).values(3).tolist() == [0.3]
+
+
+@pytest.mark.parametrize("shape", TRIED, ids=lambda shape: shape.name)
+def test_a_shape_alone_stands_for_all_of_its_range_and_one_at_an_end_for_the_half_next_to_it(shape):
+    assert shape.shares([shape.start]).tolist() == [1.0]
+    np.testing.assert_allclose(shape.shares([shape.highest, shape.lowest] if shape.tried else [36000.0, 900.0]), [0.5, 0.5])
+
+
+def test_shapes_evenly_tried_over_the_range_have_half_a_share_at_its_ends():
+    np.testing.assert_allclose(TRIED[0].shares(TRIED[0].values(3)), [0.05, *[0.1] * 9, 0.05])
+
+
+def test_values_outside_of_the_range_take_nothing_from_those_inside():
+    """Two at the far side of an end share what they would of a range that ends there: nothing but what is nearest."""
+    shape = Shape("when", "1", 0.5, 0.0, 1.0, tried=11)
+    np.testing.assert_allclose(shape.shares([-3.0, -2.0, 0.5, 1.5, 4.0]), [0.0, 0.0, 1.0, 0.0, 0.0], atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("joints", "detail", "location_name", "key", "location"),
+    [
+        ((), "", "", "law", ()),
+        ((2,), "", "", "law@2", (2,)),
+        ((1, 3), "one section", "one section", "law@1+3[one section]", (1, 3, "one section")),
+        ((), "column", "column", "law[column]", ("column",)),
+    ],
+)
+def test_key_and_location_of_a_candidate_are_its_effect_joints_and_detail(joints, detail, location_name, key, location):
+    law = Candidate("law", "any", joints, detail, (Parameter("a", "rad", 1.0),), dict, location_name=location_name)
+    assert (law.key, law.location) == (key, location)
+    assert effect_of(law.key) == "law"

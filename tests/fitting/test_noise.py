@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import check_grad
+from scipy.optimize import brentq, check_grad
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 from support import chain_of
 from synthetic import made_estimate, made_measurements, made_model
@@ -207,3 +208,211 @@ def test_repeats_that_do_not_differ_say_nothing(fanuc, rows):
     assert noise_from_repeats(model, estimate, still) is None
     taken, warnings = chosen_noise(campaign(fanuc, position_m=5e-5), model, estimate, still)
     assert taken.source == "declared" and warnings == []
+
+
+HANDS = tuple(Target(name, "hand", (0.0, 0.0, 0.0)) for name in "AB")
+
+
+def off_by(model, off, turned=None):
+    """Repeats that are off the model by exactly so much: ndarray (poses, repeats, targets, 3), m and rad."""
+    exact = made_measurements(model, np.random.default_rng(20), *off.shape[:2], 0.0, 0.0)
+    moved = replace(exact, position=exact.position + off.reshape(-1, 3))
+    if turned is None:
+        return moved
+    vectors = Rotation.from_rotvec(turned.reshape(-1, 3)) * Rotation.from_rotvec(exact.rotation_vector)
+    return replace(moved, rotation_vector=vectors.as_rotvec())
+
+
+def mirrored(parts):
+    """Two repeats either side of the middle, whose contrasts are exactly `parts`, ndarray (poses, targets, 3)."""
+    return np.stack([-parts, parts], axis=1) / np.sqrt(2)
+
+
+def gantry(text="Tx(q1) [hand]", targets=1, rows=3):
+    """A model whose joints shift or turn all targets alike in every pose, so that the likelihood has a closed form."""
+    model = made_model(chain_of(text), HANDS[:targets], rows, fitted_frames=False)
+    return model, made_estimate(model)
+
+
+def safe_side(approaches):
+    """By how much the joint part is taken larger than it seems: so that it is large enough four times of five."""
+    return np.sqrt(approaches / chi2.ppf(0.2, approaches))
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_few_repeats_have_the_pooled_standard_deviation_of_states_with_different_numbers_of_them(rows):
+    """Squares about the mean of each state and target over their degrees of freedom, positions and orientations apart."""
+    model, estimate = gantry("Tz(0.4) Rz(q1) Tx(0.7) Ry(q2) Tx(0.6) [hand]", 2, rows)
+    rng = np.random.default_rng(21)
+    off, turned = SENSOR_M * rng.standard_normal((3, 4, 2, 3)), SENSOR_RAD * rng.standard_normal((3, 4, 2, 3))
+    measurements = off_by(model, off, turned if rows == 6 else None)
+    # Pose 0 has two repeats of one target, pose 1 three of both, pose 2 four of one.
+    repeats, targets = np.array([2, 3, 4]), np.array([1, 2, 1])
+    there = (measurements.repeat < repeats[measurements.pose]) & (measurements.target < targets[measurements.pose])
+    found = noise_from_repeats(model, estimate, measurements.select(there))
+    parts = [values[pose, : repeats[pose], : targets[pose]] for values in (off, turned) for pose in range(3)]
+    squares = [((part - part.mean(axis=0)) ** 2).sum() for part in parts]
+    freedom = 3 * ((repeats - 1) * targets).sum()
+    assert found.degrees_of_freedom == freedom * rows // 3
+    assert found.position_m == pytest.approx(np.sqrt(sum(squares[:3]) / freedom), rel=1e-6)
+    expected = found.position_m if rows == 3 else np.sqrt(sum(squares[3:]) / freedom)
+    assert found.orientation_rad == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("position_m", "orientation_rad", "told"),
+    [(1.02e-8, 1e-6, True), (0.98e-8, 1e-6, False), (1e-6, 1.02e-8, True), (1e-6, 0.98e-8, False)],
+)
+def test_positions_and_orientations_must_both_differ_by_more_than_a_sensor_can_resolve(position_m, orientation_rad, told):
+    model, estimate = gantry(rows=6)
+    signs = np.random.default_rng(22).choice([-1.0, 1.0], (4, 1, 3))
+    measurements = off_by(model, mirrored(position_m * signs), mirrored(orientation_rad * signs))
+    found = noise_from_repeats(model, estimate, measurements)
+    assert (found is not None) == told
+    if told:
+        assert (found.position_m, found.orientation_rad) == pytest.approx((position_m, orientation_rad), rel=1e-6)
+
+
+@pytest.mark.parametrize(("poses", "told"), [(2, False), (3, True)])
+def test_nine_contrasts_of_repeats_are_the_fewest_that_say_anything(poses, told):
+    model, estimate = gantry()
+    found = noise_from_repeats(model, estimate, off_by(model, mirrored(SENSOR_M * np.ones((poses, 1, 3)))))
+    assert (found is not None) == told
+    assert not told or found.degrees_of_freedom == 9
+
+
+@pytest.mark.parametrize(("poses", "told"), [(19, False), (20, True)])
+def test_sixty_contrasts_of_repeats_are_the_fewest_that_separate_the_joints_from_the_sensor(poses, told):
+    model, estimate = gantry()
+    parts = SENSOR_M * np.array([20.0, 1.0, 1.0]) * np.ones((poses, 1, 3))
+    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
+    assert found.degrees_of_freedom == 3 * poses and found.joint_rad.any() == told
+    # Without a part of the joints all directions count alike.
+    assert found.position_m == pytest.approx(SENSOR_M * (1.0 if told else np.sqrt((20**2 + 2) / 3)), rel=1e-3)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_a_joint_that_shifts_all_targets_has_the_maximum_of_its_likelihood_in_closed_form(rows):
+    """What two targets make along the joint together has variance 2 s^2 + sigma^2, every other direction sigma^2."""
+    model, estimate = gantry(targets=2, rows=rows)
+    rng = np.random.default_rng(23)
+    parts = SENSOR_M * rng.standard_normal((40, 2, 3))
+    parts[..., 0] += 80e-6 * rng.standard_normal((40, 1))
+    turns = SENSOR_RAD * rng.standard_normal((40, 2, 3))
+    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts), mirrored(turns) if rows == 6 else None))
+    together = (parts[..., 0].sum(axis=1) ** 2).sum() / 2
+    sensor = ((parts**2).sum() - together) / (40 * 5)
+    assert found.position_m == pytest.approx(np.sqrt(sensor), rel=1e-3)
+    assert found.orientation_rad == pytest.approx(np.sqrt((turns**2).mean() if rows == 6 else sensor), rel=1e-3)
+    # Two targets see the same forty draws of the joint.
+    assert found.joint_rad[0] == pytest.approx(np.sqrt((together / 40 - sensor) / 2) * safe_side(40), rel=1e-3)
+
+
+def test_a_joint_that_turns_targets_on_its_axis_shows_in_their_orientations_alone():
+    model, estimate = gantry("Rz(q1) [hand]", 2, 6)
+    rng = np.random.default_rng(24)
+    parts, turns = (size * rng.standard_normal((40, 2, 3)) for size in (SENSOR_M, SENSOR_RAD))
+    turns[..., 2] += 60e-6 * rng.standard_normal((40, 1))
+    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts), mirrored(turns)))
+    together = (turns[..., 2].sum(axis=1) ** 2).sum() / 2
+    sensor = ((turns**2).sum() - together) / (40 * 5)
+    assert found.position_m == pytest.approx(np.sqrt((parts**2).mean()), rel=1e-3)
+    assert found.orientation_rad == pytest.approx(np.sqrt(sensor), rel=1e-3)
+    assert found.joint_rad[0] == pytest.approx(np.sqrt((together / 40 - sensor) / 2) * safe_side(40), rel=1e-3)
+
+
+@pytest.mark.parametrize("joints", [1, 3])
+def test_joints_that_cannot_be_separated_share_what_they_make_and_the_contrasts_behind_it(joints):
+    """All along one axis: each has the same part of the variance, and the sensor has as many contrasts as each of them."""
+    model, estimate = gantry(" ".join(f"Tx(q{number})" for number in range(1, joints + 1)) + " [hand]")
+    parts = SENSOR_M * np.array([5.0, 1.0, 1.0]) * np.ones((40, 1, 3))
+    found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
+    behind = {1: 40, 3: 3 * 40 // 4}[joints]
+    expected = SENSOR_M * np.sqrt((5**2 - 1) / joints) * safe_side(behind)
+    np.testing.assert_allclose(found.joint_rad, expected, rtol=1e-3)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_joints_are_taken_where_they_raise_the_log_likelihood_by_more_than_one_each(joints):
+    """Akaike's criterion, at contrasts for which the gain over the sensor alone is known exactly."""
+    model, estimate = gantry(" ".join(f"Tx(q{number})" for number in range(1, joints + 1)) + " [hand]")
+    poses = 40
+
+    def gain(ratio):
+        return 0.5 * poses * (3 * np.log((ratio**2 + 2) / 3) - np.log(ratio**2))
+
+    for off, taken in ((-0.05, False), (0.05, True)):
+        ratio = brentq(lambda ratio, off=off: gain(ratio) - joints - off, 1.0, 10.0)
+        parts = SENSOR_M * np.array([ratio, 1.0, 1.0]) * np.ones((poses, 1, 3))
+        found = noise_from_repeats(model, estimate, off_by(model, mirrored(parts)))
+        assert found.joint_rad.any() == taken, ratio
+
+
+def test_of_more_contrasts_than_are_needed_those_of_states_spread_over_the_campaign_are_taken(monkeypatch):
+    """The later half is three times as noisy: a half of the states shows both halves alike."""
+    model, estimate = gantry()
+    parts = SENSOR_M * np.repeat([1.0, 3.0], 20)[:, None, None] * np.ones((40, 1, 3))
+    measurements = off_by(model, mirrored(parts))
+    for most, freedom in ((120, 120), (60, 60)):
+        monkeypatch.setattr(noise_module, "MOST", most)
+        found = noise_from_repeats(model, estimate, measurements)
+        assert found.degrees_of_freedom == freedom
+        assert found.position_m == pytest.approx(np.sqrt(5) * SENSOR_M, rel=1e-6)
+
+
+@pytest.mark.parametrize("part", ["approach", "load", "session"])
+def test_only_approaches_to_one_state_from_one_side_are_repeats_of_each_other(part):
+    """What differs between two senses, loads or sessions is no noise, however much it is."""
+    model, estimate = gantry()
+    estimate = replace(estimate, sessions=(0, 1), frame_rotation=np.tile(np.eye(3), (2, 1, 1)), frame_position=np.zeros((2, 3)))
+    parts = SENSOR_M * np.random.default_rng(25).standard_normal((5, 2, 1, 3))
+    # Of four measurements of a pose the first two and the last two belong together.
+    off = np.concatenate([mirrored(parts[:, 0]), 1e-3 + mirrored(parts[:, 1])], axis=1)
+    measurements = off_by(model, off)
+    later = measurements.repeat // 2
+    values = {"approach": 2.0 * later[:, None] - 1.0, "load": later, "session": later}
+    found = noise_from_repeats(model, estimate, replace(measurements, **{part: values[part]}))
+    assert found.degrees_of_freedom == 30
+    assert found.position_m == pytest.approx(np.sqrt((parts**2).mean()), rel=1e-6)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("end", [0, 1])
+def test_declared_noise_is_doubted_beyond_the_range_of_chance_in_a_hundred_campaigns(fanuc, rows, end):
+    """The 0.5 and 99.5 % quantiles of a standard deviation from so many contrasts of positions."""
+    model, estimate = gantry(rows=rows)
+    parts = mirrored(SENSOR_M * np.ones((12, 1, 3)))
+    measurements = off_by(model, parts, parts if rows == 6 else None)
+    limit = np.sqrt(chi2.ppf([0.005, 0.995][end], 36) / 36)
+    for share, warned in ((0.999, end == 0), (1.001, end == 1)):
+        declared = campaign(fanuc, position_m=SENSOR_M / (share * limit))
+        assert len(chosen_noise(declared, model, estimate, measurements)[1]) == warned
+
+
+def test_nothing_declared_and_repeats_that_tell_is_no_warning(fanuc):
+    model, estimate = gantry()
+    noise, warnings = chosen_noise(campaign(fanuc), model, estimate, off_by(model, mirrored(SENSOR_M * np.ones((3, 1, 3)))))
+    assert noise.source == "repeats" and warnings == []
+
+
+def test_noise_of_single_measurements_is_scaled_and_what_a_pose_has_in_common_is_not():
+    noise = Noise("repeats", 1.0, 2.0, np.array([3.0, 4.0]), 50, 5.0)
+    found = noise.scaled(10.0)
+    assert (found.position_m, found.orientation_rad, found.joint_rad.tolist()) == (10.0, 20.0, [30.0, 40.0])
+    assert (found.source, found.degrees_of_freedom, found.pose_rad) == ("repeats", 50, 5.0)
+    alone = noise.of_measurements
+    assert (alone.position_m, alone.orientation_rad, alone.joint_rad.tolist()) == (1.0, 2.0, [3.0, 4.0])
+    assert alone.pose_rad == 0.0
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_covariance_of_each_approach_is_its_jacobian_about_the_joints_and_the_sensor_on_the_diagonal(rows):
+    jacobian = np.random.default_rng(26).standard_normal((3, 2, rows, 4))
+    noise = Noise("", 0.7, 0.3, np.array([0.5, 0.0, 1.0, 0.2]))
+    sensor = np.diag([0.7**2] * 3 + [0.3**2] * (rows - 3))
+    for found, each in zip(measurement_covariances(noise, jacobian, rows), jacobian, strict=True):
+        for one in range(2):
+            for other in range(2):
+                expected = each[one] @ np.diag(noise.joint_rad**2) @ each[other].T + (one == other) * sensor
+                block = found[one * rows : (one + 1) * rows, other * rows : (other + 1) * rows]
+                np.testing.assert_allclose(block, expected, rtol=1e-12, atol=1e-15)

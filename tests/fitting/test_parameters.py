@@ -1,8 +1,11 @@
 """The vector of parameters: its order, and steps of it that can be taken back."""
 
 import numpy as np
+import pytest
+from fitted_models import model_of
+from synthetic import made_estimate
 
-from elastocal.fitting.parameters import parameters, stepped
+from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
 
 
 def test_parameters_are_named_in_the_order_of_the_sensitivities(full_case):
@@ -36,3 +39,66 @@ def test_steps_keep_rotations_orthonormal_and_shapes_in_their_range(full_case):
     for turn in (*there.frame_rotation, *there.target_rotation):
         np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-10)
     assert there.shapes[1][0] == model.effects[1].shapes[0].highest
+
+
+@pytest.fixture
+def two_laws(fanuc):
+    """A model of two laws with a shape of one name, and one without, somewhere."""
+    model = model_of(fanuc, "lost_motion@2", "link_geometry@3", "stiffening@4")
+    return model, made_estimate(model, seed=7)
+
+
+def owned(model, estimate, key, name):
+    """Places of one parameter of one owner."""
+    return [n for n, (owner, p) in enumerate(parameters(model, estimate)) if (owner, p.name) == (key, name)]
+
+
+def test_only_shapes_have_limits_each_those_of_its_own_law(two_laws):
+    model, estimate = two_laws
+    found, expected = limits(model, estimate), np.tile([-np.inf, np.inf], (len(parameters(model, estimate)), 1))
+    for effect in (model.effects[0], model.effects[2]):
+        (place,) = owned(model, estimate, effect.key, "torque")
+        expected[place] = effect.shapes[0].lowest, effect.shapes[0].highest
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(nonlinear_parameters(model, estimate), np.isfinite(expected[:, 0]))
+    assert np.isfinite(expected).sum() == 4
+
+
+def test_a_model_without_effects_has_no_limits_and_no_shapes(fanuc):
+    model = model_of(fanuc)
+    estimate = made_estimate(model)
+    assert np.isinf(limits(model, estimate)).all() and limits(model, estimate).shape == (9, 2)
+    assert not nonlinear_parameters(model, estimate).any()
+
+
+@pytest.mark.parametrize(("step", "end"), [(-1e9, "lowest"), (1e9, "highest")])
+@pytest.mark.parametrize("place", [0, 2])
+def test_a_step_of_a_shape_ends_at_the_end_of_its_own_range(two_laws, place, step, end):
+    model, estimate = two_laws
+    whole = np.zeros(len(parameters(model, estimate)))
+    whole[owned(model, estimate, model.effects[place].key, "torque")] = step
+    there = stepped(model, estimate, whole)
+    assert there.shapes[place].tolist() == [getattr(model.effects[place].shapes[0], end)]
+    for number in {0, 1, 2} - {place}:
+        np.testing.assert_array_equal(there.shapes[number], estimate.shapes[number])
+
+
+def test_values_are_zero_for_frames_and_targets_and_those_of_coefficients_before_shapes(two_laws):
+    model, estimate = two_laws
+    whole = 1e-6 * np.arange(1.0, len(parameters(model, estimate)) + 1)
+    there = stepped(model, estimate, whole)
+    found = parameter_values(model, there)
+    np.testing.assert_array_equal(found[:9], np.zeros(9))
+    (play, taken_up), geometry, (beyond, meeting) = (
+        np.concatenate([a, b]) for a, b in zip(estimate.coefficients, estimate.shapes, strict=True)
+    )
+    before = np.array([play, taken_up, *geometry, beyond, meeting])
+    np.testing.assert_allclose(found[9:], before + whole[9:], rtol=1e-12, atol=0)
+
+
+def test_the_plausible_size_of_a_shape_is_the_width_of_its_range(two_laws):
+    model, estimate = two_laws
+    for effect in (model.effects[0], model.effects[2]):
+        (place,) = owned(model, estimate, effect.key, "torque")
+        (shape,) = effect.shapes
+        assert parameters(model, estimate)[place][1].plausible == shape.highest - shape.lowest

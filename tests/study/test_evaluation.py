@@ -236,3 +236,16 @@ def test_replicates_that_do_not_reach_the_limit_are_continued_and_not_left_out()
     length, error = reached_length(values, replicates, 1.0)
     assert length == 2.0 and error == pytest.approx(np.std([2, 4.5, 6], ddof=1))
     assert reached_length(values, replicates, 0.1)[0] == np.inf
+
+
+@pytest.mark.parametrize(
+    ("limit", "length", "lengths"), [(2.5, 2.0, (2, 3, 1)), (0.6, 3.0, (3, 3, 3)), (0.25, np.inf, (6, 9, 12))]
+)
+def test_a_limit_other_than_one_is_reached_by_the_same_rules(limit, length, lengths):
+    """Replicates beyond their curves go on as one over the length: from 0.5, 0.75 and 1 at length 3 to 0.25."""
+    values = np.array([3.0, 0.9, 0.5])
+    replicates = np.array([[3.0, 0.9, 0.5], [3.0, 2.6, 0.55], [2.0, 0.9, -0.6]])
+    if limit < 0.5:
+        replicates[:, 2] = 0.5, 0.75, -1.0
+    found, error = reached_length(values, replicates, limit)
+    assert found == length and error == pytest.approx(np.std(lengths, ddof=1))

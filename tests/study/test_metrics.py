@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from support import random_loads, without_tool
 
@@ -176,6 +176,33 @@ def test_length_to_reach_continues_a_bias_that_falls_as_one_over_the_length(bias
 def test_length_to_reach_is_the_first_length_below_where_there_is_one():
     values = np.array([[5.0, 0.5, 3.0], [5.0, 4.0, -2.0]])
     np.testing.assert_array_equal(length_to_reach(values, 1.0), [2.0, 6.0])
+
+
+@given(st.floats(0.1, 1e4), st.floats(1e-3, 1e3), st.sampled_from([-1.0, 1.0]), st.integers(1, 40))
+def test_lengths_follow_a_bias_over_the_length_to_any_limit(bias, limit, sign, lengths):
+    """It is below the limit from the first whole length beyond bias / limit on, and past the curve it goes on to just that."""
+    values = sign * bias / np.arange(1, lengths + 1)
+    crossing = bias / limit
+    # Exactly at a whole length rounding decides.
+    assume(abs(crossing - np.round(crossing)) > 1e-9 * crossing)
+    whole = max(np.ceil(crossing), 1.0)
+    reached = whole <= lengths
+    assert first_length_below(values, limit) == (whole if reached else np.inf)
+    assert length_to_reach(values, limit) == pytest.approx(whole if reached else crossing, rel=1e-12)
+
+
+def test_a_limit_that_is_just_met_is_reached_and_one_between_two_lengths_at_the_later():
+    values = np.array([8.0, 4.0, 2.0, 1.0])
+    assert [float(first_length_below(values, limit)) for limit in (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)] == [1, 2, 2, 3, 3, 4]
+    assert [float(length_to_reach(values, limit)) for limit in (8.0, 5.0, 4.0, 2.5, 2.0, 1.0)] == [1, 2, 2, 3, 3, 4]
+
+
+@pytest.mark.parametrize(("limit", "expected"), [(0.5, 8.0), (0.25, 16.0), (0.8, 5.0)])
+def test_a_curve_that_never_comes_down_to_the_limit_goes_on_from_its_last_value(limit, expected):
+    """Whatever it did before: as its end over the length, which at length 4 is one."""
+    values = np.array([8.0, 0.9, -3.0, -1.0])
+    assert first_length_below(values, limit) == np.inf
+    assert length_to_reach(values, limit) == pytest.approx(expected)
 
 
 def test_judge_scores_about_the_compliances_of_the_robot(kuka):
