@@ -293,6 +293,67 @@ def test_a_shape_that_was_fitted_elsewhere_than_tried_stays_among_those_looked_a
     np.testing.assert_allclose(values, [*below, 1300.0, *above])
 
 
+def ends_of(candidate):
+    (shape,) = candidate.shapes
+    return shape.lowest, shape.highest
+
+
+def test_every_shape_of_the_catalogue_is_tried_within_its_range(campaign):
+    shaped = [candidate for candidate in campaign.all_candidates if candidate.shapes]
+    assert {candidate.effect for candidate in shaped} >= {"lost_motion", "stiffening", "thermal_growth", "setup_step"}
+    for candidate in shaped:
+        lowest, highest = ends_of(candidate)
+        tried = [value for (value,) in shapes_tried(candidate, campaign.declared)]
+        assert lowest <= min(tried) and max(tried) <= highest and len(set(tried)) == len(tried), candidate.key
+
+
+@pytest.mark.parametrize("end", [0, 1])
+@pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "lost_motion@2", "link_elasticity@3"])
+def test_a_shape_that_was_fitted_at_an_end_of_its_range_is_tried_there_and_not_beyond(campaign, key, end):
+    candidate = campaign.candidates[key]
+    ends = ends_of(candidate)
+    model, start = with_effect(campaign, key, 0.0)
+    start.shapes[-1][:] = ends[end]
+    tried = [value for (value,) in shapes_tried(candidate, replace(campaign.declared, model=model, estimate=start))]
+    assert ends[end] in tried and min(tried) >= ends[0] and max(tried) <= ends[1]
+    # Only of a step others are tried beside, all on the one side that there is.
+    assert (len(tried) > 1) == (key == "setup_step")
+
+
+@pytest.mark.parametrize("key", ["setup_step", "thermal_growth[time]", "link_elasticity@3"])
+def test_a_closer_look_stays_within_the_range_and_keeps_all_that_was_tried(bent, key):
+    units = [unit for unit in bent.units if unit.candidate and unit.candidate.key == key]
+    lowest, highest = ends_of(units[0].candidate)
+    before = sorted(unit.shapes[0] for unit in units)
+    for place in range(len(units)):
+        (values,) = looked_at(bent, factors(bent, {(key, place): 30.0})).values()
+        assert set(before) < set(values) and min(values) >= lowest and max(values) <= highest
+        # None of the new ones is beyond a neighbour of the best.
+        best = before.index(units[place].shapes[0])
+        edges = [lowest, *before, highest]
+        assert all(edges[best] <= value <= edges[best + 2] for value in set(values) - set(before))
+
+
+def test_other_shapes_of_a_winning_candidate_and_all_other_candidates_stay_units_of_the_closer_problem(campaign):
+    keys = ("setup_step", "thermal_growth[time]", "joint_offset@3")
+    candidates = [campaign.candidates[key] for key in keys]
+    first = linearized(campaign.declared, campaign.observations, candidates, SETTINGS).problem
+    closer = {"setup_step": [(0.25,), (0.3,), (1 / 3,)]}
+    then = linearized(campaign.declared, campaign.observations, candidates, SETTINGS, closer).problem
+
+    def shapes(problem):
+        named = [unit for unit in problem.units if unit.candidate]
+        return {key: [unit.shapes for unit in named if unit.candidate.key == key] for key in keys}
+
+    assert shapes(then) == shapes(first) | closer
+    # At one location: a model holds one of its shapes at most, and each of them may be in one.
+    steps = [n for n, unit in enumerate(then.units) if unit.mechanism == "setup_step"]
+    assert len({then.units[n].location for n in steps}) == 1
+    columns = np.concatenate([then.units[n].columns for n in steps])
+    assert len(set(columns.tolist())) == 18
+    assert np.isfinite(initial_screening(then)[1][steps]).all()
+
+
 def test_a_step_is_found_closer_to_where_it_was_by_a_closer_look(kuka):
     """Between two of the values tried: a better Bayes factor, at a value nearer to the true one."""
     states = made_states(6, 60, seed=9)

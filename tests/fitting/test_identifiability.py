@@ -7,7 +7,7 @@ import pytest
 from fitted_models import model_of, names_held
 from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
 
-from elastocal.fitting.identifiability import identifiable, solve_identifiable
+from elastocal.fitting.identifiability import identifiable, solve_identifiable, solve_normal
 from elastocal.fitting.least_squares import fit
 
 
@@ -63,6 +63,74 @@ def test_a_shape_that_is_bound_to_nothing_is_kept():
     # A shape is no better than others where it is what can be told worst.
     worst = np.linalg.inv(np.array([[0.95, 1.9], [1.9, 4.0]]))
     np.testing.assert_array_equal(identifiable(worst, nobody[:2], np.array([False, True])), [True, False])
+
+
+def informed(*covariance):
+    """Information whose inverse is a covariance, in plausible sizes."""
+    return np.linalg.inv(np.array(covariance))
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("correlation", "kept"), [(0.49, [False, True]), (0.51, [True, False])])
+def test_a_shape_is_given_up_for_another_from_a_correlation_of_a_half_on(correlation, kept, sign):
+    """Of either sign. The other has a standard error of 1.05 beside the shape, and is told without it."""
+    shared = sign * correlation * 1.05 * 0.5
+    gram = informed([1.05**2, shared], [shared, 0.5**2])
+    assert 1 / np.sqrt(gram[0, 0]) < 1.0
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.array([False, True])), kept)
+
+
+def test_frozen_parameters_leave_the_others_their_own_shapes():
+    """The same two behind one that does not count: which of them is a shape goes by their own places."""
+    gram = np.diag([9.0, 0.0, 0.0])
+    gram[1:, 1:] = BOUND
+    frozen = np.array([True, False, False])
+    np.testing.assert_array_equal(identifiable(gram, frozen, np.array([False, False, True])), [False, True, False])
+    np.testing.assert_array_equal(identifiable(gram, frozen, np.array([True, True, False])), [False, False, True])
+
+
+@pytest.mark.parametrize(("error", "kept"), [(0.999, True), (1.001, False)])
+@pytest.mark.parametrize("beside", [0.0, 0.6])
+def test_a_standard_error_of_the_plausible_size_is_the_largest_that_is_estimated(error, kept, beside):
+    """Alone as beside another parameter that is known better."""
+    gram = informed([0.01, 0.1 * error * beside], [0.1 * error * beside, error**2])
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(2, bool), np.zeros(2, bool)), [True, kept])
+
+
+@pytest.mark.parametrize(("sizes", "kept"), [((0.7, 0.6, 1.0), [True, False, True]), ((0.6, 0.7, 1.0), [False, True, True])])
+def test_what_is_told_worst_beside_all_others_goes_and_those_that_are_told_without_it_stay(sizes, kept):
+    """The third column is the sum of the first two but for a little: each of these is told without the other alone."""
+    left = np.linalg.qr(np.random.default_rng(46).standard_normal((40, 3)))[0]
+    left = np.column_stack([100 * left[:, 0], 100 * left[:, 1], 100 * (left[:, 0] + left[:, 1]) + 1.25 * left[:, 2]]) * sizes
+    gram = left.T @ left
+    deviation = np.sqrt(np.diag(np.linalg.inv(gram)))
+    np.testing.assert_allclose(deviation, 1 / (1.25 * np.array(sizes)), rtol=1e-3)
+    np.testing.assert_array_equal(identifiable(gram, np.zeros(3, bool), np.zeros(3, bool)), kept)
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.5e-11, False), (2e-11, True)])
+def test_what_rounding_leaves_of_large_squares_tells_nothing(share, kept):
+    """A hundred-thousand-millionth of the information: more than one in plausible sizes, and less than doubles carry."""
+    size = 1e14
+    gram = size * np.array([[1.0, 1.0], [1.0, 1.0 + share]])
+    assert share * size > 1.0
+    assert identifiable(gram, np.zeros(2, bool), np.zeros(2, bool)).tolist() == [True, kept]
+
+
+def test_a_step_from_a_present_value_ends_where_the_prior_and_the_data_balance():
+    """Of one parameter: the mean of data and prior by their information, wherever the step begins."""
+    information, prior, data = 4.0e4, 5e-3, 2e-2
+    for present in (0.0, 1e-2, -3e-2):
+        for plausible in (0.1, 1.0):
+            gram, along = np.array([[information * plausible**2]]), np.array([information * plausible * (data - present)])
+            step, covariance, held = solve_normal(gram, along, np.array([plausible]), False, prior**-2, present)
+            assert present + step[0] == pytest.approx(data * information / (information + prior**-2), rel=1e-12)
+            assert covariance[0, 0] == pytest.approx(1 / (information + prior**-2), rel=1e-12) and not held.any()
+
+
+def test_nothing_that_can_be_told_leaves_no_step_and_no_covariance():
+    step, covariance, held = solve_normal(np.diag([0.5, 0.9]), np.ones(2), np.array([2.0, 3.0]))
+    assert not step.any() and not covariance.any() and held.all()
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import statsmodels.api as sm
-from fitted_models import bent, model_of
+from fitted_models import bent, gantry_model, gantry_states, linear_law, model_of, seen_off, waves
+from scipy.optimize import minimize
 from scipy.stats import chi2
 from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
+from elastocal.effects.protocol import Candidate, Parameter, Shape
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.parameters import stepped
 from elastocal.fitting.prediction import residuals
+from elastocal.fitting.robust import robustly
 
 
 def robust_objective(found):
@@ -133,3 +136,197 @@ def test_fit_converges_where_measurements_share_an_error_and_the_model_misses_fa
     moved = np.concatenate(again.estimate.coefficients) - np.concatenate(found.estimate.coefficients)
     deviation = np.sqrt(np.diag(again.covariance))[-len(moved) :]
     assert (np.abs(moved) <= 0.1 * deviation).all()
+
+
+PRIORS = [None, 3e-5, None]
+SENSOR = Noise("declared", 1e-4, 5e-5, np.zeros(3))
+
+
+def with_outliers(rows, count=40):
+    """Observations of a linear law, of which five are far off; design (S, 3, 3) and what is off, in positions and turns."""
+    rng = np.random.default_rng(95)
+    states = replace(gantry_states(count), repeats=np.ones(count, int))
+    left = waves(states.joint_angles, 3)
+    off = 1e-4 * rng.standard_normal((count, 3)) + left @ [4e-5, -8e-5, 1e-4]
+    off[[3, 11, 17, 30, 38]] += 1e-3 * np.array([[1, 0, 0], [0, -2, 0], [0, 0, 3], [2, 2, 0], [5, 0, 0]])
+    turned = 5e-5 * rng.standard_normal((count, 3)) if rows == 6 else None
+    model = gantry_model(linear_law(3, PRIORS), rows=rows)
+    return model, seen_off(states, off, turned), left, off, turned
+
+
+def distances(off, turned, left, values, factor):
+    """Root mean square of what is left of each observation, in standard deviations of the noise taken."""
+    parts = [(off - left @ values) / 1e-4] if turned is None else [(off - left @ values) / 1e-4, turned / 5e-5]
+    return np.sqrt((np.concatenate(parts, axis=1) ** 2).mean(axis=1)) / factor
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_a_linear_problem_with_outliers_is_at_the_minimum_of_hubers_objective_with_its_priors(rows):
+    """By a general minimiser: each observation counts as its squares up to the 99 % quantile of its distance."""
+    model, seen, left, off, turned = with_outliers(rows)
+    corner = np.sqrt(chi2.ppf(0.99, rows) / rows)
+
+    def objective(scaled):
+        far = distances(off, turned, left, 1e-5 * scaled, 2.0)
+        huber = np.where(far <= corner, 0.5 * far**2, corner * far - 0.5 * corner**2)
+        return rows * huber.sum() + 0.5 * (1e-5 * scaled[1] / PRIORS[1]) ** 2
+
+    expected = minimize(objective, np.zeros(3), method="BFGS", options={"gtol": 1e-8}).x
+    # Of a noise taken so large that its scale is not estimated from the measurements.
+    found = fit(model, seen, SENSOR.scaled(2.0))
+    deviation = np.sqrt(np.diag(found.covariance))
+    assert found.converged and (found.weights < 1).sum() >= 4
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, 1e-5 * expected / deviation, rtol=0, atol=5e-3)
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+@pytest.mark.parametrize("taken", [0.2, 0.7, 1.0, 3.0])
+def test_weights_fall_with_the_distance_by_the_scale_of_the_errors_that_are_there(rows, taken):
+    """One up to the 99 % quantile, then its share; the scale is that of the median distance, but never below the noise."""
+    model, seen, left, off, turned = with_outliers(rows)
+    found = fit(model, seen, SENSOR.scaled(taken))
+    far = distances(off, turned, left, found.estimate.coefficients[0], taken)
+    scale = max(1.0, np.median(far) / np.sqrt(chi2.ppf(0.5, rows) / rows))
+    assert (scale > 1.3) == (taken < 0.75)
+    expected = np.minimum(1.0, np.sqrt(chi2.ppf(0.99, rows) / rows) * scale / far)
+    assert found.converged and (expected < 1).sum() >= 3
+    np.testing.assert_allclose(found.weights, expected, rtol=2e-3)
+    # The estimate solves the equations of these weights, its covariance is their inverse.
+    weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / (1e-4 * taken) ** 2
+    precision = weighted.T @ left.reshape(-1, 3) + np.diag([0.0, PRIORS[1] ** -2, 0.0])
+    values = np.linalg.solve(precision, weighted.T @ off.ravel())
+    deviation = np.sqrt(np.diag(np.linalg.inv(precision)))
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, values / deviation, rtol=0, atol=5e-3 * scale)
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), deviation, rtol=1e-6)
+
+
+def one_parameter(spread):
+    """A law of one parameter, observations whose errors are all of one size, in standard deviations; estimate and its error."""
+    states = replace(gantry_states(30), repeats=np.ones(30, int))
+    left = waves(states.joint_angles, 1)[..., 0]
+    off = 1e-4 * spread * np.random.default_rng(96).choice([-1.0, 1.0], (30, 3))
+    model = gantry_model(linear_law(1))
+    best, deviation = (left * off).sum() / (left**2).sum(), 1e-4 / np.sqrt((left**2).sum())
+    return model, seen_off(states, off), best, deviation
+
+
+@pytest.mark.parametrize(("spread", "settled"), [(0.5, 1e-3), (5.0, 1e-3), (0.5, 0.1), (5.0, 0.1)])
+@pytest.mark.parametrize(("share", "converged"), [(0.98, True), (-0.98, True), (1.02, False), (-1.02, False)])
+def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_error(
+    spread, settled, share, converged, monkeypatch
+):
+    """Of the errors that are there: of measurements that scatter more than the noise, of their own standard error."""
+    model, seen, best, deviation = one_parameter(spread)
+    # All distances are alike but for what the one parameter takes: their median is their root mean square.
+    scale = max(1.0, spread / np.sqrt(chi2.ppf(0.5, 3) / 3))
+    start = made_estimate(model, size=0.0)
+    start = replace(start, coefficients=(np.array([best + share * settled * scale * deviation]),))
+    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 1)
+    found = fit(model, seen, SENSOR, start, reweighted=True, settled=settled)
+    assert found.converged == converged
+    # The last step is taken all the same: a linear problem is solved by it.
+    assert found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-3 * settled * deviation)
+    # One that starts anew gives all observations one weight first, and does not trust that step.
+    assert not fit(model, seen, SENSOR, start, settled=settled).converged
+
+
+@pytest.mark.parametrize("moving", [0, 1, 2])
+def test_a_fit_has_not_converged_while_one_of_its_parameters_still_moves(moving, monkeypatch):
+    """The others are where they belong, and it moves by ten standard errors."""
+    left = waves(gantry_states(40).joint_angles, 3).reshape(120, 3)
+    # What measurements are off is nothing that the law could make: its best values are zero.
+    off = 1e-4 * np.random.default_rng(100).choice([-1.0, 1.0], 120)
+    off -= left @ np.linalg.lstsq(left, off)[0]
+    states = replace(gantry_states(40), repeats=np.ones(40, int))
+    start = np.linalg.inv(left.T @ left)[moving]
+    start = 10 * 1e-4 * start / np.sqrt(start[moving]) * (np.arange(3) == moving)
+    model = gantry_model(linear_law(3))
+    begin = replace(made_estimate(model, size=0.0), coefficients=(start,))
+    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 1)
+    assert not fit(model, seen_off(states, off.reshape(40, 3)), SENSOR.scaled(3.0), begin, reweighted=True).converged
+    nothing = replace(begin, coefficients=(np.zeros(3),))
+    assert fit(model, seen_off(states, off.reshape(40, 3)), SENSOR.scaled(3.0), nothing, reweighted=True).converged
+
+
+@pytest.mark.parametrize("frozen", [[True, False, False], [False, True, True]])
+def test_frozen_parameters_stay_and_the_others_are_best_beside_them(frozen):
+    model, seen, left, off, _ = with_outliers(3)
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([2e-4, -1e-4, 3e-4]),))
+    found = robustly(model, seen, conditions(model, start, seen.states), SENSOR, start, np.array(frozen))
+    values, free = found.estimate.coefficients[0], ~np.array(frozen)
+    np.testing.assert_array_equal(values[frozen], start.coefficients[0][frozen])
+    weighted = left.reshape(-1, 3) * np.repeat(found.weights, 3)[:, None] / 1e-8
+    pull = weighted.T @ (off - left @ values).ravel() - values * np.array([0.0, PRIORS[1] ** -2, 0.0])
+    assert (np.abs(np.linalg.solve(np.linalg.inv(found.covariance[np.ix_(free, free)]), pull[free])) < 1e-5).all()
+    assert found.held.tolist() == frozen and not found.covariance[np.array(frozen)].any()
+
+
+SATURATION = Shape("knee", "1", 0.5, 0.2, 3.0)
+
+
+def saturating(around, knee):
+    """A law that is taken up at a knee in the angle of joint 1, and another one that is partly like it."""
+    angle = around.joint_angles[:, 0]
+    return [{0: np.tanh(angle / knee)}, {0: beside(angle)}]
+
+
+def beside(angle):
+    return angle**2 + 0.5 * angle
+
+
+def saturated(knee, count=60):
+    """Observations of that law at a knee, which errors as large as the noise but of one size do not hide."""
+    law = Candidate("made_law", "made", (1,), "", tuple(Parameter(n, "m", 0.1) for n in "ab"), saturating, shapes=(SATURATION,))
+    states = replace(gantry_states(count), repeats=np.ones(count, int))
+    angle = states.joint_angles[:, 0]
+    off = 5e-5 * np.random.default_rng(97).choice([-1.0, 1.0], (count, 3))
+    off[:, 0] += 5e-3 * max(knee, 1.0) * np.tanh(angle / knee) - 3e-4 * beside(angle)
+    return gantry_model(law), seen_off(states, off), angle, off[:, 0]
+
+
+@pytest.mark.parametrize(("knee", "end"), [(0.05, 0.2), (6.0, 3.0)])
+@pytest.mark.parametrize("start", [0.5, 0.2, 3.0])
+def test_a_shape_beyond_its_range_is_fitted_at_its_end_and_the_others_are_best_there(knee, end, start):
+    model, seen, angle, off = saturated(knee)
+    begin = replace(made_estimate(model, size=0.0), shapes=(np.array([start]),))
+    found = fit(model, seen, SENSOR, begin)
+    assert found.converged and found.estimate.shapes[0][0] == end
+    left = np.column_stack([np.tanh(angle / end), beside(angle)])
+    root = np.sqrt(found.weights)
+    expected = np.linalg.lstsq(left * root[:, None], off * root)[0]
+    deviation = 1e-4 * np.sqrt(np.diag(np.linalg.inv((left * found.weights[:, None]).T @ left)))
+    np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-2)
+
+
+@pytest.mark.parametrize("knee", [0.3, 1.0])
+def test_a_shape_within_its_range_is_that_of_a_general_minimiser(knee):
+    model, seen, angle, off = saturated(knee)
+    found = fit(model, seen, SENSOR)
+
+    def squares(values):
+        return (((off - 1e-4 * values[0] * np.tanh(angle / values[2]) - 1e-4 * values[1] * beside(angle)) / 1e-4) ** 2).sum()
+
+    expected = minimize(
+        squares, [50.0, -3.0, knee], method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12, "maxfev": 4000}
+    ).x
+    deviation = np.sqrt(np.diag(found.covariance))
+    values = np.concatenate([found.estimate.coefficients[0], found.estimate.shapes[0]])
+    assert found.converged and (found.weights == 1.0).all()
+    np.testing.assert_allclose(values / deviation, expected * [1e-4, 1e-4, 1.0] / deviation, rtol=0, atol=2e-3)
+    assert SATURATION.lowest < found.estimate.shapes[0][0] < SATURATION.highest
+
+
+@pytest.mark.parametrize("begin", [0.2, 0.25, 1.5, 2.0])
+def test_no_step_of_a_fit_raises_its_objective(begin, monkeypatch):
+    """Step by step from a knee far off, by measurements of which none loses weight: squares fall to the least there is."""
+    model, seen, _, _ = saturated(0.6)
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([5e-3, -3e-4]),), shapes=(np.array([begin]),))
+    squares = [(residuals(model, start, seen, conditions(model, start, seen.states)) ** 2).sum()]
+    for steps in range(1, 9):
+        monkeypatch.setattr("elastocal.fitting.robust._STEPS", steps)
+        found = fit(model, seen, SENSOR.scaled(10.0), start)
+        squares.append((found.residual**2).sum())
+    assert found.converged and (found.weights == 1.0).all()
+    assert (np.diff(squares) <= 1e-9 * squares[0]).all()
+    # Errors are half the noise in each of 180 numbers, of which three parameters take up a little.
+    assert 0.9 * 180 * 25e-10 < squares[-1] < 180 * 25e-10 < 0.2 * squares[0]
