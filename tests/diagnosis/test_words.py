@@ -60,7 +60,7 @@ def test_locations_are_read_as_findings_write_them():
         ("lost_motion@3", "lost motion (backlash) of joint 3"),
         ("transmission_harmonic@1[orders 1-2]", "gear transmission error of joint 1 (orders 1-2)"),
         ("force_bias[base axes]", "zero error of the force sensor (base axes)"),
-        ("link_elasticity[column]", "elastic nonlinear and torsion of the column"),
+        ("link_elasticity[column]", "elastic bending and torsion of the column"),
     ],
 )
 def test_candidates_are_named_in_words(key, expected):

@@ -167,7 +167,7 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
     )
     assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
     assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
-    assert table.reading[3] == "R7, R10: joints of the first stage"
+    assert table.interpretation[3] == "R7, R10: joints of the first stage"
     assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
 
 

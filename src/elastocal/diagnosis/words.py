@@ -73,12 +73,12 @@ def effect_words(effect, locations=()):
     str
         Such as: gravity sag of joints 2 and 3.
     """
-    locations = []
+    parsed = []
     for location in filter(None, locations):
         found = _LOCATION.match(location)
         numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
-        locations.append((numbers, found["detail"]))
-    return physical_name(effect) + _where(effect, locations)
+        parsed.append((numbers, found["detail"]))
+    return physical_name(effect) + _where(effect, parsed)
 
 
 def found_words(effect, keys):

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.constants import g as standard_gravity
 
 from elastocal.mechanics.chain import Chain
 
-# Standard acceleration (ISO 80000-3), on a floor.
-STANDING = (0.0, 0.0, -standard_gravity)
+# m/s² (ISO 80000-3), on a floor; as scipy.constants.g, whose import costs a job of the study more than its work.
+STANDARD_GRAVITY = 9.80665
+STANDING = (0.0, 0.0, -STANDARD_GRAVITY)
 
 
 @dataclass(frozen=True)
