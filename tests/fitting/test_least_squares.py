@@ -28,6 +28,7 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.noise import Noise, measurement_covariances
 from elastocal.fitting.normal_equations import Parts
 from elastocal.fitting.parameters import parameters
+from elastocal.fitting.robust import robustly
 
 
 @pytest.mark.parametrize("rows", [3, 6])
@@ -339,16 +340,34 @@ def test_a_fit_to_more_than_it_starts_from_is_that_to_all_of_them(monkeypatch):
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-5)
 
 
-def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc):
-    """Exact measurements of the same targets from elsewhere give back the frame; of other targets they cannot."""
-    model = model_of(fanuc, "joint_offset@3", targets=TARGETS)
+def test_a_fit_settles_roughly_on_some_measurements_and_then_exactly_on_all(monkeypatch):
+    noise, calls = GANTRY_NOISES["joints"], []
+    model, seen, *_ = linear_problem(noise, 60)
+
+    def watched(model, observations, *rest, **options):
+        calls.append((len(observations), options["reweighted"], options["settled"]))
+        return robustly(model, observations, *rest, **options)
+
+    monkeypatch.setattr("elastocal.fitting.least_squares.robustly", watched)
+    monkeypatch.setattr("elastocal.fitting.least_squares._MOST_STARTED_FROM", 20)
+    fit(model, seen, noise, settled=1e-4)
+    (few, *first), (every, *last) = calls
+    assert few <= 24 and first == [False, ON_THE_WAY]
+    assert every == 60 and last == [True, 1e-4]
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_frames_are_fitted_to_targets_that_stay_as_they_were_found(fanuc, rows):
+    """Exact measurements of the same targets from elsewhere give back the frame; others have their own."""
+    model = model_of(fanuc, "joint_offset@3", targets=TARGETS, rows=rows)
     true = made_estimate(model, seed=36)
     fitted = fit(model, seen_exactly(model, true, made_states(6, 40, seed=37)), NOISE)
     elsewhere = replace(made_estimate(model, seed=38), coefficients=true.coefficients)
-    here = replace(elsewhere, target_offset=true.target_offset)
+    here = replace(elsewhere, target_offset=true.target_offset, target_rotation=true.target_rotation)
     states = made_states(6, 10, seed=39)
     found = fit_frames(fitted, model, seen_exactly(model, here, states), NOISE, own_targets=False)
-    np.testing.assert_array_equal(found.target_offset, fitted.estimate.target_offset)
+    for name in ("target_offset", "target_rotation"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(fitted.estimate, name))
     np.testing.assert_array_equal(found.coefficients[0], fitted.estimate.coefficients[0])
     np.testing.assert_allclose(found.frame_position, here.frame_position, rtol=0, atol=1e-7)
     np.testing.assert_allclose(found.frame_rotation, here.frame_rotation, rtol=0, atol=1e-7)

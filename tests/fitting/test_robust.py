@@ -210,24 +210,25 @@ def one_parameter(spread):
     return model, seen_off(states, off), best, deviation
 
 
-@pytest.mark.parametrize(("spread", "settled"), [(0.5, 1e-3), (5.0, 1e-3), (0.5, 0.1), (5.0, 0.1)])
+@pytest.mark.parametrize(("spread", "settled"), [(0.5, None), (5.0, None), (0.5, 0.1), (5.0, 0.1)])
 @pytest.mark.parametrize(("share", "converged"), [(0.98, True), (-0.98, True), (1.02, False), (-1.02, False)])
 def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_error(
     spread, settled, share, converged, monkeypatch
 ):
-    """Of the errors that are there: of measurements that scatter more than the noise, of their own standard error."""
+    """A thousandth unless told otherwise; of measurements that scatter more than the noise, of their own standard error."""
     model, seen, best, deviation = one_parameter(spread)
     # All distances are alike but for what the one parameter takes: their median is their root mean square.
     scale = max(1.0, spread / np.sqrt(chi2.ppf(0.5, 3) / 3))
+    options, largest = ({} if settled is None else {"settled": settled}), settled or 1e-3
     start = made_estimate(model, size=0.0)
-    start = replace(start, coefficients=(np.array([best + share * settled * scale * deviation]),))
+    start = replace(start, coefficients=(np.array([best + share * largest * scale * deviation]),))
     monkeypatch.setattr("elastocal.fitting.robust._STEPS", 1)
-    found = fit(model, seen, SENSOR, start, reweighted=True, settled=settled)
+    found = fit(model, seen, SENSOR, start, reweighted=True, **options)
     assert found.converged == converged
     # The last step is taken all the same: a linear problem is solved by it.
-    assert found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-3 * settled * deviation)
+    assert found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-3 * largest * deviation)
     # One that starts anew gives all observations one weight first, and does not trust that step.
-    assert not fit(model, seen, SENSOR, start, settled=settled).converged
+    assert not fit(model, seen, SENSOR, start, **options).converged
 
 
 @pytest.mark.parametrize("moving", [0, 1, 2])
@@ -238,8 +239,8 @@ def test_a_fit_has_not_converged_while_one_of_its_parameters_still_moves(moving,
     off = 1e-4 * np.random.default_rng(100).choice([-1.0, 1.0], 120)
     off -= left @ np.linalg.lstsq(left, off)[0]
     states = replace(gantry_states(40), repeats=np.ones(40, int))
-    start = np.linalg.inv(left.T @ left)[moving]
-    start = 10 * 1e-4 * start / np.sqrt(start[moving]) * (np.arange(3) == moving)
+    deviation = 3e-4 * np.sqrt(np.diag(np.linalg.inv(left.T @ left)))
+    start = 10 * deviation * (np.arange(3) == moving)
     model = gantry_model(linear_law(3))
     begin = replace(made_estimate(model, size=0.0), coefficients=(start,))
     monkeypatch.setattr("elastocal.fitting.robust._STEPS", 1)
@@ -298,6 +299,16 @@ def test_a_shape_beyond_its_range_is_fitted_at_its_end_and_the_others_are_best_t
     np.testing.assert_allclose(found.estimate.coefficients[0] / deviation, expected / deviation, rtol=0, atol=1e-2)
 
 
+def test_frozen_parameters_stay_where_a_shape_reaches_the_end_of_its_range():
+    model, seen, angle, off = saturated(0.05)
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([5e-3, 1e-4]),))
+    found = robustly(model, seen, conditions(model, start, seen.states), SENSOR, start, np.array([False, True, False]))
+    (value, frozen), (knee,) = found.estimate.coefficients[0], found.estimate.shapes[0]
+    assert (frozen, knee) == (1e-4, 0.2) and found.converged
+    along, left = np.tanh(angle / 0.2) * found.weights, off - 1e-4 * beside(angle)
+    assert value == pytest.approx((along @ left) / (along @ np.tanh(angle / 0.2)), abs=1e-2 * 1e-4 / np.sqrt(60))
+
+
 @pytest.mark.parametrize("knee", [0.3, 1.0])
 def test_a_shape_within_its_range_is_that_of_a_general_minimiser(knee):
     model, seen, angle, off = saturated(knee)
@@ -330,3 +341,29 @@ def test_no_step_of_a_fit_raises_its_objective(begin, monkeypatch):
     assert (np.diff(squares) <= 1e-9 * squares[0]).all()
     # Errors are half the noise in each of 180 numbers, of which three parameters take up a little.
     assert 0.9 * 180 * 25e-10 < squares[-1] < 180 * 25e-10 < 0.2 * squares[0]
+
+
+def test_a_linear_problem_is_solved_by_one_whole_step(monkeypatch):
+    """The second one finds nothing left to do."""
+    model, seen, best, deviation = one_parameter(0.5)
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([best + 1e3 * deviation]),))
+    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 2)
+    found = fit(model, seen, SENSOR.scaled(1e3), start)
+    assert found.converged and found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-6 * deviation)
+
+
+def test_a_fit_stays_where_no_step_of_it_lowers_the_objective_and_has_not_converged():
+    """A law that rises within a ten-thousandth of where it begins and falls everywhere else: its slope there misleads."""
+    misleading = Shape("place", "1", 0.0, -1.0, 1.0)
+
+    def displacement(around, place):
+        return [{0: np.ones(len(around.joint_angles)) * (1e-3 * np.tanh(1e4 * place) - place)}]
+
+    law = Candidate("made_law", "made", (1,), "", (Parameter("a", "m", 1.0),), displacement, shapes=(misleading,))
+    model, states = gantry_model(law), replace(gantry_states(12), repeats=np.ones(12, int))
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.ones(1),))
+    seen = seen_off(states, np.tile([2.0, 0.0, 0.0], (12, 1)))
+    found = robustly(model, seen, conditions(model, start, states), SENSOR.scaled(1e4), start, np.array([True, False]))
+    assert not found.held[1] and not found.converged
+    np.testing.assert_array_equal(found.estimate.shapes[0], 0.0)
+    np.testing.assert_allclose(found.residual[:, 0], 2.0)
