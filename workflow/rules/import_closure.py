@@ -36,7 +36,8 @@ def closure(script, source):
 
 @cache
 def _graph():
-    graph = grimp.build_graph(PACKAGE, include_external_packages=True, cache_dir=None)
+    # What is imported for annotations alone changes no result.
+    graph = grimp.build_graph(PACKAGE, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
     # A catalogue looks up the modules beside it by itself.
     for catalogue in graph.find_modules_that_directly_import("pkgutil"):
         for module in graph.find_children(catalogue.rpartition(".")[0]):
