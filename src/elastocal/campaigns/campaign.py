@@ -1,12 +1,21 @@
 """What a measured campaign is: its targets, its measurements and what it declares of itself."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.mechanics.robot import Robot
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from elastocal.mechanics.chain import Chain
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
@@ -27,7 +36,7 @@ class Target:
 
     name: str
     point: str
-    offset_m: tuple | None
+    offset_m: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
@@ -69,10 +78,10 @@ class Measurements:
     temperature_c: np.ndarray | None
     row: np.ndarray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.pose)
 
-    def select(self, mask_or_index):
+    def select(self, mask_or_index: np.ndarray) -> Measurements:
         """The measurements of a mask or of an index array, in its order.
 
         Parameters
@@ -84,7 +93,8 @@ class Measurements:
         Measurements
         """
         arrays = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Measurements(**{name: None if array is None else array[mask_or_index] for name, array in arrays.items()})
+        chosen: dict[str, Any] = {name: None if array is None else array[mask_or_index] for name, array in arrays.items()}
+        return Measurements(**chosen)
 
 
 @dataclass(frozen=True)
@@ -113,15 +123,15 @@ class Campaign:
     robot: Robot
     measured: str
     frame: str
-    targets: tuple
+    targets: tuple[Target, ...]
     compliance: str
-    declared: tuple
-    noise: dict | None
-    holdout: dict
+    declared: tuple[str, ...]
+    noise: dict[str, float] | None
+    holdout: dict[str, Any]
     measurements: Measurements
 
 
-def described_campaign(document, robot, measurements, source):
+def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
     """A campaign from its parts, which have been checked before.
 
     Parameters
@@ -151,7 +161,7 @@ def described_campaign(document, robot, measurements, source):
     )
 
 
-def targets_from(described, chain, source):
+def targets_from(described: Mapping[str, Any], chain: Chain, source: str) -> tuple[Target, ...]:
     """What a campaign says that it tracks.
 
     Parameters

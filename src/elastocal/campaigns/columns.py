@@ -1,15 +1,22 @@
 """Measurements to columns of tables and back."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.campaign import Measurements
 from elastocal.mechanics.components import COMPONENT_NAMES, WRENCH_NAMES
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 IDENTITY = ("session", "pose", "load", "repeat", "target", "row")
 
 
-def columns_of(measurements):
-    """Columns of the measurements table."""
+def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
+    """Columns of the measurements table, dict of str to ndarray (N,)."""
     count, joints = measurements.joint_angles.shape
     columns = {name: getattr(measurements, name) for name in IDENTITY}
     columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
@@ -21,8 +28,8 @@ def columns_of(measurements):
     return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c")}
 
 
-def measurements_from(columns):
-    """Measurements from the columns of their table."""
+def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
+    """Measurements from the columns of their table, dict of str to ndarray (N,)."""
     joints = sum(name.startswith("approach") for name in columns)
     return Measurements(
         **{name: columns[name] for name in IDENTITY},
@@ -36,8 +43,26 @@ def measurements_from(columns):
     )
 
 
-def residual_columns(measurements, held_out, outside, position, before, after):
-    """Columns of the residuals table."""
+def residual_columns(
+    measurements: Measurements, held_out: bool, outside: np.ndarray, position: np.ndarray, before: np.ndarray, after: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Columns of the residuals table.
+
+    Parameters
+    ----------
+    measurements : Measurements
+    held_out : bool
+    outside : ndarray of bool (N,)
+        Whether each lies outside of the range of the poses fitted.
+    position : ndarray (N, 3)
+        m, base axes.
+    before, after : ndarray (N, rows)
+        Residuals of the declared and of the found model, m and rad.
+
+    Returns
+    -------
+    dict of str to ndarray (N,)
+    """
     count, joints = measurements.joint_angles.shape
     columns = {name: getattr(measurements, name) for name in IDENTITY}
     columns |= {"held_out": np.full(count, held_out), "outside_range": outside}
@@ -52,9 +77,9 @@ def residual_columns(measurements, held_out, outside, position, before, after):
     return columns
 
 
-def _or_missing(values, shape):
+def _or_missing(values: np.ndarray | None, shape: tuple[int, ...]) -> np.ndarray:
     return np.full(shape, np.nan) if values is None else values
 
 
-def _or_none(values):
+def _or_none(values: np.ndarray) -> np.ndarray | None:
     return None if np.isnan(values).all() else values

@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def groups_of(keys):
+def groups_of(keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Group equal rows: `numpy.unique` along the first axis, many times as fast.
 
     Parameters

@@ -1,5 +1,9 @@
 """Which poses of a campaign are fitted and which are held out to test the fit."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.campaign import DOCUMENT
@@ -7,12 +11,19 @@ from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks
 from elastocal.errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
+
+    from elastocal.campaigns.campaign import Campaign, Measurements
+
 HOLDOUTS = ("fraction", "blocks", "session", "poses", "campaign")
 # Below these a fit or a test says nothing.
 FEWEST_TRAINING_POSES, FEWEST_HELD_OUT_POSES = 5, 2
 
 
-def split(campaign):
+def split(campaign: Campaign) -> tuple[Measurements, Measurements]:
     """Measurements to fit and measurements to test, parted by whole poses.
 
     Parameters
@@ -34,7 +45,7 @@ def split(campaign):
     return campaign.measurements.select(~held_out), campaign.measurements.select(held_out)
 
 
-def holdout_from(described, folder, source):
+def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[str, Any]:
     """How a campaign parts its measurements, in one way and with a seed where the poses are drawn.
 
     Parameters
@@ -67,7 +78,7 @@ def holdout_from(described, folder, source):
     return {"seed": 1} | described if drawn else dict(described)
 
 
-def held_out_mask(holdout, measurements, source):
+def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source: str) -> np.ndarray:
     """Which measurements are held out.
 
     Parameters
@@ -103,7 +114,7 @@ def held_out_mask(holdout, measurements, source):
     return chosen[index]
 
 
-def measured_poses(measurements):
+def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
     """The poses that were measured, each once.
 
     Parameters
@@ -122,7 +133,9 @@ def measured_poses(measurements):
     return pairs[first], index
 
 
-def _chosen_poses(holdout, measurements, pairs, index, source):
+def _chosen_poses(
+    holdout: Mapping[str, Any], measurements: Measurements, pairs: np.ndarray, index: np.ndarray, source: str
+) -> np.ndarray:
     """Mask (P,) of the poses that are held out; `pairs` and `index` as of `measured_poses`."""
     total, chosen = len(pairs), np.zeros(len(pairs), bool)
     if "poses" in holdout:

@@ -9,7 +9,7 @@ _ROUNDS = 100
 _LEVEL = 0.05
 
 
-def blocks(joint_angles, count):
+def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
     """Poses parted into blocks of neighbours whose sizes differ by one at most.
 
     Bisecting k-means [1]_ with parts of given size: a block is cut across its principal direction [2]_, then across the line
@@ -61,7 +61,7 @@ def blocks(joint_angles, count):
     return found
 
 
-def beyond_range(fitted_angles, joint_angles):
+def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
     """Poses at which a joint stands farther beyond those of other poses than chance explains.
 
     Of P + 1 poses drawn from a box, one stands beyond the others' range at one of the 2 n ends by more than a share t of that

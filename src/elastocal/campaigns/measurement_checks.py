@@ -1,12 +1,22 @@
 """Checks of measurements as a whole: what can be told wrong of them without fitting anything."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.campaigns.campaign import Measurements, Target
+    from elastocal.campaigns.measurements import MeasurementFile
+    from elastocal.mechanics.robot import Robot
 
 # Measurements of one pose share their joint angles up to what a controller's servo error can differ.
 _SAME_POSE_RAD = 0.02
@@ -20,7 +30,7 @@ _FARTHEST_REACHES = 10.0
 _LONGEST_TOOL_M = 1.0
 
 
-def check_angles(reported, table, robot):
+def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> None:
     """Refuse degrees: more turns than a joint has, or far beyond limits that a 57th of the angle keeps.
 
     Parameters
@@ -38,7 +48,7 @@ def check_angles(reported, table, robot):
     low, high = robot.joint_limits.T
     farthest = max(_FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
-    def inside(reported, margin=0.0):
+    def inside(reported: np.ndarray, margin: float = 0.0) -> np.ndarray:
         angles = robot.model_angles(reported)
         return (angles >= low - margin) & (angles <= high + margin)
 
@@ -54,7 +64,9 @@ def check_angles(reported, table, robot):
         raise table.cell_fault(index, table.angles[joint], f"{reported[index, joint]:g}", allowed)
 
 
-def check_measurements(measurements, table, robot, targets, source):
+def check_measurements(
+    measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target], source: str
+) -> None:
     """Refuse measurements that cannot be of one campaign in the units of the format.
 
     Parameters
@@ -87,7 +99,7 @@ def check_measurements(measurements, table, robot, targets, source):
             )
 
 
-def _check_duplicates(measurements, table, targets):
+def _check_duplicates(measurements: Measurements, table: MeasurementFile, targets: Sequence[Target]) -> None:
     key = np.column_stack(
         [measurements.session, measurements.pose, measurements.load, measurements.repeat, measurements.target]
     )
@@ -102,7 +114,7 @@ def _check_duplicates(measurements, table, targets):
         raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
 
 
-def _check_loads(measurements, table):
+def _check_loads(measurements: Measurements, table: MeasurementFile) -> None:
     unloaded = measurements.load == 0
     if not table.has(table.wrench) and not unloaded.all():
         index = int(np.argmin(unloaded))
@@ -117,7 +129,7 @@ def _check_loads(measurements, table):
         )
 
 
-def _check_poses(measurements, table):
+def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
     pairs, pose_of = measured_poses(measurements)
     first = np.full(len(pairs), len(measurements))
     np.minimum.at(first, pose_of, np.arange(len(measurements)))
@@ -131,7 +143,7 @@ def _check_poses(measurements, table):
         raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {_SAME_POSE_RAD} rad")
 
 
-def _check_units(measurements, table, robot, targets):
+def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> None:
     tool = max((np.linalg.norm(target.offset_m) for target in targets if target.offset_m is not None), default=_LONGEST_TOOL_M)
     reach = tool + sum(abs(transform.constant) for transform in robot.chain.transforms if transform.kind == "T")
     for session in np.unique(measurements.session):
@@ -147,7 +159,7 @@ def _check_units(measurements, table, robot, targets):
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
         if angle.max() > _FARTHEST_RAD:
-            index = int(np.argmax(angle))
+            turned = int(np.argmax(angle))
             raise table.cell_fault(
-                index, "rx, ry, rz", f"a turn of {angle[index]:.4g}", "a rotation vector in rad, not degrees"
+                turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", "a rotation vector in rad, not degrees"
             )

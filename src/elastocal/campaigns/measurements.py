@@ -1,8 +1,11 @@
 """Files of measurements: their columns, read cell by cell with the row of every fault, and written."""
 
+from __future__ import annotations
+
 import csv
 import difflib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -12,10 +15,14 @@ from elastocal.errors import InputError
 from elastocal.io.storage import Column
 from elastocal.mechanics.components import WRENCH
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
+    from typing import Any
+
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 
 
-def file_columns(joints):
+def file_columns(joints: int) -> dict[str, Column]:
     """Every column that a file of measurements may have.
 
     Parameters
@@ -44,7 +51,7 @@ def file_columns(joints):
     return {column.name: column for column in columns}
 
 
-def read_measurements(folder, joints, measured):
+def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFile:
     """Open the measurements of a campaign.
 
     Parameters
@@ -74,7 +81,7 @@ def read_measurements(folder, joints, measured):
     return MeasurementFile(path, columns, rows, joints, measured)
 
 
-def check_column_names(names, joints, path):
+def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     """Refuse a column that the format does not have.
 
     Parameters
@@ -98,7 +105,7 @@ def check_column_names(names, joints, path):
             raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)
 
 
-def write_measurements(path, table, joints):
+def write_measurements(path: str, table: Mapping[str, Sequence[Any] | np.ndarray], joints: int) -> None:
     """Write the measurements of a campaign.
 
     Parameters
@@ -113,7 +120,7 @@ def write_measurements(path, table, joints):
     (_write_csv if Path(path).name.startswith(CSV) else _write_parquet)(path, columns, table)
 
 
-def _read_csv(path):
+def _read_csv(path: str) -> tuple[dict[str, tuple[str, ...]], np.ndarray]:
     try:
         # A byte order mark is what spreadsheets write.
         with open(path, encoding="utf-8-sig", newline="") as file:
@@ -136,7 +143,7 @@ def _read_csv(path):
     return columns, np.array([number for number, _ in kept], np.int32)
 
 
-def _read_parquet(path):
+def _read_parquet(path: str) -> tuple[dict[str, Sequence[Any] | np.ndarray], np.ndarray]:
     try:
         table = pq.read_table(path)
         columns = [(name, _cells(column)) for name, column in zip(table.column_names, table.columns, strict=True)]
@@ -146,13 +153,13 @@ def _read_parquet(path):
     return dict(columns), np.arange(1, table.num_rows + 1, dtype=np.int32)
 
 
-def _cells(column):
+def _cells(column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
     """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
     numbers = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
     return column.to_numpy() if numbers and not column.null_count else column.to_pylist()
 
 
-def _check_header(path, names):
+def _check_header(path: str, names: Sequence[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise InputError(path, "header", f"column {name!r} twice", "each column once")
@@ -172,7 +179,9 @@ class MeasurementFile:
         Names of the columns that belong together; no orientation where positions are measured.
     """
 
-    def __init__(self, path, columns, rows, joints, measured):
+    def __init__(
+        self, path: str, columns: Mapping[str, Sequence[Any] | np.ndarray], rows: np.ndarray, joints: int, measured: str
+    ) -> None:
         self.path, self.columns, self.rows = path, columns, rows
         known = file_columns(joints)
         self.angles = [f"q{j}" for j in range(1, joints + 1)]
@@ -188,23 +197,23 @@ class MeasurementFile:
                 unit = f" in {known[name].unit}" if known[name].unit else ""
                 raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
 
-    def fault(self, key, found, allowed):
+    def fault(self, key: str, found: str, allowed: str) -> InputError:
         """InputError of this file."""
         return InputError(self.path, key, found, allowed)
 
-    def cell_fault(self, index, name, found, allowed):
+    def cell_fault(self, index: int, name: str, found: str, allowed: str) -> InputError:
         """InputError of one cell; `index` counts the measurements."""
         return self.fault(f"row {self.rows[index]}, column {name}", found, allowed)
 
-    def has(self, names):
+    def has(self, names: Iterable[str]) -> bool:
         """Whether all of some columns are there."""
         return all(name in self.columns for name in names)
 
-    def numbers(self, names):
+    def numbers(self, names: Iterable[str]) -> np.ndarray:
         """ndarray (N, len(names)) of finite numbers."""
         return np.column_stack([self._column(name) for name in names])
 
-    def integers(self, name):
+    def integers(self, name: str) -> np.ndarray:
         """ndarray of int32 (N,)."""
         values = self._column(name)
         wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
@@ -213,11 +222,11 @@ class MeasurementFile:
             raise self.cell_fault(index, name, shown(self.columns[name][index]), "an integer")
         return values.astype(np.int32)
 
-    def texts(self, name):
+    def texts(self, name: str) -> list[str]:
         """list of str (N,)."""
         return [str(cell).strip() for cell in self.columns[name]]
 
-    def _column(self, name):
+    def _column(self, name: str) -> np.ndarray:
         try:
             values = np.array(self.columns[name], float)
         except (ValueError, TypeError):
@@ -229,7 +238,7 @@ class MeasurementFile:
         return values
 
 
-def _is_number(cell):
+def _is_number(cell: Any) -> bool:
     try:
         np.array([cell], float)
     except (ValueError, TypeError):
@@ -237,13 +246,13 @@ def _is_number(cell):
     return True
 
 
-def shown(cell):
+def shown(cell: Any) -> str:
     """A cell as an error shows it."""
     text = str(cell).strip() if cell is not None else ""
     return repr(text[:40]) if text else "nothing"
 
 
-def _write_csv(path, columns, table):
+def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
     with open(path, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([column.name for column in columns])
@@ -251,13 +260,13 @@ def _write_csv(path, columns, table):
         writer.writerows(zip(*(np.asarray(table[column.name]).tolist() for column in columns), strict=True))
 
 
-def _write_parquet(path, columns, table):
+def _write_parquet(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
     fields = [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
     arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in fields]
     pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, compression="zstd")
 
 
-def closest_first(name, known):
+def closest_first(name: str, known: Collection[str]) -> str:
     """What is allowed instead of a name: the closest first."""
     lower = {other.lower(): other for other in known}
     close = difflib.get_close_matches(str(name).lower(), lower, n=1)

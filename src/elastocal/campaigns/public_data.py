@@ -39,7 +39,7 @@ class PublicFile:
     licence: str
 
     @property
-    def address(self):
+    def address(self) -> str:
         """Where the file is downloaded from; the commit fixes its contents."""
         return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{self.path}"
 
@@ -108,7 +108,7 @@ FILES = {
 }
 
 
-def fetch(name, folder):
+def fetch(name: str, folder: str | Path) -> Path:
     """A file of public data with the contents that this project knows: from `FOLDER_VARIABLE`, else downloaded once.
 
     Parameters

@@ -5,7 +5,10 @@ of one target. All that can be told wrong without fitting anything is refused he
 wrong is left for the diagnosis to trace.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,8 +20,16 @@ from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Sequence
+    from typing import Any
 
-def read_campaign(folder, robots_folder, effects=None):
+    from elastocal.campaigns.campaign import Campaign, Target
+    from elastocal.campaigns.measurements import MeasurementFile
+    from elastocal.mechanics.robot import Robot
+
+
+def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None) -> Campaign:
     """Read a campaign and check it as a whole.
 
     Parameters
@@ -55,7 +66,7 @@ def read_campaign(folder, robots_folder, effects=None):
     return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
 
 
-def read_descriptions(folder, robots_folder):
+def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
     """What a campaign says of itself, and where its robot is described.
 
     Parameters
@@ -80,7 +91,7 @@ def read_descriptions(folder, robots_folder):
     return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
 
 
-def campaign_files(folder, robots_folder):
+def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
     """Files that a campaign is read from, those of the campaign that holds its test included.
 
     Parameters
@@ -104,7 +115,7 @@ def campaign_files(folder, robots_folder):
     return [path.as_posix() for path in files] + beyond
 
 
-def read_robot(path):
+def read_robot(path: str | Path) -> Robot:
     """Read a robot file.
 
     Parameters
@@ -126,7 +137,9 @@ def read_robot(path):
     return robot_from_document(document, source)
 
 
-def held_out_campaign(campaign, folder, robots_folder, effects=None):
+def held_out_campaign(
+    campaign: Campaign, folder: str | Path, robots_folder: str | Path, effects: Collection[str] | None = None
+) -> Campaign | None:
     """The other campaign that tests this one.
 
     Parameters
@@ -163,7 +176,7 @@ def held_out_campaign(campaign, folder, robots_folder, effects=None):
     return other
 
 
-def folds_of(folder, robots_folder, number, of):
+def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int) -> dict[str, Any]:
     """Poses of one fold of a campaign, as in ``holdout`` of ``campaign.yaml``.
 
     Of K-fold cross-validation [1]_ by whole poses.
@@ -190,7 +203,7 @@ def folds_of(folder, robots_folder, number, of):
     return {"poses": pairs[number - 1 :: of].tolist()}
 
 
-def _robot_path(name, folder, robots_folder, source):
+def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:
     known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
     path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
     if not path.is_file():
@@ -201,7 +214,7 @@ def _robot_path(name, folder, robots_folder, source):
     return path
 
 
-def _measurements(table, robot, targets):
+def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> Measurements:
     reported = table.numbers(table.angles)
     check_angles(reported, table, robot)
     names = {target.name: index for index, target in enumerate(targets)}

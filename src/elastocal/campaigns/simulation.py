@@ -1,6 +1,9 @@
 """Campaigns of a simulated robot: ladders of loads at random poses, read with noise, as a calibrator would measure them."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -10,6 +13,9 @@ from elastocal.mechanics.elastostatics import generalized_forces, wrench_of_offs
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.random_streams import stream
+
+if TYPE_CHECKING:
+    from elastocal.mechanics.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -33,18 +39,18 @@ class Plan:
         Standard deviation of each component of a measurement.
     """
 
-    points: tuple
+    points: tuple[str, ...]
     poses: int
     force_N: float
-    ladder: tuple
-    offset_m: tuple
+    ladder: tuple[float, ...]
+    offset_m: tuple[float, ...]
     repeats: int
     repeated_poses: int
     noise_m: float
     noise_rad: float
 
 
-def simulated_measurements(robot, plan, seed, name):
+def simulated_measurements(robot: Robot, plan: Plan, seed: int, name: str) -> dict[str, np.ndarray]:
     """Measurements of a robot with elastic joints and, where it has them, elastic links.
 
     Springs yield by the virtual joint method, see `mechanics.elastostatics`; poses are exact.

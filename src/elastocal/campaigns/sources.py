@@ -1,14 +1,22 @@
 """Which campaigns a configuration names and where they come from, and the user's own: checked before any job starts."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.reading import read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
 
-def campaign_sources(config, folder, source="config.yaml"):
+
+def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
     """Where the campaigns that a configuration names come from.
 
     Parameters
@@ -41,7 +49,7 @@ def campaign_sources(config, folder, source="config.yaml"):
     return found
 
 
-def user_campaign(config, robots_folder):
+def user_campaign(config: Mapping[str, Any], robots_folder: str | Path) -> dict[str, str]:
     """A user's own campaign, checked as a whole before any job starts.
 
     Parameters

@@ -1,6 +1,9 @@
 """A campaign's folder, written so that it is never half a campaign."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -9,8 +12,20 @@ from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, w
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.documents import check_document
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
-def write_campaign(folder, document, table, joints, kind="parquet"):
+    import numpy as np
+
+
+def write_campaign(
+    folder: str | Path,
+    document: Mapping[str, Any],
+    table: Mapping[str, Sequence[Any] | np.ndarray],
+    joints: int,
+    kind: str = "parquet",
+) -> None:
     """Write a campaign's folder; each file appears whole or not at all, ``campaign.yaml`` last.
 
     Parameters

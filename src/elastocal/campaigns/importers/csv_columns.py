@@ -1,16 +1,23 @@
 """Sources that are tables of text with a header: their columns by name, and the numbers in these."""
 
+from __future__ import annotations
+
 import csv
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+    from pathlib import Path
+
 _DECIMAL_WORDS = {",": "a number with a decimal comma", ".": "a number"}
 
 
-def read_columns(path, separator, needed, kind):
+def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: str) -> dict[str, tuple[str, ...]]:
     """Cells of a table, column by column; blank lines are left out.
 
     Parameters
@@ -52,7 +59,7 @@ def read_columns(path, separator, needed, kind):
     return dict(zip(header, zip(*rows, strict=True), strict=True))
 
 
-def numbers(path, name, cells, decimal="."):
+def numbers(path: str | Path, name: str, cells: Sequence[str], decimal: str = ".") -> np.ndarray:
     """Numbers of one column.
 
     Parameters

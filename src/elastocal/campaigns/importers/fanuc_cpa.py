@@ -1,9 +1,18 @@
 """FANUC R-2000iC/165F, one joint moved at a time (RABKKK/LaserTrackerPoseData4KinIdent): a text file as a campaign."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
 
 ROBOT, TARGETS = "fanuc_cpa", ("D", "E", "F")
 # Three reflectors in mm, six zeros, six angles of the controller in degrees.
@@ -12,7 +21,7 @@ _COLUMNS, _ANGLES = 21, slice(15, 21)
 NOISE = {"position_m": 5.2e-5}
 
 
-def read(path):
+def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of the text file.
 
     Parameters
@@ -54,7 +63,9 @@ def read(path):
     return np.radians(values[:, _ANGLES]), {name: 1e-3 * values[:, 3 * i : 3 * i + 3] for i, name in enumerate(TARGETS)}
 
 
-def write_campaign(path, folder, name="fanuc_cpa", holdout=None):
+def write_campaign(
+    path: str | Path, folder: str | Path, name: str = "fanuc_cpa", holdout: Mapping[str, Any] | None = None
+) -> None:
     """Write the text file as a campaign's folder.
 
     Parameters

@@ -1,6 +1,9 @@
 """Both sessions of the FANUC as one campaign: one robot, two tools, two tracker frames."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +14,22 @@ from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.reading import read_robot
 from elastocal.campaigns.writing import write_campaign as write_folder
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
 # Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
 ROBOT = "fanuc_measured"
 
 
-def write_campaign(static_path, cpa_path, folder, robots_folder, name="fanuc_joint", holdout=None):
+def write_campaign(
+    static_path: str | Path,
+    cpa_path: str | Path,
+    folder: str | Path,
+    robots_folder: str | Path,
+    name: str = "fanuc_joint",
+    holdout: Mapping[str, Any] | None = None,
+) -> None:
     """Write both sources as the sessions 0 (static) and 1 (cpa) of one campaign.
 
     Parameters

@@ -1,15 +1,24 @@
 """FANUC R-2000iC/165F, 24 configurations with 10 repeats (Sarrasor/RoboticManipulators): a MAT file as a campaign."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import scipy.io
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
+
 ROBOT, TARGETS = "fanuc_static", ("A", "B", "C")
 
 
-def read(path):
+def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Measurements of the MAT file.
 
     Parameters
@@ -42,7 +51,9 @@ def read(path):
     return found["q"], {target: found[f"m{target}"] for target in TARGETS}
 
 
-def write_campaign(path, folder, name="fanuc_static", holdout=None):
+def write_campaign(
+    path: str | Path, folder: str | Path, name: str = "fanuc_static", holdout: Mapping[str, Any] | None = None
+) -> None:
     """Write the MAT file as a campaign's folder.
 
     Parameters

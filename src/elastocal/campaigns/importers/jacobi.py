@@ -4,6 +4,10 @@ Measured with a GTS3800 laser tracker for P. Jacobi's master's thesis (Tsinghua 
 position of the reflector, which the nominal chain and a tool along its last axis reproduce to 12 um, and a difference from it.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns
@@ -11,6 +15,11 @@ from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+    from typing import Any
 
 TARGET = "SMR"
 # Robots of the source by their number of joints.
@@ -21,7 +30,7 @@ NOISE = {"position_m": 1.5e-5}
 COMMANDED, DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")
 
 
-def read(path):
+def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     """Measurements of one file.
 
     Parameters
@@ -49,13 +58,19 @@ def read(path):
         found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
         raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOTS))}")
 
-    def table(names):
+    def table(names: Iterable[str]) -> np.ndarray:
         return np.column_stack([numbers(path, name, cells[name]) for name in names])
 
     return np.radians(table(names)), 1e-3 * (table(COMMANDED) + table(DIFFERENCE))
 
 
-def write_campaign(path, folder, name, holdout=None, noise=NOISE):
+def write_campaign(
+    path: str | Path,
+    folder: str | Path,
+    name: str,
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = NOISE,
+) -> None:
     """Write one file as a campaign's folder.
 
     Parameters

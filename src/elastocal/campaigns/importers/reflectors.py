@@ -1,13 +1,28 @@
 """Campaigns of several reflectors on one flange, unloaded: what both FANUC sources are."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
 
-def reflector_table(pose, repeat, joint_angles, positions, session=None):
+
+def reflector_table(
+    pose: np.ndarray,
+    repeat: np.ndarray,
+    joint_angles: np.ndarray,
+    positions: Mapping[str, np.ndarray],
+    session: int | None = None,
+) -> dict[str, np.ndarray]:
     """Columns of measurements, one row for each reflector of each measurement.
 
     Parameters
@@ -33,7 +48,15 @@ def reflector_table(pose, repeat, joint_angles, positions, session=None):
     return table | {axis: measurements[:, i] for i, axis in enumerate("xyz")}
 
 
-def write_reflectors(folder, name, robot, joint_angles, positions, holdout=None, noise=None):
+def write_reflectors(
+    folder: str | Path,
+    name: str,
+    robot: str,
+    joint_angles: np.ndarray,
+    positions: Mapping[str, np.ndarray],
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = None,
+) -> None:
     """Write measurements of one session as a campaign's folder.
 
     Parameters

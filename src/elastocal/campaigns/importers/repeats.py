@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 
-def pose_and_repeat(joint_angles, tolerance_rad=0.0):
+def pose_and_repeat(joint_angles: np.ndarray, tolerance_rad: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Number poses by their joint angles.
 
     Single-linkage clusters [1]_ by the largest difference of angles, cut at the tolerance.

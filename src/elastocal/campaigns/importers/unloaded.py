@@ -1,10 +1,26 @@
 """What all public campaigns have in common: a tracker's measurements of an unloaded flange, in a frame that nobody knows."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from typing import Any
+
 # What such data can be fitted with at all before any physics is looked for.
 _DECLARED = ("joint_offset", "link_geometry")
 
 
-def unloaded_document(name, robot, measured, targets, holdout=None, noise=None, point="6DoF"):
+def unloaded_document(
+    name: str,
+    robot: str,
+    measured: str,
+    targets: Iterable[str],
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = None,
+    point: str = "6DoF",
+) -> dict[str, Any]:
     """Contents of ``campaign.yaml``: targets on the flange whose offsets nobody knows.
 
     Parameters

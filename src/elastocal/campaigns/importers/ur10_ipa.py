@@ -1,6 +1,9 @@
 """Universal Robots UR10 with a T-Mac on its flange (christianlandgraf/ipa-robot-accuracy): Series A and B as campaigns."""
 
+from __future__ import annotations
+
 from datetime import datetime
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -9,6 +12,11 @@ from elastocal.campaigns.importers.csv_columns import numbers, read_columns
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign as write_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+    from typing import Any
 
 ROBOT, TARGET = "ur10", "TMac"
 # One measurement of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median
@@ -34,7 +42,7 @@ _SAME_POSE_RAD = 1e-4
 _TIME_FORMAT = "%Y%m%d%H%M%S"
 
 
-def read(path):
+def read(path: str | Path) -> dict[str, np.ndarray]:
     """Measurements of one series.
 
     Parameters
@@ -54,7 +62,7 @@ def read(path):
     """
     cells = read_columns(path, ";", (*ANGLES, *POSITION, *ORIENTATION), "a series of ipa-robot-accuracy")
 
-    def table(names):
+    def table(names: Iterable[str]) -> np.ndarray:
         return np.column_stack([numbers(path, name, cells[name], ",") for name in names])
 
     found = {
@@ -68,7 +76,13 @@ def read(path):
     return found if times is None else found | {"time_s": times}
 
 
-def write_campaign(path, folder, name, holdout=None, noise=NOISE):
+def write_campaign(
+    path: str | Path,
+    folder: str | Path,
+    name: str,
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = NOISE,
+) -> None:
     """Write one series as a campaign's folder.
 
     Parameters
@@ -98,7 +112,7 @@ def write_campaign(path, folder, name, holdout=None, noise=NOISE):
     write_folder(folder, unloaded_document(name, ROBOT, "pose", [TARGET], holdout, noise), table, angles.shape[1])
 
 
-def _times(cells):
+def _times(cells: Iterable[str]) -> np.ndarray | None:
     """Seconds since the first row; None where a spreadsheet has cut the stamps down to 2,02011E+13."""
     try:
         stamps = [datetime.strptime(cell, _TIME_FORMAT) for cell in cells]
