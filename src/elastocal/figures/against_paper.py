@@ -1,9 +1,19 @@
 """Figures that hold the study against the paper's printed figures."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.figures.style import PALETTE, panels, styled
 from elastocal.study.comparison import ACCEPTED_Z
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 MILLI = 1e3
 # Beyond this, a z score is drawn at the margin with an arrow.
@@ -11,7 +21,7 @@ _MARGIN = 8.0
 
 
 @styled
-def scores(comparison):
+def scores(comparison: pd.DataFrame) -> Figure:
     """Distance of each printed figure from ours, in Monte Carlo standard deviations.
 
     Parameters
@@ -46,7 +56,7 @@ def scores(comparison):
 
 
 @styled
-def table2_samples(initial, reference, titles):
+def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
     """Statistics of single data sets, in which the paper's Table 2 lies, although it is far from all data sets together.
 
     Parameters

@@ -1,6 +1,9 @@
 """Errors on held-out poses, model by model."""
 
+from __future__ import annotations
+
 import textwrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -10,6 +13,13 @@ from matplotlib.ticker import FuncFormatter
 from elastocal.diagnosis.words import in_words
 from elastocal.figures.residuals import MICRO, MILLI
 from elastocal.figures.style import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 METRICS = {"mean": "mean", "rms": "RMS", "p95": "95th percentile", "max": "maximum"}
 LOOKS = {
@@ -23,7 +33,7 @@ _LINE = 26
 
 
 @styled
-def before_after(steps, noise_floor_m=None):
+def before_after(steps: Sequence[Mapping[str, Any]], noise_floor_m: float | None = None) -> Figure:
     """Bars of the errors on held-out poses, one for each model.
 
     Parameters
@@ -70,22 +80,22 @@ def before_after(steps, noise_floor_m=None):
     return figure
 
 
-def _interval(axis, value, low, high, row):
+def _interval(axis: Axes, value: float, low: float, high: float, row: float) -> None:
     """A line from end to end; an arrow where it is open above; nothing where there is none."""
     axis.plot([low, value if np.isinf(high) else high], [row, row], color="black", linewidth=1.1, gid="interval")
     if np.isinf(high):
         axis.plot(value, row, ">", color="black", markersize=4, gid="open interval")
 
 
-def step_name(name, most=3):
+def step_name(name: str, most: int = 3) -> str:
     """Name of a model for people: words, with the ends of long lists left out, in lines that fit beside the bars."""
     parts = in_words(name).split(", ")
     rest = f" and {len(parts) - most} more" if len(parts) > most else ""
     return textwrap.fill(", ".join(parts[:most]) + rest, _LINE)
 
 
-def _legend(kinds, noise_floor_m):
-    handles = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
+def _legend(kinds: Collection[str], noise_floor_m: float | None) -> list[Artist]:
+    handles: list[Artist] = [Patch(color=color, label=label) for kind, (color, label) in LOOKS.items() if kind in kinds]
     handles.append(Line2D([], [], color="black", linewidth=1.1, label="95 % interval over poses"))
     handles.append(
         Line2D(

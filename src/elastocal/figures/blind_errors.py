@@ -1,11 +1,20 @@
 """Held-out errors of the blind cases against those of the oracle that knows the effect."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeVar
+
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from elastocal.blind.robots import leading
 from elastocal.figures.style import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MICRO = 1e6
 _GROUPS = ("single", "pair")
@@ -16,9 +25,12 @@ _DECADE = 4.0
 _TO_SCALE = 0.1
 _MARKS = (-10, -1, -0.1, 0, 0.1, 1, 5, 20, 100)
 
+# A number or a column of a table.
+_Ratio = TypeVar("_Ratio", "float", "pd.Series")
+
 
 @styled
-def errors_against_oracle(cases):
+def errors_against_oracle(cases: pd.DataFrame) -> Figure:
     """Held-out RMS after the diagnosis against the oracle's, case by case, and the ratio of the two by size.
 
     Parameters
@@ -74,11 +86,11 @@ def errors_against_oracle(cases):
     return figure
 
 
-def _percent(ratio):
+def _percent(ratio: _Ratio) -> _Ratio:
     return 100.0 * (ratio - 1.0)
 
 
-def _shares(axis, part, color, dashes, label):
+def _shares(axis: Axes, part: pd.DataFrame, color: str, dashes: str, label: str) -> None:
     excess = np.sort(_percent(part.after_rms_m / part.oracle_rms_m).to_numpy())
     steps = 100.0 * np.arange(len(excess) + 1) / len(excess)
     axis.step([*excess, excess[-1]], steps, where="pre", color=color, linestyle=dashes, linewidth=1.2, label=label)

@@ -1,5 +1,9 @@
 """Heat maps of the blind proof: what is found at which size beside the oracle, and what is said for what."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Rectangle
@@ -7,6 +11,11 @@ from matplotlib.patches import Rectangle
 from elastocal.blind.confusion import PAIR, WORDS
 from elastocal.blind.robots import leading
 from elastocal.figures.style import PALETTE, note, panels, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 PANELS = {
     "oracle_detected": "the oracle\ndetects",
@@ -23,7 +32,7 @@ _ALL, _NONE, _OUTSIDE = "all", "none", "outside:"
 
 
 @styled
-def power_map(power):
+def power_map(power: pd.DataFrame) -> Figure:
     """Shares detected and named for each effect and size, beside the oracle that knows the effect.
 
     Parameters
@@ -61,7 +70,7 @@ def power_map(power):
 
 
 @styled
-def confusion_map(confusion):
+def confusion_map(confusion: pd.DataFrame) -> Figure:
     """What was said for what was true, at the largest sizes.
 
     Parameters
@@ -78,8 +87,8 @@ def confusion_map(confusion):
         return note("This run has no case in the usual setting.")
     largest = usual[usual.level == usual.groupby("truth")["level"].transform("max")].set_index("truth")
     counts = largest.drop(columns=["robots", "settings", "level"])
-    named, words = [column for column in counts if column not in WORDS], [*WORDS]
-    groups = [
+    named, words = [column for column in counts.columns if column not in WORDS], [*WORDS]
+    groups: list[list[str]] = [
         [name for name in named if name in counts.index],
         [name for name in (PAIR,) if name in counts.index],
         sorted(name for name in counts.index if name.startswith(_OUTSIDE)),
@@ -110,11 +119,11 @@ def confusion_map(confusion):
     return figure
 
 
-def _at(table, effect, level, column):
-    return float(table.loc[(effect, level), column]) if (effect, level) in table.index else np.nan
+def _at(table: pd.DataFrame, effect: str, level: float, column: str) -> float:
+    return float(table[column].loc[(effect, level)]) if (effect, level) in table.index else np.nan
 
 
-def _heat(axis, shares, size):
+def _heat(axis: Axes, shares: np.ndarray, size: float) -> None:
     axis.imshow(np.ma.masked_invalid(shares), cmap=_SHARES, vmin=0, vmax=1, interpolation="nearest", aspect="auto")
     for row, column in np.argwhere(np.isfinite(shares)):
         if shares[row, column] >= _LEAST_WRITTEN:
@@ -126,6 +135,6 @@ def _heat(axis, shares, size):
     axis.spines[:].set_visible(False)
 
 
-def _name(name):
+def _name(name: str) -> str:
     known = {_ALL: "all effects", _NONE: "no effect", PAIR: "two effects"}
     return known.get(name, name.replace("_", " ").replace(_OUTSIDE, "outside: "))

@@ -1,6 +1,9 @@
 """Rates of the blind proof as dots with their intervals: against the targets, and how often intervals hold the truth."""
 
+from __future__ import annotations
+
 import textwrap
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 from matplotlib.lines import Line2D
@@ -8,6 +11,14 @@ from matplotlib.patches import Patch
 
 from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.figures.style import PALETTE, note, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
 _COMPARABLE = {
@@ -21,8 +32,40 @@ _LINE = 40
 _PER_CENT = 100.0
 
 
+class _Aim(NamedTuple):
+    """What a row of the summary aims at."""
+
+    quantity: str
+    target_low: float
+    target_high: float
+
+
+class _Rate(NamedTuple):
+    """What a row of the summary has reached."""
+
+    quantity: str
+    rate: float
+    low: float
+    high: float
+
+
+class _Coverage(NamedTuple):
+    """What is drawn of a row of the coverage table."""
+
+    kind: str
+    effect: str
+    comparable: str
+    rate: float
+    low: float
+    high: float
+    cases: int
+
+
+_Row = TypeVar("_Row", bound="NamedTuple")
+
+
 @styled
-def rates_and_targets(summary):
+def rates_and_targets(summary: pd.DataFrame) -> Figure:
     """Every figure that has a target, with its interval and the range that the target leaves.
 
     Parameters
@@ -45,7 +88,7 @@ def rates_and_targets(summary):
     farthest = np.nanmax(np.abs(_PER_CENT * (aimed[ratio][["rate", "low", "high"]].to_numpy(float) - 1.0)), initial=6.0)
     axes[1, 0].set(xlim=(-1.1 * farthest, 1.1 * farthest), xlabel="held-out RMS above the oracle's (%)")
     present = [robots for robots in LOOKS if robots in set(aimed.robots)]
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=LOOKS[robots][0], marker=LOOKS[robots][1], markersize=4.5, linewidth=1.2, label=LOOKS[robots][2])
         for robots in present
     ]
@@ -55,7 +98,7 @@ def rates_and_targets(summary):
 
 
 @styled
-def coverage_by_effect(coverage):
+def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
     """How often 95 % intervals hold the truth, for each kind of parameter.
 
     Parameters
@@ -73,9 +116,9 @@ def coverage_by_effect(coverage):
         return note("This run has no interval that a truth can be compared with.")
     of_effects = rows[rows.kind == "effect"].sort_values(["effect"])
     order = [
-        *rows[rows.kind != "effect"].itertuples(),
-        *of_effects[of_effects.effect == "all"].itertuples(),
-        *of_effects[of_effects.effect != "all"].itertuples(),
+        *_rows(_Coverage, rows[rows.kind != "effect"]),
+        *_rows(_Coverage, of_effects[of_effects.effect == "all"]),
+        *_rows(_Coverage, of_effects[of_effects.effect != "all"]),
     ]
     figure, axes = panels(1, 1, 34 + 5.2 * max(len(order), 2))
     axis = axes[0, 0]
@@ -95,7 +138,7 @@ def coverage_by_effect(coverage):
     )
     axis.grid(visible=False, axis="y")
     present = {row.comparable for row in order}
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=PALETTE[0], marker=marker, markersize=4.5, linewidth=1.2, label=label)
         for key, (marker, label) in _COMPARABLE.items()
         if key in present
@@ -105,22 +148,27 @@ def coverage_by_effect(coverage):
     return figure
 
 
-def _coverage_name(row):
+def _rows(kind: type[_Row], table: pd.DataFrame) -> list[_Row]:
+    """Rows of a table, as far as the kind of row needs them."""
+    return [kind._make(row) for row in table[[*kind._fields]].itertuples(index=False, name=None)]
+
+
+def _coverage_name(row: _Coverage) -> str:
     if row.kind == "effect":
         return "parameters of all effects" if row.effect == "all" else row.effect.replace("_", " ")
     return "joint " + row.kind.replace("compliance, ", "compliances, ")
 
 
-def _dots(axis, rows, names, scaled):
+def _dots(axis: Axes, rows: pd.DataFrame, names: list[str], scaled: Callable[[float], float]) -> None:
     robots = [key for key in LOOKS if key in set(rows.robots)]
-    for row in rows.drop_duplicates("quantity").itertuples():
-        place = names.index(row.quantity)
-        low, high = (scaled(value) for value in (row.target_low, row.target_high))
+    for aim in _rows(_Aim, rows.drop_duplicates("quantity")):
+        place: float = names.index(aim.quantity)
+        low, high = (scaled(value) for value in (aim.target_low, aim.target_high))
         # A target of a single value is a line that can be seen.
         axis.barh(place, max(high - low, 0.8), left=low - (0.4 if high == low else 0.0), height=0.86, color=_AIM, zorder=0)
     for number, key in enumerate(robots):
         color, marker, _ = LOOKS[key]
-        for row in rows[rows.robots == key].itertuples():
+        for row in _rows(_Rate, rows[rows.robots == key]):
             place = names.index(row.quantity) + 0.32 * (number - (len(robots) - 1) / 2)
             axis.plot([scaled(row.low), scaled(row.high)], [place, place], color=color, linewidth=1.2)
             axis.plot(scaled(row.rate), place, marker, color=color, markersize=4.2)

@@ -1,13 +1,21 @@
 """Reliability diagram of the blind proof: how often what was stated with a probability is so."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.blind.robots import PROOF, TUNED
 from elastocal.figures.style import PALETTE, note, panels, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 _LOOKS = {PROOF: (PALETTE[0], "o", "robots of the proof"), TUNED: ("#8a8a8a", "D", "robots on which it was developed")}
 
 
 @styled
-def reliability_diagram(reliability):
+def reliability_diagram(reliability: pd.DataFrame) -> Figure:
     """Shares of cases whose most probable set of mechanisms is true, against what was stated, and numbers of cases.
 
     Parameters

@@ -1,6 +1,9 @@
 """What may be missing in a model: probabilities of hypotheses, candidates one by one, and which of them contribute alike."""
 
+from __future__ import annotations
+
 import textwrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
@@ -8,6 +11,12 @@ from matplotlib.patches import Patch, Rectangle
 
 from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.figures.style import PALETTE, note, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 FAMILIES = dict(zip(("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift"), PALETTE, strict=False))
 # Hypotheses and candidates with a bar of their own.
@@ -20,7 +29,7 @@ _AT_FAULT = "the measurements are at fault"
 
 
 @styled
-def probabilities(stated, table):
+def probabilities(stated: Mapping[str, Any] | None, table: Mapping[str, np.ndarray]) -> Figure:
     """Posterior probabilities of the leading hypotheses, and Bayes factors of the leading candidates alone.
 
     Parameters
@@ -35,7 +44,7 @@ def probabilities(stated, table):
     matplotlib.figure.Figure
     """
     order = leading(table)
-    if not len(order):
+    if stated is None or not len(order):
         return _nothing_tested(table)
     sets = stated["sets"][:_HYPOTHESES]
     labels = [textwrap.fill(_capital(words), _LINE) for words in hypotheses_words(sets)]
@@ -54,7 +63,7 @@ def probabilities(stated, table):
     return figure
 
 
-def _bars(axis, rows, end, labels, values):
+def _bars(axis: Axes, rows: np.ndarray, end: float, labels: Sequence[str], values: Sequence[float]) -> None:
     """Probabilities of hypotheses in percent."""
     colours = [_REST_COLOUR if label == "Everything else" else PALETTE[0] for label in labels]
     axis.barh(rows, 100 * np.array(values), height=0.9, color=colours, zorder=2)
@@ -67,13 +76,13 @@ def _bars(axis, rows, end, labels, values):
     axis.grid(visible=False, axis="y")
 
 
-def _factors(axis, table, named):
+def _factors(axis: Axes, table: Mapping[str, np.ndarray], named: np.ndarray) -> None:
     """Bayes factors of single candidates, coloured by family."""
     factors, rows = table["log_bayes_factor"][named], np.arange(len(named))
     axis.barh(rows, factors, color=_colours(table, named), height=0.62, zorder=2)
     chosen = table["chosen"][named].astype(bool)
     if chosen.any():
-        style = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
+        style: dict[str, Any] = {"facecolor": "none", "edgecolor": "black", "linewidth": 1.3, "zorder": 3, "gid": "chosen"}
         axis.barh(rows[chosen], factors[chosen], height=0.62, **style)
     axis.set_xscale("function", functions=(_root, _square))
     low, high = min(factors.min(), 0.0), max(factors.max(), 2.0)
@@ -88,7 +97,7 @@ def _factors(axis, table, named):
 
 
 @styled
-def confounding(table, pairs):
+def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]) -> Figure:
     """Angles between the contributions of the leading candidates beyond the declared model.
 
     Parameters
@@ -143,15 +152,15 @@ def confounding(table, pairs):
     return figure
 
 
-def leading(table):
-    """Indices of the tested candidates by falling Bayes factor; each at the best value of its shape."""
+def leading(table: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Indices (tested,) of the tested candidates by falling Bayes factor; each at the best value of its shape."""
     tested = np.flatnonzero(np.isfinite(table["log_bayes_factor"]))
     order = tested[np.argsort(-table["log_bayes_factor"][tested], kind="stable")]
     _, first = np.unique(table["candidate"][order].astype(str), return_index=True)
     return order[np.sort(first)]
 
 
-def shortlist(order, chosen, count=_LEADING):
+def shortlist(order: Sequence[int] | np.ndarray, chosen: np.ndarray, count: int = _LEADING) -> list[int]:
     """The first of an order, and those chosen whatever their place, as far as there is room; in the order."""
     wanted = [index for index in order if chosen[index]][:count]
     others = [index for index in order if not chosen[index]][: count - len(wanted)]
@@ -159,14 +168,14 @@ def shortlist(order, chosen, count=_LEADING):
     return [index for index in order if index in kept]
 
 
-def name_in_pairs(table, index):
+def name_in_pairs(table: Mapping[str, np.ndarray], index: int) -> str:
     """Name of a candidate in the confounding table, which has it once for each value of its shape."""
     shape = table["shape"][index]
     return table["candidate"][index] + (f" {shape:.3g}" if np.isfinite(shape) else "")
 
 
-def angle_matrix(names, pairs):
-    """Angles between candidates as a symmetric matrix with zeros on its diagonal; not a number where unknown."""
+def angle_matrix(names: Sequence[str], pairs: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Angles between candidates as a symmetric matrix (names, names), zeros on its diagonal; not a number where unknown."""
     place = {name: number for number, name in enumerate(names)}
     angles = np.full((len(names), len(names)), np.nan)
     np.fill_diagonal(angles, 0.0)
@@ -176,55 +185,56 @@ def angle_matrix(names, pairs):
     return angles
 
 
-def short_name(key, longest=80):
+def short_name(key: str, longest: int = 80) -> str:
     """A candidate's key as words, in two lines where it is long and cut in the middle where it is very long."""
     words = _capital(candidate_words(key))
     words = words if len(words) <= longest else f"{words[: longest // 2]} … {words[-(longest // 2 - 2) :]}"
     return textwrap.fill(words, 48)
 
 
-def _two_lines(axis):
+def _two_lines(axis: Axes) -> None:
     """Names of two lines in smaller letters, so that they do not touch their neighbours."""
     for label in axis.get_yticklabels():
         if "\n" in label.get_text():
             label.set(fontsize=5.6, linespacing=0.95)
 
 
-def _capital(text):
+def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _nothing_tested(table):
+def _nothing_tested(table: Mapping[str, np.ndarray]) -> Figure:
     count = len(set(table["candidate"]))
     if count and set(table["note"]) == {_AT_FAULT}:
         return note("The data are at fault: no cause in the robot was looked for.")
     return note(f"None of {count} candidate causes can be tested with these measurements.")
 
 
-def _colours(table, indices):
+def _colours(table: Mapping[str, np.ndarray], indices: Iterable[int]) -> list[str]:
     return [FAMILIES.get(table["family"][index], PALETTE[-1]) for index in indices]
 
 
-def _root(value):
+def _root(value: np.ndarray | float) -> np.ndarray:
     """Root that keeps the sign."""
     return np.sign(value) * np.sqrt(np.abs(value))
 
 
-def _square(value):
+def _square(value: np.ndarray | float) -> np.ndarray:
     return np.sign(value) * np.square(value)
 
 
-def _ticks(low, high):
+def _ticks(low: float, high: float) -> list[int]:
     """Round values, so far apart that their numbers do not touch on an axis of roots."""
     steps = [0, *(digit * 10**power for power in range(6) for digit in (1, 2, 5))]
-    apart, kept = 0.07 * (_root(high) - _root(low)), []
+    apart = 0.07 * (_root(high) - _root(low))
+    kept: list[int] = []
     for step in sorted({*steps, *(-step for step in steps)}, key=abs):
         if low <= step <= high and all(abs(_root(step) - _root(other)) > apart for other in kept):
             kept.append(step)
     return sorted(kept)
 
 
-def _families_legend(figure, table, order, named):
+def _families_legend(figure: Figure, table: Mapping[str, np.ndarray], order: np.ndarray, named: np.ndarray) -> None:
     present = [family for family in FAMILIES if family in set(table["family"][named])]
     handles = [Patch(color=FAMILIES[family], label=family) for family in present]
     if table["chosen"].any():
@@ -234,5 +244,5 @@ def _families_legend(figure, table, order, named):
     figure.legend(handles=handles, title=words, loc="outside lower center", ncols=4, title_fontsize=7.5)
 
 
-def _frame(number, count):
+def _frame(number: int, count: int) -> Rectangle:
     return Rectangle((-0.5, number - 0.5), count, 1, fill=False, edgecolor=PALETTE[1], linewidth=1.4, zorder=4)

@@ -1,5 +1,9 @@
 """A robot's kinematic scheme: links, joints, measuring points, and their names."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from matplotlib.patches import Circle, Polygon
 
@@ -20,6 +24,13 @@ from elastocal.figures.scheme_sheet import (
     subscripted,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from matplotlib.figure import Figure
+
+    from elastocal.mechanics.robot import Robot
+
 GREY = "#555555"
 POINT_COLOURS = (ORANGE, GREEN, PINK, RED, SKY, BLUE)
 POINT_MARKERS = "sDo^vP"
@@ -28,7 +39,7 @@ HALF_LENGTH_MM, HALF_WIDTH_MM = 4.2, 2.6
 SEPARATOR = {"lw": 1.2, "ls": (0, (3, 2)), "color": GREY}
 
 
-def kinematic_scheme(robot):
+def kinematic_scheme(robot: Robot) -> Figure:
     """Equivalent kinematic scheme of a serial robot (the paper's Figure 2), drawn from its chain.
 
     Parameters
@@ -47,7 +58,9 @@ def kinematic_scheme(robot):
     joint. So the three joints of a spherical wrist can be seen apart.
     """
     items, depth = laid_out(robot.chain)
-    segments, joints, points = ([i for i in items if isinstance(i, kind)] for kind in (Segment, Joint, Point))
+    segments = [item for item in items if isinstance(item, Segment)]
+    joints = [item for item in items if isinstance(item, Joint)]
+    points = [item for item in items if isinstance(item, Point)]
     sheet = Sheet()
     _draw_base(sheet, any(abs(s.direction[2]) > 1 - PARALLEL for s in segments), view_of(robot.chain), depth)
     for segment in segments:
@@ -63,7 +76,7 @@ def kinematic_scheme(robot):
     return sheet.finish(low, (high[0], top + TEXT_HEIGHT_MM / 2))
 
 
-def _draw_base(sheet, oblique, view, depth):
+def _draw_base(sheet: Sheet, oblique: bool, view: np.ndarray, depth: np.ndarray) -> None:
     """Ground under the origin, and the base's axes beside it, where the first link does not hide them."""
     half, drop = 9.0, 2.6
     sheet.line([(-half, 0), (half, 0)], lw=1.6)
@@ -77,27 +90,27 @@ def _draw_base(sheet, oblique, view, depth):
         # The view from the front has -x into the paper: x itself then comes out of it.
         tip = origin + arrow * row[axis]
         style = {"arrowstyle": "-|>", "color": INK, "lw": 1.0, "shrinkA": 0, "shrinkB": 0}
-        sheet.axes.annotate("", tip, origin, arrowprops=style)
+        sheet.axes.annotate("", (tip[0], tip[1]), (origin[0], origin[1]), arrowprops=style)
         place = tip + (tip - origin) / np.linalg.norm(tip - origin) * 2.2
         sheet.text(place, f"${'xyz'[axis]}$")
         sheet.take(origin, place, 1.8)
-    sheet.axes.add_patch(Circle(origin, 0.6, fc=INK, ec="none", zorder=3))
+    sheet.axes.add_patch(Circle((origin[0], origin[1]), 0.6, fc=INK, ec="none", zorder=3))
     caption = origin + np.array([length / 2 - 1.0, -4.5 if not oblique or view[2].sum() > 0 else -10.0])
     sheet.text(caption, "base frame")
     sheet.take(caption - [9.0, 0], caption + np.array([9.0, 0]), TEXT_HEIGHT_MM / 2)
 
 
-def _draw_segment(sheet, segment):
+def _draw_segment(sheet: Sheet, segment: Segment) -> None:
     style = {"lw": 3.0, "color": GREY} if segment.length_m else SEPARATOR
     sheet.line([segment.start, segment.end], zorder=2, **style)
     sheet.take(segment.start, segment.end, 0.8)
 
 
-def _draw_joint(sheet, place, axis):
+def _draw_joint(sheet: Sheet, place: np.ndarray, axis: np.ndarray | None) -> None:
     """A circle where the axis points into the paper (`axis` None), else a rectangle along the axis."""
     if axis is None:
-        sheet.axes.add_patch(Circle(place, SYMBOL_RADIUS_MM, fc=JOINT_FACE, ec=BLUE, lw=1.3, zorder=4))
-        sheet.axes.add_patch(Circle(place, 0.6, fc=BLUE, ec="none", zorder=4))
+        sheet.axes.add_patch(Circle((place[0], place[1]), SYMBOL_RADIUS_MM, fc=JOINT_FACE, ec=BLUE, lw=1.3, zorder=4))
+        sheet.axes.add_patch(Circle((place[0], place[1]), 0.6, fc=BLUE, ec="none", zorder=4))
         sheet.take(place, place, SYMBOL_RADIUS_MM)
         return
     along = axis / np.linalg.norm(axis)
@@ -110,7 +123,7 @@ def _draw_joint(sheet, place, axis):
     sheet.take(*ends, 0.5)
 
 
-def _draw_points(sheet, points):
+def _draw_points(sheet: Sheet, points: Sequence[Point]) -> None:
     for number, point in enumerate(points):
         # Points that share a place are drawn one on the other, each smaller than the one below.
         below = sum(np.allclose(other.place, point.place) for other in points[:number])
@@ -121,13 +134,13 @@ def _draw_points(sheet, points):
         sheet.take(point.place, point.place, 1.4)
 
 
-def _point_style(number, smaller=0):
+def _point_style(number: int, smaller: int = 0) -> dict[str, Any]:
     size = max(2.0, 6.5 - 2.5 * smaller)
     colour, marker = POINT_COLOURS[number % len(POINT_COLOURS)], POINT_MARKERS[number % len(POINT_MARKERS)]
     return {"marker": marker, "ms": size, "mfc": colour, "mec": INK, "mew": 0.6}
 
 
-def _draw_labels(sheet, segments, joints, points):
+def _draw_labels(sheet: Sheet, segments: Sequence[Segment], joints: Sequence[Joint], points: Sequence[Point]) -> None:
     middle = np.mean([s.start for s in segments] + [s.end for s in segments], axis=0)
     for joint in joints:
         away = _outward(joint.place, middle)
@@ -144,21 +157,21 @@ def _draw_labels(sheet, segments, joints, points):
         sheet.label(point.name, [point.place], _outward(point.place, middle), (8.0, 0.0), f"point-{point.name}", frame=colour)
 
 
-def _visible_places(segment):
+def _visible_places(segment: Segment) -> list[np.ndarray]:
     """Places on a link that no joint covers, those near its middle first."""
     places = [segment.start + part * (segment.end - segment.start) for part in (0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2)]
     covered = [any(np.linalg.norm(joint.place - place) < HALF_LENGTH_MM for joint in segment.carried) for place in places]
     return [place for place, hidden in zip(places, covered, strict=True) if not hidden] or places
 
 
-def _outward(place, middle):
+def _outward(place: np.ndarray, middle: np.ndarray) -> np.ndarray:
     distance = np.linalg.norm(place - middle)
     return (place - middle) / distance if distance > 0 else np.array([0.0, 1.0])
 
 
-def _draw_legend(sheet, segments, joints, middle, top):
+def _draw_legend(sheet: Sheet, segments: Iterable[Segment], joints: Iterable[Joint], middle: float, top: float) -> float:
     """Symbols and what they mean, below the drawing; returns where it ends."""
-    entries = []
+    entries: list[tuple[Callable[[np.ndarray], Any], float, str]] = []
     if any(not joint.across for joint in joints):
         entries.append((lambda p: _draw_joint(sheet, p, np.array([1.0, 0.0])), 13.0, "joint, axis in plane"))
     if any(joint.across for joint in joints):

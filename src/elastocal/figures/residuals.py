@@ -1,10 +1,20 @@
 """Residuals of a campaign, before and after: against what the robot did, and as arrows where it stood."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 
 from elastocal.figures.style import PALETTE, note, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MICRO, MILLI = 1e6, 1e3
 STAGES = {"before": ("declared model", PALETTE[1]), "after": ("with the effects found", PALETTE[0])}
@@ -27,7 +37,7 @@ _ARROW = 0.13
 
 
 @styled
-def residuals(table):
+def residuals(table: Mapping[str, np.ndarray]) -> Figure:
     """Residual against each joint angle, the load and the time, before and after.
 
     Parameters
@@ -68,14 +78,14 @@ def residuals(table):
     for axis in axes[:, 0]:
         axis.set_ylabel(f"residual ({unit})")
     above = "above each panel: the component drawn, and the share of its mean square that the quantity below explains"
-    handles = _legend(stages, held_out.any())
+    handles = _legend(stages, bool(held_out.any()))
     figure.legend(handles=handles, title=above, loc="outside lower center", ncols=4, title_fontsize=7.5, columnspacing=1.4)
     figure.set_dpi(_PIXELS_PER_INCH)
     return figure
 
 
 @styled
-def arrows(table):
+def arrows(table: Mapping[str, np.ndarray]) -> Figure:
     """Residuals as arrows where the measurements were taken, from the side and from above.
 
     Parameters
@@ -123,7 +133,7 @@ def arrows(table):
     return figure
 
 
-def quantities(table):
+def quantities(table: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """What a residual can be drawn against: angles, load and time, where the campaign varies them.
 
     Parameters
@@ -132,7 +142,7 @@ def quantities(table):
 
     Returns
     -------
-    dict of str to ndarray
+    dict of str to ndarray (M,)
         By the label of the axis.
     """
     joints = sum(name[0] == "q" and name[1:].isdigit() for name in table)
@@ -144,7 +154,7 @@ def quantities(table):
     return {label: values for label, values in found.items() if np.isfinite(values).any() and np.nanstd(values) > 1e-6}
 
 
-def components(table, stage):
+def components(table: Mapping[str, np.ndarray], stage: str) -> np.ndarray:
     """Position residuals in m, radial, tangential and vertical at the place of each measurement, and along its force.
 
     Parameters
@@ -167,13 +177,13 @@ def components(table, stage):
     return np.column_stack([cos * off[:, 0] + sin * off[:, 1], cos * off[:, 1] - sin * off[:, 0], off[:, 2], along])
 
 
-def length_unit(lengths_m):
-    """Factor and name of the unit in which lengths in m are best read."""
+def length_unit(lengths_m: np.ndarray) -> tuple[float, str]:
+    """Factor and name of the unit in which lengths (...) in m are best read."""
     return (MILLI, "mm") if np.nanquantile(lengths_m, 0.95) > 1e-3 else (MICRO, "µm")
 
 
-def bins_of(values):
-    """Bin of each measurement: its own for each value where there are few, else of about equal counts; -1 where none."""
+def bins_of(values: np.ndarray) -> np.ndarray:
+    """Bin of each measurement, (M,): its own for each value where there are few, else of about equal counts; -1 where none."""
     finite = np.isfinite(values)
     levels = np.unique(np.round(values[finite], 3))
     edges = levels[:-1] + np.diff(levels) / 2
@@ -183,7 +193,7 @@ def bins_of(values):
     return np.where(finite, np.searchsorted(edges, values), -1)
 
 
-def share_explained(bins, values):
+def share_explained(bins: np.ndarray, values: np.ndarray) -> float:
     """Share of the mean square of values that the means of their bins make, beyond what chance gives to as many bins.
 
     Parameters
@@ -208,11 +218,11 @@ def share_explained(bins, values):
     return float(max(explained - used * rest, 0.0) / total) if total > 0 else 0.0
 
 
-def _cloud(axis, values, residual, held_out, color, bins):
+def _cloud(axis: Axes, values: np.ndarray, residual: np.ndarray, held_out: np.ndarray, color: str, bins: np.ndarray) -> None:
     """Points of one stage, those held out as crosses, with the running median and the middle half of all."""
     as_pixels = len(values) > _MOST_VECTORS
     alpha = float(np.clip(400 / len(values), 0.05, 0.45))
-    common = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
+    common: dict[str, Any] = {"color": color, "alpha": alpha, "rasterized": as_pixels, "linewidths": 0.5}
     axis.scatter(values[~held_out], residual[~held_out], s=4, marker="o", edgecolors="none", **{**common, "linewidths": 0})
     axis.scatter(values[held_out], residual[held_out], s=9, marker="x", **{**common, "alpha": min(1.5 * alpha, 1.0)})
     middle, quartiles = running_quartiles(values, residual, bins)
@@ -222,7 +232,7 @@ def _cloud(axis, values, residual, held_out, color, bins):
     axis.plot(middle, quartiles[:, 1], color=color, linestyle="", marker="o", markersize=1.8)
 
 
-def running_quartiles(values, residual, bins):
+def running_quartiles(values: np.ndarray, residual: np.ndarray, bins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Quartiles of the residual bin by bin, with a row that is not a number where a line would cross a gap.
 
     Parameters
@@ -240,7 +250,8 @@ def running_quartiles(values, residual, bins):
     ordered = np.sort(values[np.isfinite(values)])
     few = len(np.unique(np.round(ordered, 3))) <= _FEWEST_BINS
     wide = np.flatnonzero(np.diff(ordered) > (np.inf if few else _GAP * np.ptp(ordered)))
-    gaps, rows = ordered[wide], []
+    gaps = ordered[wide]
+    rows: list[list[float]] = []
     for number in range(bins.max() + 1):
         member = (bins == number) & np.isfinite(residual)
         if member.sum() < _FEWEST_IN_BIN:
@@ -249,11 +260,11 @@ def running_quartiles(values, residual, bins):
         if rows and ((gaps >= rows[-1][0]) & (gaps < at)).any():
             rows.append([at, np.nan, np.nan, np.nan])
         rows.append([at, *np.quantile(residual[member], [0.25, 0.5, 0.75])])
-    rows = np.array(rows).reshape(-1, 4)
-    return rows[:, 0], rows[:, 1:]
+    quartiles = np.array(rows).reshape(-1, 4)
+    return quartiles[:, 0], quartiles[:, 1:]
 
 
-def middle_of_cells(at, size, side):
+def middle_of_cells(at: np.ndarray, size: np.ndarray, side: float) -> np.ndarray:
     """The state of middle size in each cell of a grid.
 
     Parameters
@@ -266,7 +277,7 @@ def middle_of_cells(at, size, side):
 
     Returns
     -------
-    ndarray of int
+    ndarray of int (cells,)
         One for each cell that is not empty.
     """
     _, cell = np.unique(np.floor(at / side).astype(int), axis=0, return_inverse=True)
@@ -275,13 +286,13 @@ def middle_of_cells(at, size, side):
     return order[np.cumsum(counts) - counts + (counts - 1) // 2]
 
 
-def _stages(table):
+def _stages(table: Mapping[str, np.ndarray]) -> tuple[str, ...]:
     """Both stages, or the first alone where nothing was found that changes a residual."""
     same = all(np.allclose(table[f"before_d{axis}"], table[f"after_d{axis}"], rtol=0, atol=1e-9) for axis in "xyz")
     return tuple(STAGES)[: 1 if same else 2]
 
 
-def _legend(stages, with_held_out):
+def _legend(stages: Iterable[str], with_held_out: bool) -> list[Line2D]:
     drawn = [STAGES[stage] for stage in stages]
     handles = [Line2D([], [], color=color, marker="o", markersize=2.2, label=name) for name, color in drawn]
     handles.append(Line2D([], [], color="#666666", linestyle="", marker="o", markersize=2.5, label="fitted measurement"))
@@ -290,7 +301,7 @@ def _legend(stages, with_held_out):
     return handles
 
 
-def _states(table):
+def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     """Mean place and residuals of each state and target."""
     keys = np.column_stack([table[name] for name in ("held_out", "session", "pose", "load", "target")])
     _, state = np.unique(keys, axis=0, return_inverse=True)
@@ -299,19 +310,19 @@ def _states(table):
     return place, {stage: _means(state.ravel(), values) for stage, values in off.items()}
 
 
-def _cell_side(extent):
+def _cell_side(extent: np.ndarray) -> float:
     # One digit: a cell that can be told to others.
     side = extent.max() / _CELLS
     digit = 10.0 ** np.floor(np.log10(side))
     return float(np.ceil(side / digit) * digit)
 
 
-def _means(group, values):
+def _means(group: np.ndarray, values: np.ndarray) -> np.ndarray:
     counts = np.bincount(group)
     return np.column_stack([np.bincount(group, column) / counts for column in values.T])
 
 
-def _scale_arrow(axis, largest, length):
+def _scale_arrow(axis: Axes, largest: float, length: float) -> None:
     """An arrow of a round length beside the title."""
     digit = 10.0 ** np.floor(np.log10(largest))
     shown = max(step for step in (1, 2, 5) if step * digit <= largest * (1 + 1e-9)) * digit

@@ -1,11 +1,19 @@
 """From a robot's chain to places on paper: segments, joints and points of its kinematic scheme."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
 from itertools import combinations, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.figures.scheme_sheet import subscripted
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.mechanics.chain import Chain, Transform
 
 # Links after the joints that bend run from this heading to that one, in degrees above the horizontal. Headings that only
 # fall, by less than 180 degrees in all, make an arch that cannot meet itself; links that recede can still cross it, so there
@@ -30,9 +38,9 @@ class Segment:
     direction: np.ndarray
     length_m: float
     label: str = ""
-    carried: list = field(default_factory=list)
-    start: np.ndarray = None
-    end: np.ndarray = None
+    carried: list[Joint] = field(default_factory=list)
+    start: np.ndarray = field(init=False, repr=False)
+    end: np.ndarray = field(init=False, repr=False)
 
 
 @dataclass
@@ -41,11 +49,11 @@ class Joint:
 
     number: int
     axis: np.ndarray
-    carrier: Segment = None
-    place: np.ndarray = None
+    carrier: Segment | None = None
+    place: np.ndarray = field(init=False, repr=False)
 
     @property
-    def across(self):
+    def across(self) -> bool:
         """Whether its axis points along the line of sight."""
         return abs(self.axis[2]) > PARALLEL
 
@@ -56,11 +64,14 @@ class Point:
 
     name: str
     offset: np.ndarray
-    node: np.ndarray = None
-    place: np.ndarray = None
+    node: np.ndarray = field(init=False, repr=False)
+    place: np.ndarray = field(init=False, repr=False)
 
 
-def laid_out(chain):
+Item = Segment | Joint | Point
+
+
+def laid_out(chain: Chain) -> tuple[list[Item], np.ndarray]:
     """Everything at its place, and the direction on paper of what recedes.
 
     Places are in millimetres of paper. The kinematic scheme is a side view with the base's z upwards, in an oblique
@@ -70,7 +81,8 @@ def laid_out(chain):
     Arch and direction are the first choice whose links are apart, else the one that keeps them furthest apart; the scale is
     the largest whose drawing is not larger than DRAWING_MM.
     """
-    best, chosen = -1.0, None
+    best = -1.0
+    chosen: tuple[list[Item], np.ndarray]
     for last_heading, angle in product(LAST_HEADINGS, np.radians(DEPTH_ANGLES)):
         items = _spread(_walk(chain, last_heading))
         depth = DEPTH_RATIO * np.array([np.cos(angle), np.sin(angle)])
@@ -88,8 +100,8 @@ def laid_out(chain):
     return items, depth
 
 
-def view_of(chain):
-    """Base axes to (right, up, into the paper): z is up, and most of the joints that are not about z point into the paper."""
+def view_of(chain: Chain) -> np.ndarray:
+    """Base axes to (right, up, into the paper), (3, 3): z is up, and most joints that are not about z point into the paper."""
     along = np.zeros(3)
     for transform, frame in zip(chain.transforms, _frames(chain), strict=False):
         if transform.coordinate is not None:
@@ -99,12 +111,12 @@ def view_of(chain):
     return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
 
 
-def projected(vector, depth):
-    """(right, up, into the paper) on paper, where `depth` is what a unit into the paper becomes."""
+def projected(vector: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    """(right, up, into the paper) on paper, (2,), where `depth` (2,) is what a unit into the paper becomes."""
     return vector[:2] + vector[2] * depth
 
 
-def _frames(chain):
+def _frames(chain: Chain) -> list[np.ndarray]:
     """Axes of the moving frame before each transform and after the last, all joints at zero."""
     frames = [np.eye(3)]
     for transform in chain.transforms:
@@ -113,7 +125,7 @@ def _frames(chain):
     return frames
 
 
-def _rotation(axis, angle):
+def _rotation(axis: int, angle: float) -> np.ndarray:
     matrix = np.eye(3)
     second, third = (axis + 1) % 3, (axis + 2) % 3
     matrix[[second, third], [second, third]] = np.cos(angle)
@@ -121,17 +133,18 @@ def _rotation(axis, angle):
     return matrix
 
 
-def _walk(chain, last_heading):
+def _walk(chain: Chain, last_heading: float) -> list[Item]:
     """Segments, joints and points in the order of the chain, their directions as (right, up, into the paper)."""
     view = view_of(chain)
     frames = [view @ frame for frame in _frames(chain)]
     turns = _turns(chain, frames, last_heading)
-    items, lengths = [], 0
+    items: list[Item] = []
+    lengths = 0
     for index in range(len(chain.transforms) + 1):
         frame = _rotation(2, turns[index]) @ frames[index]
         items += [Point(p.name, frame @ np.array(p.offset_m)) for p in chain.points if p.after == index]
         if index == len(chain.transforms):
-            return items
+            break
         transform = chain.transforms[index]
         direction = frame[:, transform.axis]
         if transform.kind == "R" and transform.coordinate is not None:
@@ -140,13 +153,14 @@ def _walk(chain, last_heading):
             lengths += 1
             label = f"{subscripted('l', lengths)} = {_millimetres(transform.constant)} mm"
             items.append(Segment(np.sign(transform.constant) * direction, abs(transform.constant), label))
+    return items
 
 
-def _millimetres(length_m):
+def _millimetres(length_m: float) -> str:
     return f"{round(1000 * length_m, 1):g}".replace("-", "\N{MINUS SIGN}")
 
 
-def _turns(chain, frames, last_heading):
+def _turns(chain: Chain, frames: Sequence[np.ndarray], last_heading: float) -> list[float]:
     """Angle in the plane of the paper, before each transform and after the last, by which the joints have turned the frame.
 
     Only joints across the view turn it, and each such turn shifts the headings of all that follows: so the headings at zero
@@ -157,7 +171,7 @@ def _turns(chain, frames, last_heading):
         for index, (transform, frame) in enumerate(zip(chain.transforms, frames, strict=False))
         if transform.coordinate is not None and abs(frame[2, transform.axis]) > PARALLEL
     ]
-    longest = {}
+    longest: dict[int, float] = {}
     for index, end in zip(bends, [*bends, len(chain.transforms)][1:], strict=True):
         flat = [_flat_vector(chain.transforms[i], frames[i]) for i in range(index, end)]
         vector = max(flat, key=np.linalg.norm)
@@ -170,16 +184,18 @@ def _turns(chain, frames, last_heading):
     return turns
 
 
-def _flat_vector(transform, frame):
+def _flat_vector(transform: Transform, frame: np.ndarray) -> np.ndarray:
     """What of a translation lies in the plane of the paper."""
     if transform.kind == "R":
         return np.zeros(2)
     return np.round(transform.constant * frame[:2, transform.axis], 9)
 
 
-def _spread(items):
+def _spread(items: list[Item]) -> list[Item]:
     """Joints that share a place, apart: on the links whose direction is their axis, or with a separator between them."""
-    spread, run, before = [], [], None
+    spread: list[Item] = []
+    run: list[Joint | Point] = []
+    before: Segment | None = None
     if isinstance(_without_points(items)[0], Joint):
         # A joint in the base's origin would be drawn on the ground.
         items = [Segment(np.array([0.0, 1.0, 0.0]), 0.0), *items]
@@ -193,36 +209,36 @@ def _spread(items):
     return spread
 
 
-def _without_points(items):
+def _without_points(items: Iterable[Item]) -> list[Segment | Joint]:
     return [item for item in items if not isinstance(item, Point)]
 
 
-def _spread_run(run, before, after):
+def _spread_run(run: Sequence[Joint | Point], before: Segment | None, after: Segment | None) -> list[Item]:
     """Joints and points between two segments; the first joint may move back along its axis, the last one forward."""
-    left = _without_points(run)
+    left = [item for item in run if isinstance(item, Joint)]
     if before and left and _turns_about(left[0], before, alone=len(left) == 1):
         _carry(left.pop(0), before)
     if after and left and _turns_about(left[-1], after, alone=len(left) == 1):
         _carry(left.pop(), after)
-    spread = []
+    spread: list[Item] = []
     for item in run:
-        if any(item is joint for joint in left[1:]):
+        if before and any(item is joint for joint in left[1:]):
             spread.append(Segment(before.direction, 0.0))
         spread.append(item)
     return spread
 
 
-def _turns_about(joint, segment, alone):
+def _turns_about(joint: Joint, segment: Segment, alone: bool) -> bool:
     # Across the view a joint is a circle, which looks best at the corner: it moves only to make room for another.
     return abs(joint.axis @ segment.direction) > PARALLEL and not (alone and joint.across)
 
 
-def _carry(joint, segment):
+def _carry(joint: Joint, segment: Segment) -> None:
     joint.carrier = segment
     segment.carried.append(joint)
 
 
-def _clearance(items):
+def _clearance(items: Iterable[Item]) -> float:
     """Smallest distance between links, up to ENOUGH_MM; of two that meet, between the halves away from there."""
     segments, nearest = [item for item in items if isinstance(item, Segment)], ENOUGH_MM
     for (i, one), (j, other) in combinations(enumerate(segments), 2):
@@ -232,11 +248,11 @@ def _clearance(items):
     return nearest
 
 
-def _samples(segment, first, last):
+def _samples(segment: Segment, first: float, last: float) -> np.ndarray:
     return segment.start + np.linspace(first, last, 25)[:, None] * (segment.end - segment.start)
 
 
-def _place(items, scale, depth):
+def _place(items: Sequence[Item], scale: float, depth: np.ndarray) -> np.ndarray:
     """Places on paper of everything, in millimetres from the base's origin."""
     longest = max((item.length_m for item in items if isinstance(item, Segment)), default=0.0)
     here, places = np.zeros(3), []
@@ -259,5 +275,5 @@ def _place(items, scale, depth):
     return np.array(places)
 
 
-def _drawn_length(segment, longest, scale):
+def _drawn_length(segment: Segment, longest: float, scale: float) -> float:
     return SHORTEST_MM + CARRIED_MM * len(segment.carried) + scale * (segment.length_m / longest if longest else 0.0)

@@ -1,6 +1,9 @@
 """A robot's model as a chain of blocks and springs, one for each joint and, in the extended model, for each link."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon
@@ -15,10 +18,18 @@ from elastocal.figures.scheme_sheet import (
     RED,
     TEXT_HEIGHT_MM,
     WIDTH_MM,
+    Place,
     Sheet,
     filled_rows,
     subscripted,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from matplotlib.figure import Figure
+
+    from elastocal.mechanics.robot import Robot
 
 THETA = r"\theta"
 LINK_FACE = "#E4E4E4"
@@ -32,7 +43,7 @@ class _Block:
     label: str = ""
 
 
-def spring_scheme(robot):
+def spring_scheme(robot: Robot) -> Figure:
     """Virtual joint model of a robot as a chain of blocks (the paper's Figure 3), drawn from its chain.
 
     Parameters
@@ -58,7 +69,7 @@ def spring_scheme(robot):
     return sheet.finish((-half, bottom), (half, TEXT_HEIGHT_MM / 2))
 
 
-def _blocks(robot, extended):
+def _blocks(robot: Robot, extended: bool) -> list[_Block]:
     """Base, links and joints in the order of the chain, end-effector."""
     link = "elastic link" if extended else "link"
     blocks, names, lengths = [_Block("base", "Base")], [], 0
@@ -75,7 +86,7 @@ def _blocks(robot, extended):
     return [*blocks, _Block("end-effector", "End-\neffector")]
 
 
-def _draw_model(sheet, blocks, top):
+def _draw_model(sheet: Sheet, blocks: Sequence[_Block], top: float) -> float:
     """Blocks from left to right, in as many lines as they need; returns the height below them."""
     widths = [BLOCK_WIDTHS_MM[block.kind] for block in blocks]
     rows, previous = _even_rows(widths), None
@@ -95,7 +106,7 @@ def _draw_model(sheet, blocks, top):
     return top + LINE_MM - 12.0
 
 
-def _even_rows(widths):
+def _even_rows(widths: Sequence[float]) -> list[list[int]]:
     """As few rows as possible, the longest of them as short as possible."""
     widest = WIDTH_MM - 2 * MARGIN_MM - 8.0
     rows = filled_rows(widths, widest, BLOCK_GAP_MM)
@@ -107,14 +118,14 @@ def _even_rows(widths):
     return rows
 
 
-def _draw_return(sheet, end, start):
+def _draw_return(sheet: Sheet, end: np.ndarray, start: np.ndarray) -> None:
     """From the end of a line of blocks to the start of the next."""
     right, left, between = end[0] + 3.0, start[0] - 3.0, (end[1] + start[1]) / 2
-    corners = [end, (right, end[1]), (right, between), (left, between), (left, start[1]), start]
+    corners: list[Place] = [end, (right, end[1]), (right, between), (left, between), (left, start[1]), start]
     sheet.line(corners, lw=1.2, solid_joinstyle="round")
 
 
-def _draw_block(sheet, block, x, y):
+def _draw_block(sheet: Sheet, block: _Block, x: float, y: float) -> None:
     width = BLOCK_WIDTHS_MM[block.kind]
     if block.kind == "base":
         _draw_box(sheet, x, width, y, "white")
@@ -136,24 +147,24 @@ def _draw_block(sheet, block, x, y):
             _draw_six_springs(sheet, x + BLOCK_WIDTHS_MM["link"], x + width, y)
 
 
-def _draw_box(sheet, x, width, y, face, half=BLOCK_HALF_MM):
+def _draw_box(sheet: Sheet, x: float, width: float, y: float, face: str, half: float = BLOCK_HALF_MM) -> None:
     corners = [(x, y - half), (x + width, y - half), (x + width, y + half), (x, y + half)]
     sheet.axes.add_patch(Polygon(corners, fc=face, ec=INK, lw=1.0, zorder=3))
 
 
-def _draw_actuator(sheet, x, y):
+def _draw_actuator(sheet: Sheet, x: float, y: float) -> None:
     sheet.axes.add_patch(Circle((x + 4.0, y), 4.0, fc=JOINT_FACE, ec=BLUE, lw=1.3, zorder=3))
     sheet.text((x + 4.0, y), "Ac")
 
 
-def _draw_spring(sheet, start, end, y, colour):
+def _draw_spring(sheet: Sheet, start: float, end: float, y: float, colour: str) -> None:
     steps = np.linspace(start + 1.2, end - 1.2, 9)
     heights = y + 2.2 * np.array([0, 1, -1, 1, -1, 1, -1, 1, 0])
     path = [(start, y), *zip(steps, heights, strict=True), (end, y)]
     sheet.line(path, lw=1.4, color=colour, solid_joinstyle="round", zorder=3)
 
 
-def _draw_six_springs(sheet, start, end, y):
+def _draw_six_springs(sheet: Sheet, start: float, end: float, y: float) -> None:
     """One spring in a frame that says it stands for six."""
     start += 1.5
     sheet.line([(start - 1.5, y), (start, y)], lw=1.2)
@@ -164,14 +175,14 @@ def _draw_six_springs(sheet, start, end, y):
     sheet.text(((start + end) / 2, y + 6.4), "6D")
 
 
-def _draw_legend(sheet, extended, top):
+def _draw_legend(sheet: Sheet, extended: bool, top: float) -> float:
     half = BLOCK_WIDTHS_MM["link"] / 2
 
-    def link(place):
+    def link(place: np.ndarray) -> None:
         _draw_box(sheet, place[0] - half, 2 * half, place[1], LINK_FACE)
         sheet.text(place, "Link")
 
-    entries = [
+    entries: list[tuple[Callable[[np.ndarray], Any], float, str]] = [
         (lambda p: _draw_actuator(sheet, p[0] - 4.0, p[1]), 8.0, "actuated joint"),
         (lambda p: _draw_spring(sheet, p[0] - 5.0, p[0] + 5.0, p[1], ORANGE), 10.0, "1-DoF spring"),
         (link, 2 * half, "rigid link"),

@@ -1,16 +1,27 @@
 """Figures that compare strategies and noise levels over the data set length."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
 from elastocal.figures.style import PALETTE, line_style, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MICRO = 1e6
 _LENGTH = "configurations in the data set"
 
 
 @styled
-def noise_impact(metrics, strategy, titles):
+def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]) -> Figure:
     """Figure 4: deviation of one strategy against the data set length, for each noise level.
 
     Parameters
@@ -42,7 +53,7 @@ def noise_impact(metrics, strategy, titles):
 
 
 @styled
-def stiffness_errors(metrics, title, robot, order, limit_percent):
+def stiffness_errors(metrics: pd.DataFrame, title: str, robot: str, order: Iterable[str], limit_percent: float) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
     Parameters
@@ -76,7 +87,7 @@ def stiffness_errors(metrics, title, robot, order, limit_percent):
 
 
 @styled
-def deviations(metrics, title, robot, order, limit_um):
+def deviations(metrics: pd.DataFrame, title: str, robot: str, order: Iterable[str], limit_um: float) -> Figure:
     """Figures 5c and 5d: deviation of all strategies against the data set length.
 
     Parameters
@@ -104,7 +115,9 @@ def deviations(metrics, title, robot, order, limit_um):
 
 
 @styled
-def bias_and_accuracy(metrics, per_dataset, titles, order):
+def bias_and_accuracy(
+    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]
+) -> Figure:
     """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
 
     Parameters
@@ -145,7 +158,7 @@ def bias_and_accuracy(metrics, per_dataset, titles, order):
 
 
 @styled
-def accuracy_of_one_data_set(per_dataset, titles, order, length):
+def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], length: int) -> Figure:
     """Error that one data set of a given length leaves, strategy by strategy, beside the bound of its own measurements.
 
     Parameters
@@ -179,7 +192,7 @@ def accuracy_of_one_data_set(per_dataset, titles, order, length):
     return figure
 
 
-def _strategy_lines(axis, metrics, robot, quantity, scale, order):
+def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Iterable[str]) -> None:
     for index, strategy in enumerate(order):
         cell = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
         style = line_style(index)
@@ -188,12 +201,12 @@ def _strategy_lines(axis, metrics, robot, quantity, scale, order):
     axis.set_xlim(2, metrics.length.max())
 
 
-def _limit(axis, value, unit):
+def _limit(axis: Axes, value: float, unit: str) -> None:
     axis.axhline(value, color="black", linewidth=0.7)
     axis.annotate(
         f"{value:g} {unit}", (1, value), (2, 0), ("axes fraction", "data"), "offset points", va="center", fontsize=7.5
     )
 
 
-def _band(axis, length, value, error, color):
+def _band(axis: Axes, length: pd.Series, value: pd.Series, error: pd.Series, color: str) -> None:
     axis.fill_between(length, value - error, value + error, color=color, alpha=0.12, linewidth=0)

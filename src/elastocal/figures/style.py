@@ -1,15 +1,23 @@
 """One look for all figures: sizes, colours that colour-blind readers can tell apart, and a line style for each strategy."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from elastocal.io.atomic_writes import atomic_write
 
+if TYPE_CHECKING:
+    import numpy as np
+    from matplotlib.typing import RcKeyType
+
 WIDTH_MM = 165
 # Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
 DASHES = ("-", (0, (1, 2)), "--", (0, (4, 4)), "-", (0, (2, 3)), "-.", (0, (6, 1.5, 1, 1.5)))
-SETTINGS = {
+SETTINGS: dict[RcKeyType, Any] = {
     "font.size": 8,
     "axes.titlesize": 9,
     "axes.spines.top": False,
@@ -28,7 +36,7 @@ SETTINGS = {
 styled = rc_context(SETTINGS)
 
 
-def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
+def panels(rows: int, columns: int, height_mm: float, width_mm: float = WIDTH_MM, **options: Any) -> tuple[Figure, np.ndarray]:
     """A figure with a grid of axes in the common look.
 
     Parameters
@@ -47,7 +55,7 @@ def panels(rows, columns, height_mm, width_mm=WIDTH_MM, **options):
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
-def note(text, height_mm=25):
+def note(text: str, height_mm: float = 25) -> Figure:
     """A figure that says in words why there is nothing to draw."""
     figure, axes = panels(1, 1, height_mm)
     axes[0, 0].set_axis_off()
@@ -55,13 +63,13 @@ def note(text, height_mm=25):
     return figure
 
 
-def line_style(index):
+def line_style(index: int) -> dict[str, Any]:
     """Colour and dashes of the strategy with this place in the list; lines that coincide remain visible through the gaps."""
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
 
 
 @styled
-def save(figure, pdf, png):
+def save(figure: Figure, pdf: str, png: str) -> None:
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
 
     Each has a layout of its own: the widths of its letters differ by a few per cent, and labels would be cut off.

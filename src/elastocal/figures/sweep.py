@@ -1,8 +1,16 @@
 """How near relatives are named, against the angle between them."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.figures.style import PALETTE, panels, styled
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 _LOOKS = {
     "right": (PALETTE[2], "right name"),
@@ -14,7 +22,7 @@ _COLUMNS = 4
 
 
 @styled
-def sweep(table):
+def sweep(table: pd.DataFrame) -> Figure:
     """Stacked bars of what was said, a panel for each pair and one for all.
 
     Parameters

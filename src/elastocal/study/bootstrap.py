@@ -1,11 +1,18 @@
 """Bootstrap weights: how often each data set and each test configuration counts in each replicate."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.random_streams import draw
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-def bootstrap_weights(seed, key, data_sets, replicates):
+
+def bootstrap_weights(seed: int, key: str, data_sets: Sequence[int] | np.ndarray, replicates: int) -> np.ndarray:
     """How often each data set counts in each replicate: once in replicate 0, Poisson(1) times in the others.
 
     The Poisson bootstrap [1]_, whose independent weights of mean one do not need to know how many data sets there are. They are
@@ -31,7 +38,7 @@ def bootstrap_weights(seed, key, data_sets, replicates):
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
-def bootstrap_test_weights(seed, key, tests, replicates):
+def bootstrap_test_weights(seed: int, key: str, tests: int, replicates: int) -> np.ndarray:
     """How often each test configuration counts in each replicate, as `bootstrap_weights` for data sets.
 
     Parameters

@@ -5,7 +5,7 @@ import numpy as np
 from elastocal.study.identification import cholesky_triangles, inverse_triangles
 
 
-def squared_error_bounds(information, moment):
+def squared_error_bounds(information: np.ndarray, moment: np.ndarray) -> np.ndarray:
     """Cramér-Rao bound of the mean squared end-effector position error, for normal measurements of unit variance [1]_, [2]_.
 
     Parameters

@@ -1,6 +1,7 @@
 """The paper's printed figures beside ours, each with the Monte Carlo spread of a study of this size."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -27,14 +28,25 @@ class OurResults:
         Noise level and data set length of the tables.
     """
 
-    tables: dict
+    tables: dict[str, pd.DataFrame]
     metrics: pd.DataFrame
     replicates: pd.DataFrame
     noise_um: float
     length: int
 
 
-def comparison_table(reference, ours):
+class _PrintedFigure(NamedTuple):
+    """A row of the reference table."""
+
+    table: str
+    robot: str
+    strategy: str
+    quantity: str
+    unit: str
+    value: float
+
+
+def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     """One row for each figure that the paper prints.
 
     Parameters
@@ -52,30 +64,30 @@ def comparison_table(reference, ours):
         1.4 and about one in thirteen lies beyond 2.5. What the study does not cover is empty.
     """
     rows = []
-    for figure in reference.itertuples():
+    printed = reference[[*_PrintedFigure._fields]].itertuples(index=False, name=None)
+    for figure in map(_PrintedFigure._make, printed):
         value, spread, interpretation = _RULES[figure.table](figure, ours)
         z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
-        printed = (figure.table, figure.robot, figure.strategy, figure.quantity, figure.unit, figure.value)
-        rows.append((*printed, value, spread, z, interpretation))
+        rows.append((*figure, value, spread, z, interpretation))
     names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "interpretation"]
     return pd.DataFrame(rows, columns=names)
 
 
-def _table1_figure(figure, ours):
+def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     return _pair(ours.tables["table1"], figure.quantity, robot=figure.robot)[0], 0.0, "R1: an input"
 
 
-def _table2_figure(figure, ours):
+def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     column = _TABLE2[figure.quantity]
     chosen = (figure.robot, column) == ("kuka_extended", "mean_mm")
     return *_pair(ours.tables["table2"], column, robot=figure.robot), "R11: the tube was chosen for it" if chosen else "R3"
 
 
-def _table3_figure(figure, ours):
+def _table3_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     return *_pair(ours.tables["table3"], figure.quantity, robot=figure.robot), "R7"
 
 
-def _table4_figure(figure, ours):
+def _table4_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     table, key = ours.tables["table4"], {"strategy": figure.strategy, "robot": figure.robot}
     column = _TABLE4.get(figure.quantity, figure.quantity)
     if "k_sigma" not in column:
@@ -84,31 +96,31 @@ def _table4_figure(figure, ours):
     return *first, "R7" if first == whole else "R7, R10: joints of the first stage"
 
 
-def _text_figure(figure, ours):
+def _text_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     return _TEXT[figure.quantity](ours)
 
 
-def _largest_residual(ours):
+def _largest_residual(ours: OurResults) -> tuple[float, float, str]:
     extended = ours.tables["extended"]
     if extended.empty:
         return np.nan, np.nan, ""
-    worst = extended.loc[extended.residual_mean_um.idxmax()]
+    worst = extended.iloc[extended.residual_mean_um.argmax()]
     return worst.residual_mean_um, worst.residual_mean_um_std_error, "R11: largest of all strategies; the paper prints a bound"
 
 
-def _share_with_links(ours):
+def _share_with_links(ours: OurResults) -> tuple[float, float, str]:
     row = _pair(ours.tables["extended"], "share_compensated_percent", strategy="6DoF")
     return *row, "R11, strategy 6DoF"
 
 
-def _share_without_links(ours):
+def _share_without_links(ours: OurResults) -> tuple[float, float, str]:
     return *share_compensated(ours.metrics, ours.replicates, "kuka", "6DoF", ours.noise_um, ours.length), "kuka, strategy 6DoF"
 
 
-def _smallest_ratio(ours):
+def _smallest_ratio(ours: OurResults) -> tuple[float, float, str]:
     ratios = []
     for _, cells in ours.tables["table4"].groupby("robot", sort=True):
-        best = cells.loc[cells[f"dev_{ours.length}_um"].idxmin()]
+        best = cells.iloc[cells[f"dev_{ours.length}_um"].argmin()]
         ratios.append(
             deviation_ratio(ours.metrics, ours.replicates, best.robot, "6DoF", best.strategy, ours.noise_um, ours.length)
         )
@@ -124,7 +136,7 @@ _TEXT = {
 }
 
 
-def _pair(table, column, **key):
+def _pair(table: pd.DataFrame, column: str, **key: str) -> tuple[float, float]:
     """Value and standard error of one cell; not a number where the table lacks it."""
     rows = table
     for name, value in key.items():

@@ -1,12 +1,19 @@
 """The study's configuration: checked as a whole before anything runs, with the robots and strategies that it names."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, document_path, named_document
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -23,13 +30,13 @@ class Study:
         Last measuring point of each robot.
     """
 
-    robots: dict
-    strategies: dict
-    points: dict
-    end_effectors: dict
+    robots: dict[str, dict[str, Any]]
+    strategies: dict[str, dict[str, Any]]
+    points: dict[str, tuple[str, ...]]
+    end_effectors: dict[str, str]
 
 
-def check_study(config, folder, source="config.yaml"):
+def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> Study:
     """Read the robots and strategies that a configuration names and check everything against everything.
 
     Parameters
@@ -74,12 +81,12 @@ def check_study(config, folder, source="config.yaml"):
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
 
-def rows_read(measured):
+def rows_read(measured: str) -> int:
     """Measurements of one point in one configuration: 6 where poses are measured, 3 where positions are."""
     return {"pose": 6, "position": 3}[measured]
 
 
-def _check_cells(config, source):
+def _check_cells(config: Mapping[str, Any], source: str) -> None:
     tables, longest = config["tables"], config["configurations"]
     if tables["classical_strategy"] not in config["strategies"]:
         raise InputError(

@@ -4,11 +4,15 @@ Two views of the same estimates: the paper's, which averages the stiffness over 
 (equations 12-15), and that of somebody who has one data set.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.study.metrics import (
+    Judge,
     first_length_below,
     k_sigma,
     length_to_reach,
@@ -17,6 +21,10 @@ from elastocal.study.metrics import (
     relative_stiffness_error,
     scored_parts,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
 
 LARGEST_TRUSTED_SPREAD = 0.25
 
@@ -43,7 +51,9 @@ class Averages:
     relative_spread: np.ndarray
 
 
-def average(blocks, judge, method, deviation_of, test_weights):
+def average(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]], judge: Judge, method: str, deviation_of: str, test_weights: np.ndarray
+) -> Averages:
     """Average the estimates over data sets (equation 12) and score the averaged model (equation 15).
 
     A replicate multiplies weights of data sets by independent weights of test configurations: the product-weight bootstrap of
@@ -73,7 +83,8 @@ def average(blocks, judge, method, deviation_of, test_weights):
     if method == "median":
         compliances, weights = zip(*blocks, strict=True)
         blocks = [(np.concatenate(compliances), np.concatenate(weights, axis=1))]
-    total = sums = scores = moments = nonpositive = 0.0
+    zero: np.ndarray = np.zeros(())
+    total = sums = scores = moments = nonpositive = zero
     sets = 0
     for compliance, weights in blocks:
         sets += len(compliance)
@@ -98,7 +109,7 @@ def average(blocks, judge, method, deviation_of, test_weights):
     return Averages(averaged, deviation, initial, nonpositive / sets, spread)
 
 
-def metrics_table(averages, true_compliance, first_stage_joints):
+def metrics_table(averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the metrics table, one row for each length, from `average`.
 
     Parameters
@@ -126,7 +137,9 @@ def metrics_table(averages, true_compliance, first_stage_joints):
     return table
 
 
-def replicates_table(averages, true_compliance, first_stage_joints):
+def replicates_table(
+    averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]
+) -> dict[str, np.ndarray]:
     """Columns of the replicates table: the scores of every bootstrap replicate at every length.
 
     Parameters
@@ -147,7 +160,7 @@ def replicates_table(averages, true_compliance, first_stage_joints):
     return table | {name: values[1:].ravel() for name, values in scores.items()}
 
 
-def accuracy_sums(compliance, judge):
+def accuracy_sums(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     """What one data set gives, summed over the data sets of a block: add the sums of blocks for `accuracy_table`.
 
     Parameters
@@ -170,7 +183,7 @@ def accuracy_sums(compliance, judge):
     return np.stack([np.full(values.shape[1:], float(sets)), values.sum(axis=0), (values**2).sum(axis=0)])
 
 
-def accuracy_table(sums, lengths):
+def accuracy_table(sums: np.ndarray, lengths: Sequence[int]) -> dict[str, np.ndarray]:
     """Columns of the accuracy table: what one data set gives, averaged over data sets.
 
     Standard errors of roots are by the delta method.
@@ -201,7 +214,7 @@ def accuracy_table(sums, lengths):
     return table
 
 
-def reached_length(values, replicate_values, limit):
+def reached_length(values: np.ndarray, replicate_values: np.ndarray, limit: float) -> tuple[float, float]:
     """First length at which a metric is at most `limit`, with its Monte Carlo standard error.
 
     Parameters
@@ -219,7 +232,7 @@ def reached_length(values, replicate_values, limit):
     return float(first_length_below(values, limit)), float(np.std(length_to_reach(replicate_values, limit), ddof=1))
 
 
-def _scores_of_one_data_set(compliance, judge):
+def _scores_of_one_data_set(compliance: np.ndarray, judge: Judge) -> np.ndarray:
     """Mean, mean square, 95th percentile and largest of the position error, (sets, lengths, 4)."""
     sets, lengths, n = compliance.shape
     errors = position_errors(judge, compliance.reshape(-1, n))
@@ -229,7 +242,9 @@ def _scores_of_one_data_set(compliance, judge):
     return np.stack([mean, square, errors[:, rank], errors[:, rank:].max(axis=1)], 1).reshape(sets, lengths, 4)
 
 
-def _replicated_scores(averages, true_compliance, first_stage_joints):
+def _replicated_scores(
+    averages: Averages, true_compliance: np.ndarray, first_stage_joints: Sequence[int]
+) -> dict[str, np.ndarray]:
     return {
         "k_sigma": k_sigma(averages.compliance, true_compliance),
         "k_sigma_first_stage": k_sigma(averages.compliance, true_compliance, list(first_stage_joints)),
@@ -238,6 +253,6 @@ def _replicated_scores(averages, true_compliance, first_stage_joints):
     }
 
 
-def _weighted_medians(compliance, weights):
+def _weighted_medians(compliance: np.ndarray, weights: np.ndarray) -> np.ndarray:
     counts = weights.astype(int)
     return np.stack([np.median(np.repeat(compliance, count, axis=0), axis=0) for count in counts])

@@ -12,11 +12,21 @@ References
    Electronic Systems AES-7, 1971.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.mechanics.elastostatics import regressor
 from elastocal.mechanics.kinematics import poses, poses_and_jacobians
 from elastocal.mechanics.pose_differences import pose_differences
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from elastocal.mechanics.chain import Chain, MeasuringPoint
+    from elastocal.study.strategies import Strategy
 
 STEPS = 30
 # Relative size of the last step but one. Each step is about a thousand times smaller than the one before, down to the rounding
@@ -24,7 +34,15 @@ STEPS = 30
 LAST_STEP = 1e-7
 
 
-def identify_exactly(strategy, chain, joint_angles, torques, deflections, start, lengths):
+def identify_exactly(
+    strategy: Strategy,
+    chain: Chain,
+    joint_angles: np.ndarray,
+    torques: Mapping[str, np.ndarray],
+    deflections: Mapping[str, np.ndarray],
+    start: np.ndarray,
+    lengths: Sequence[int],
+) -> np.ndarray:
     """Compliances by a strategy with the exact kinematics, for some prefix lengths of every data set.
 
     Parameters
@@ -61,14 +79,20 @@ def identify_exactly(strategy, chain, joint_angles, torques, deflections, start,
     return solved
 
 
-def _solve_stage(chain, data, identified, compliance):
+def _solve_stage(
+    chain: Chain,
+    data: Sequence[tuple[MeasuringPoint, np.ndarray, np.ndarray, np.ndarray]],
+    identified: list[int],
+    compliance: np.ndarray,
+) -> np.ndarray:
     compliance = compliance.copy()
-    data = [(*measurements, poses(chain, measurements[1], measurements[0])) for measurements in data]
+    started = [(*measurements, poses(chain, measurements[1], measurements[0])) for measurements in data]
     settled = np.zeros(len(compliance), bool)
     with np.errstate(all="ignore"):
         for _ in range(STEPS):
-            normal = right = 0.0
-            for point, joint_angles, torques, measured, unloaded in data:
+            normal: np.ndarray = np.zeros(())
+            right: np.ndarray = np.zeros(())
+            for point, joint_angles, torques, measured, unloaded in started:
                 sensitivity, residual = _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance)
                 sensitivity = sensitivity[..., identified]
                 normal = normal + np.einsum("ksri,ksrj->sij", sensitivity, sensitivity, optimize=True)
@@ -82,7 +106,7 @@ def _solve_stage(chain, data, identified, compliance):
     return compliance
 
 
-def _solved(normal, right):
+def _solved(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solutions of the normal equations; not a number where they are singular."""
     usable = np.isfinite(normal).all(axis=(1, 2))
     usable[usable] = np.linalg.cond(normal[usable]) < 1.0 / np.finfo(float).eps
@@ -91,11 +115,19 @@ def _solved(normal, right):
     return solution
 
 
-def _linearised(chain, point, joint_angles, torques, measured, unloaded, compliance):
+def _linearised(
+    chain: Chain,
+    point: MeasuringPoint,
+    joint_angles: np.ndarray,
+    torques: np.ndarray,
+    measured: np.ndarray,
+    unloaded: tuple[np.ndarray, np.ndarray],
+    compliance: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
     """Derivative of the predicted deflection with respect to the compliances, and what it leaves of the measured one."""
     rows = measured.shape[-1]
-    *loaded, jacobian = poses_and_jacobians(chain, joint_angles + compliance * torques, point)
-    predicted = pose_differences(*loaded, *unloaded)
+    position, rotation, jacobian = poses_and_jacobians(chain, joint_angles + compliance * torques, point)
+    predicted = pose_differences(position, rotation, *unloaded)
     sensitivity = regressor(jacobian, torques)
     # A rotation vector r turns with angular velocity w at the rate w - r x w / 2 (first order in r).
     turn, angular = predicted[..., 3:, None], sensitivity[..., 3:, :]

@@ -7,12 +7,19 @@ forming them, so that prefixes of one or two configurations keep their digits.
 Inside this module the batch lies last in memory, as (..., configuration, data set).
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.strategies import without_forgotten_stages
+from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
 
 # Condition numbers come from squares of singular values, so they mean nothing beyond the root of the machine's precision; there
 # the measurements do not determine the compliances.
@@ -54,7 +61,7 @@ class Estimates:
     condition: np.ndarray
 
 
-def first_solvable_length(strategy, rows):
+def first_solvable_length(strategy: Strategy, rows: int) -> int:
     """Smallest number of configurations with at least as many measurements as unknowns in every stage.
 
     Parameters
@@ -70,7 +77,7 @@ def first_solvable_length(strategy, rows):
     return max(-(-len(stage.identified) // (rows * len(stage.points))) for stage in strategy.stages)
 
 
-def identify(strategy, measurements, joints):
+def identify(strategy: Strategy, measurements: Mapping[str, Measurements], joints: int) -> Estimates:
     """Compliances by a strategy for every prefix length of every data set, with covariance and condition number.
 
     Parameters
@@ -95,7 +102,7 @@ def identify(strategy, measurements, joints):
     return Estimates(compliance, spread, condition)
 
 
-def undetermined_prefixes(strategy, measurements, condition):
+def undetermined_prefixes(strategy: Strategy, measurements: Mapping[str, Measurements], condition: np.ndarray) -> np.ndarray:
     """Which prefixes of which data sets do not determine the compliances: too few measurements, or not the right ones.
 
     Parameters
@@ -115,7 +122,9 @@ def undetermined_prefixes(strategy, measurements, condition):
     return undetermined
 
 
-def estimate_compliance(strategy, measurements, joints):
+def estimate_compliance(
+    strategy: Strategy, measurements: Mapping[str, Measurements], joints: int
+) -> tuple[np.ndarray, list[np.ndarray]]:
     """Solve the stages of a strategy one after the other (equation 11).
 
     Parameters
@@ -149,7 +158,7 @@ def estimate_compliance(strategy, measurements, joints):
     return compliance, triangles
 
 
-def covariance(strategy, measurements, triangles):
+def covariance(strategy: Strategy, measurements: Mapping[str, Measurements], triangles: Sequence[np.ndarray]) -> np.ndarray:
     """Covariance of the estimates for measurements of unit variance, through all stages, also where stages share measurements.
 
     That of a multi-step estimator, whose later stages take over what earlier ones have estimated [1]_; exact here, since every
@@ -159,7 +168,7 @@ def covariance(strategy, measurements, triangles):
     ----------
     strategy, measurements
         As in `identify`.
-    triangles : list of ndarray
+    triangles : sequence of ndarray
         From `estimate_compliance`.
 
     Returns
@@ -178,7 +187,9 @@ def covariance(strategy, measurements, triangles):
        Economic Statistics 3, 1985.
     """
     joints = next(iter(measurements.values())).regressor.shape[1]
-    stages, gains, inverses = without_forgotten_stages(strategy, joints).stages, [], []
+    stages = without_forgotten_stages(strategy, joints).stages
+    gains: list[np.ndarray] = []
+    inverses: list[np.ndarray] = []
     for stage, triangle in zip(stages, triangles[-len(stages) :], strict=True):
         pivots, size = list(stage.identified), len(stage.identified)
         inverse = _row_major(inverse_triangles(triangle[:, :, :size]))
@@ -191,7 +202,9 @@ def covariance(strategy, measurements, triangles):
     total = sum(gain @ np.swapaxes(gain, -1, -2) for gain in gains)
     for (s, earlier), (t, later) in combinations(enumerate(stages), 2):
         if shared := set(earlier.points) & set(later.points):
-            information = _row_major(sum(prefix_information(measurements[name].regressor) for name in sorted(shared)))
+            information = _row_major(
+                sum((prefix_information(measurements[name].regressor) for name in sorted(shared)), np.zeros(()))
+            )
             products = information[..., list(earlier.identified), :][..., list(later.identified)]
             between = np.swapaxes(inverses[s], -1, -2) @ products @ inverses[t]
             cross = gains[s] @ between @ np.swapaxes(gains[t], -1, -2)
@@ -199,7 +212,7 @@ def covariance(strategy, measurements, triangles):
     return total
 
 
-def condition_numbers(strategy, triangles):
+def condition_numbers(strategy: Strategy, triangles: Iterable[np.ndarray]) -> np.ndarray:
     """2-norm condition number of the identification Jacobian, the largest of the stages.
 
     Its inverse is an observability index of calibration [1]_.
@@ -207,7 +220,7 @@ def condition_numbers(strategy, triangles):
     Parameters
     ----------
     strategy : Strategy
-    triangles : list of ndarray
+    triangles : iterable of ndarray
         From `estimate_compliance`; their singular values are those of the regressor.
 
     Returns
@@ -220,7 +233,7 @@ def condition_numbers(strategy, triangles):
     .. [1] Driels, M. R. and Pathre, U. S., Significance of observation strategy on the design of robot calibration experiments,
        Journal of Robotic Systems 7, 1990.
     """
-    largest = 1.0
+    largest: np.ndarray = np.ones(())
     for stage, triangle in zip(strategy.stages, triangles, strict=True):
         matrices = _row_major(triangle[:, :, : len(stage.identified)])
         eigenvalues = np.linalg.eigvalsh(np.swapaxes(matrices, -1, -2) @ matrices)
@@ -229,7 +242,7 @@ def condition_numbers(strategy, triangles):
     return largest
 
 
-def prefix_triangles(systems, configurations, pivots):
+def prefix_triangles(systems: Iterable[np.ndarray], configurations: int, pivots: int) -> np.ndarray:
     """Triangular factor of the first k configurations, for every k, by Householder reflections [1]_.
 
     Parameters
@@ -257,9 +270,10 @@ def prefix_triangles(systems, configurations, pivots):
     .. [1] Householder, A. S., Unitary triangularization of a nonsymmetric matrix, Journal of the ACM 5, 1958.
     .. [2] Lawson, C. L. and Hanson, R. J., Solving Least Squares Problems, Prentice-Hall, 1974.
     """
-    triangles = None
+    triangles: np.ndarray
+    products: np.ndarray
     for index, new in enumerate(systems):
-        if triangles is None:
+        if index == 0:
             triangles = np.zeros((configurations, pivots, *new.shape[1:]))
             products = np.empty_like(new)
         else:
@@ -279,7 +293,7 @@ def prefix_triangles(systems, configurations, pivots):
     return triangles
 
 
-def inverse_triangles(triangle):
+def inverse_triangles(triangle: np.ndarray) -> np.ndarray:
     """Inverses of upper triangular matrices by back substitution.
 
     Parameters
@@ -302,7 +316,7 @@ def inverse_triangles(triangle):
     return inverse
 
 
-def cholesky_triangles(information):
+def cholesky_triangles(information: np.ndarray) -> np.ndarray:
     """Upper triangular Cholesky factors R of symmetric matrices R^T R.
 
     Parameters
@@ -327,7 +341,7 @@ def cholesky_triangles(information):
     return triangle
 
 
-def prefix_information(regressor):
+def prefix_information(regressor: np.ndarray) -> np.ndarray:
     """Sum of A^T A over the first k configurations, for every k.
 
     Parameters
@@ -347,7 +361,7 @@ def prefix_information(regressor):
     return information
 
 
-def _systems(stage, measurements):
+def _systems(stage: Stage, measurements: Mapping[str, Measurements]) -> Iterator[np.ndarray]:
     """Equations of a stage, configuration by configuration; columns: joints identified, joints held, measured deflection."""
     order = stage.identified + stage.held
     points = [measurements[name] for name in stage.points]
@@ -361,6 +375,6 @@ def _systems(stage, measurements):
         yield system.reshape(-1, *system.shape[2:])
 
 
-def _row_major(matrices):
+def _row_major(matrices: np.ndarray) -> np.ndarray:
     """(configurations, m, n, sets) to contiguous (configurations, sets, m, n), as stacked linear algebra wants it."""
     return np.ascontiguousarray(np.moveaxis(matrices, -1, 1))

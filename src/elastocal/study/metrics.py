@@ -1,11 +1,20 @@
 """Equations 12-15: how good an identified model is, in its stiffnesses and at the end-effector."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.elastostatics import exact_deflections, joint_torques, loaded_point, regressor
 from elastocal.mechanics.kinematics import jacobians
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.mechanics.robot import Robot
+    from elastocal.study.experiments import Experiments
 
 # So many models at a time keep their errors at 500 test configurations in a second-level cache.
 MODELS_AT_A_TIME = 400
@@ -30,7 +39,7 @@ class Judge:
     initial_errors: np.ndarray
 
 
-def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
+def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarray, wrench_at: str = "end_effector") -> Judge:
     """Score sheet of the reduced model on test configurations.
 
     Parameters
@@ -65,7 +74,7 @@ def make_judge(robot, experiments, true_deflection, wrench_at="end_effector"):
     return Judge(robot.compliance, forms, np.linalg.norm(true_deflection[..., :3], axis=-1).ravel())
 
 
-def error_moment(judge):
+def error_moment(judge: Judge) -> np.ndarray:
     """Mean over the test configurations of A^T A: the quadratic form of the mean squared position error.
 
     Parameters
@@ -84,7 +93,7 @@ def error_moment(judge):
     return (moment + moment.T)[:-1, :-1]
 
 
-def scored_parts(groups, models):
+def scored_parts(groups: int, models: int) -> list[slice]:
     """Slices of groups of models, small enough for the errors of one to stay in the cache.
 
     Parameters
@@ -101,7 +110,7 @@ def scored_parts(groups, models):
     return [slice(start, start + size) for start in range(0, groups, size)]
 
 
-def position_errors(judge, compliance):
+def position_errors(judge: Judge, compliance: np.ndarray) -> np.ndarray:
     """End-effector position error of models at every test configuration.
 
     Parameters
@@ -121,7 +130,7 @@ def position_errors(judge, compliance):
     return np.sqrt(np.maximum(squares, 0.0, out=squares), out=squares)
 
 
-def mean_deviation(judge, compliance, test_weights=None):
+def mean_deviation(judge: Judge, compliance: np.ndarray, test_weights: np.ndarray | None = None) -> np.ndarray:
     """Equation 15: position error of models, mean over the test configurations.
 
     Parameters
@@ -146,7 +155,7 @@ def mean_deviation(judge, compliance, test_weights=None):
     return means / test_weights.sum(axis=1, keepdims=True)
 
 
-def relative_stiffness_error(compliance, true_compliance):
+def relative_stiffness_error(compliance: np.ndarray, true_compliance: np.ndarray) -> np.ndarray:
     """Equation 13, (k - k0) / k0 in percent, with k = 1 / c.
 
     Parameters
@@ -162,7 +171,7 @@ def relative_stiffness_error(compliance, true_compliance):
     return 100.0 * (true_compliance / compliance - 1.0)
 
 
-def k_sigma(compliance, true_compliance, joints=slice(None)):
+def k_sigma(compliance: np.ndarray, true_compliance: np.ndarray, joints: Sequence[int] | slice = slice(None)) -> np.ndarray:
     """Equation 14: sum of the relative stiffness errors over joints, in percent.
 
     Parameters
@@ -179,7 +188,7 @@ def k_sigma(compliance, true_compliance, joints=slice(None)):
     return relative_stiffness_error(compliance, true_compliance)[..., joints].sum(axis=-1)
 
 
-def first_length_below(values, limit):
+def first_length_below(values: np.ndarray, limit: float) -> np.ndarray:
     """First data set length at which a metric is at most `limit` in absolute value.
 
     Parameters
@@ -197,7 +206,7 @@ def first_length_below(values, limit):
     return np.where(below.any(axis=-1), below.argmax(axis=-1) + 1.0, np.inf)
 
 
-def length_to_reach(values, limit):
+def length_to_reach(values: np.ndarray, limit: float) -> np.ndarray:
     """Data set length at which a metric comes down to `limit`, past the longest one if need be.
 
     Parameters

@@ -3,7 +3,10 @@
 Arrays have the axes (data set, configuration, ...).
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,12 @@ from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.links import extended_chain, spring_compliance
 from elastocal.random_streams import draw
 from elastocal.study.experiments import Experiments
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.mechanics.chain import Chain, MeasuringPoint
+    from elastocal.mechanics.robot import Robot
 
 
 @dataclass(frozen=True)
@@ -31,12 +40,21 @@ class Loading:
     """
 
     force_N: float
-    offset_m: tuple
+    offset_m: tuple[float, ...]
     offset_frame: str
     joint_range: str
 
 
-def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, configurations):
+def random_experiments(
+    chain: Chain,
+    limits: np.ndarray,
+    seed: int,
+    key: str,
+    loading: Loading,
+    purpose: str,
+    data_sets: Sequence[int] | np.ndarray,
+    configurations: int,
+) -> Experiments:
     """Random configurations and wrenches.
 
     Forces have the directions of normal vectors, which are uniform on the sphere [1]_.
@@ -75,7 +93,7 @@ def random_experiments(chain, limits, seed, key, loading, purpose, data_sets, co
     return Experiments(joint_angles, wrench_of_offset_force(force, loading.offset_m, rotation))
 
 
-def true_deflections(robot, experiments, point, wrench_at):
+def true_deflections(robot: Robot, experiments: Experiments, point: MeasuringPoint, wrench_at: str) -> np.ndarray:
     """Deflection of a measuring point: theta from equation 7, then the exact kinematics of all springs.
 
     The virtual joint method, see `mechanics.elastostatics`.
@@ -104,7 +122,9 @@ def true_deflections(robot, experiments, point, wrench_at):
     return exact_deflections(chain, unloaded, springs, measured)
 
 
-def measurement_noise(seed, key, point_name, data_sets, configurations):
+def measurement_noise(
+    seed: int, key: str, point_name: str, data_sets: Sequence[int] | np.ndarray, configurations: int
+) -> np.ndarray:
     """Standard normal noise of the six components at one measuring point; times the noise level it is the measurement error.
 
     The same numbers serve every noise level, so that levels differ by scale alone: common random numbers [1]_.

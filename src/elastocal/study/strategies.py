@@ -1,8 +1,16 @@
 """Identification strategies as data: stages of (points measured, joints identified, joints held from an earlier stage)."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from elastocal.mechanics.chain import Chain
 
 
 @dataclass(frozen=True)
@@ -19,9 +27,9 @@ class Stage:
         Joint indices whose estimates it takes over from earlier stages.
     """
 
-    points: tuple
-    identified: tuple
-    held: tuple = ()
+    points: tuple[str, ...]
+    identified: tuple[int, ...]
+    held: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -36,21 +44,21 @@ class Strategy:
     """
 
     name: str
-    stages: tuple
+    stages: tuple[Stage, ...]
 
     @property
-    def points(self):
+    def points(self) -> tuple[str, ...]:
         """Names of all points that the strategy measures, each once, in order of use."""
         return tuple(dict.fromkeys(name for stage in self.stages for name in stage.points))
 
     @property
-    def first_stage_joints(self):
+    def first_stage_joints(self) -> tuple[int, ...]:
         """Joints that the last stage takes over (which the paper's k_sigma counts alone, interpretation R10); else all."""
         last = self.stages[-1]
         return last.held or tuple(sorted({joint for stage in self.stages for joint in stage.identified}))
 
 
-def strategy_from_document(document):
+def strategy_from_document(document: Mapping[str, Any]) -> Strategy:
     """Make a strategy from the contents of its file, already validated against the strategy schema.
 
     Parameters
@@ -73,7 +81,7 @@ def strategy_from_document(document):
     return Strategy(document["name"], tuple(stages))
 
 
-def without_forgotten_stages(strategy, joints):
+def without_forgotten_stages(strategy: Strategy, joints: int) -> Strategy:
     """What of a strategy the solution of equation 11 depends on: a stage that identifies every joint forgets those before it.
 
     Parameters
@@ -91,7 +99,7 @@ def without_forgotten_stages(strategy, joints):
     return replace(strategy, stages=strategy.stages[first:])
 
 
-def check_strategy(strategy, chain, source):
+def check_strategy(strategy: Strategy, chain: Chain, source: str) -> None:
     """Refuse a strategy that the chain cannot carry out.
 
     Parameters
@@ -107,7 +115,8 @@ def check_strategy(strategy, chain, source):
         An unknown point or joint; a joint that moves a measured point but is neither identified nor held; a held joint that
         no earlier stage identified; a joint that no stage identifies.
     """
-    known, names = set(), [p.name for p in chain.points]
+    known: set[int] = set()
+    names = [p.name for p in chain.points]
     for number, stage in enumerate(strategy.stages, 1):
         where = f"stages[{number}]"
         for name in stage.points:
@@ -128,5 +137,5 @@ def check_strategy(strategy, chain, source):
         raise InputError(source, "stages", f"no stage for joint {_numbers(left)}", "every joint identified in some stage")
 
 
-def _numbers(joints):
+def _numbers(joints: Iterable[int]) -> str:
     return ", ".join(str(joint + 1) for joint in sorted(joints)) or "none"

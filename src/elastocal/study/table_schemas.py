@@ -8,7 +8,7 @@ _CONFIGURATION = Column("configuration", "int32", "", "number of the configurati
 _LENGTH = Column("length", "int32", "", "data set length ds: how many configurations, from the first, were used", minimum=1)
 
 
-def experiments(joints):
+def experiments(joints: int) -> TableSchema:
     """Configurations and wrenches; one row for each loaded configuration."""
     angles = [Column(f"q{j}", "float64", "rad", f"angle of joint {j}") for j in range(1, joints + 1)]
     wrench = [Column(name, "float64", unit, f"{meaning}, at the end-effector") for name, unit, meaning in WRENCH]
@@ -26,12 +26,12 @@ DEFLECTIONS = TableSchema(
 )
 
 
-def covariance_columns(joints):
+def covariance_columns(joints: int) -> list[tuple[str, int, int]]:
     """(name, row, column) of the lower triangle of the covariance of the compliances."""
     return [(f"cov_{i + 1}_{j + 1}", i, j) for i in range(joints) for j in range(i + 1)]
 
 
-def design(joints):
+def design(joints: int) -> TableSchema:
     """What the experiments can tell a strategy, whatever the noise; one row for each data set and length."""
     covariances = [
         Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit measurement variance", missing=True)
@@ -41,7 +41,7 @@ def design(joints):
     return TableSchema("design", (_SET, _LENGTH, *covariances, condition))
 
 
-def identified(joints):
+def identified(joints: int) -> TableSchema:
     """What a strategy identified; one row for each data set and length."""
     compliances = [
         Column(f"c{j}", "float64", "rad/(N m)", f"identified compliance of joint {j}", missing=True)
@@ -50,7 +50,7 @@ def identified(joints):
     return TableSchema("identified", (_SET, _LENGTH, *compliances))
 
 
-def metrics(joints):
+def metrics(joints: int) -> TableSchema:
     """Equations 12-15, averaged over the data sets; one row for each length."""
     columns = [_LENGTH]
     for j in range(1, joints + 1):
@@ -77,7 +77,7 @@ def metrics(joints):
     return TableSchema("metrics", tuple(columns))
 
 
-def accuracy(joints):
+def accuracy(joints: int) -> TableSchema:
     """What one data set gives, as the mean over data sets; one row for each evaluated length."""
     columns = [_LENGTH]
     for name, meaning in (
@@ -130,7 +130,7 @@ INITIAL = TableSchema(
 )
 
 
-def solvers(joints):
+def solvers(joints: int) -> TableSchema:
     """Estimates of both solvers at one length; one row for each strategy and data set, a row group holds one strategy."""
     pairs = [
         Column(f"{solver}_c{j}", "float64", "rad/(N m)", f"compliance of joint {j} by {solver.replace('_', ' ')}")
@@ -152,7 +152,7 @@ BOUNDS = TableSchema(
 )
 
 
-def _with_error(name, unit, meaning, over="data sets and test configurations"):
+def _with_error(name: str, unit: str, meaning: str, over: str = "data sets and test configurations") -> list[Column]:
     return [
         Column(name, "float64", unit, meaning, missing=True),
         Column(f"{name}_std_error", "float64", unit, f"Monte Carlo standard error of {name} over {over}", missing=True),

@@ -4,15 +4,24 @@ Long frames come in with the columns robot, noise_um and strategy in front of th
 measured by simulation has a column of its Monte Carlo standard error, ``<quantity>_std_error``.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from elastocal.study.evaluation import reached_length
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from elastocal.mechanics.robot import Robot
+
 MICRO, MILLI = 1e6, 1e3
 
 
-def table1(robots):
+def table1(robots: Mapping[str, Robot]) -> pd.DataFrame:
     """Joint compliances that the study takes as true.
 
     Parameters
@@ -28,7 +37,7 @@ def table1(robots):
     return pd.DataFrame(rows)
 
 
-def table2(initial, weights):
+def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray]) -> pd.DataFrame:
     """End-effector deviation before calibration, over all configurations of all data sets.
 
     Parameters
@@ -50,8 +59,12 @@ def table2(initial, weights):
         mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
         std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
         largest = np.where(weights[robot] > 0, frame.maximum.to_numpy(), 0.0).max(axis=1)
-        single = {"mean_mm": frame["mean"], "std_mm": np.sqrt(frame.mean_square - frame["mean"] ** 2), "max_mm": frame.maximum}
-        row = {"robot": robot}
+        single: dict[str, pd.Series] = {
+            "mean_mm": frame["mean"],
+            "std_mm": pd.Series(np.sqrt(frame.mean_square - frame["mean"] ** 2)),
+            "max_mm": frame.maximum,
+        }
+        row: dict[str, str | float] = {"robot": robot}
         for name, values in (("mean_mm", mean), ("std_mm", std), ("max_mm", largest)):
             row |= _value_and_error(name, MILLI * values)
         for name, values in single.items():
@@ -60,7 +73,7 @@ def table2(initial, weights):
     return pd.DataFrame(rows)
 
 
-def table3(metrics, robots, strategy, noise_um, length):
+def table3(metrics: pd.DataFrame, robots: Iterable[str], strategy: str, noise_um: float, length: int) -> pd.DataFrame:
     """Compliances from the averaged stiffness (equation 12) by one strategy.
 
     Parameters
@@ -79,8 +92,8 @@ def table3(metrics, robots, strategy, noise_um, length):
     """
     rows = []
     for robot in robots:
-        cell = _by_length(metrics, robot, noise_um, strategy).loc[length]
-        row = {"robot": robot}
+        cell = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
+        row: dict[str, str | float] = {"robot": robot}
         # A robot with fewer joints than another one of the same frame has empty columns for those that it lacks.
         for j in range(1, int(cell.filter(regex=r"^compliance_\d+$").notna().sum()) + 1):
             row |= {f"c{j}": MICRO * cell[f"compliance_{j}"], f"c{j}_std_error": MICRO * cell[f"compliance_{j}_std_error"]}
@@ -88,7 +101,16 @@ def table3(metrics, robots, strategy, noise_um, length):
     return pd.DataFrame(rows)
 
 
-def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_limit_percent, deviation_limit_um):
+def table4(
+    metrics: pd.DataFrame,
+    replicates: pd.DataFrame,
+    robots: Sequence[str],
+    strategies: Iterable[str],
+    noise_um: float,
+    length: int,
+    k_sigma_limit_percent: float,
+    deviation_limit_um: float,
+) -> pd.DataFrame:
     """Comparison of the strategies at one noise level.
 
     Parameters
@@ -113,8 +135,8 @@ def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_li
         for robot in robots:
             cell = _by_length(metrics, robot, noise_um, strategy)
             drawn = _cell(replicates, robot, noise_um, strategy)
-            at = cell.loc[length]
-            row = {"strategy": strategy, "robot": robot}
+            at = _row_of(cell, length)
+            row: dict[str, str | float] = {"strategy": strategy, "robot": robot}
             for suffix in ("", "_first_stage"):
                 name = f"k_sigma{suffix}"
                 row |= {f"k_sigma_{length}_percent{suffix}": at[name]}
@@ -128,7 +150,14 @@ def table4(metrics, replicates, robots, strategies, noise_um, length, k_sigma_li
     return pd.DataFrame(rows)
 
 
-def extended_table(metrics, replicates, robots, strategies, noise_um, length):
+def extended_table(
+    metrics: pd.DataFrame,
+    replicates: pd.DataFrame,
+    robots: Iterable[str],
+    strategies: Sequence[str],
+    noise_um: float,
+    length: int,
+) -> pd.DataFrame:
     """What the reduced model leaves of the deviation of robots with elastic links.
 
     Parameters
@@ -147,7 +176,7 @@ def extended_table(metrics, replicates, robots, strategies, noise_um, length):
     rows = []
     for robot in robots:
         for strategy in strategies:
-            at = _by_length(metrics, robot, noise_um, strategy).loc[length]
+            at = _row_of(_by_length(metrics, robot, noise_um, strategy), length)
             share, error = share_compensated(metrics, replicates, robot, strategy, noise_um, length)
             rows.append(
                 {
@@ -166,7 +195,9 @@ def extended_table(metrics, replicates, robots, strategies, noise_um, length):
     return pd.DataFrame(rows, columns=names)
 
 
-def share_compensated(metrics, replicates, robot, strategy, noise_um, length):
+def share_compensated(
+    metrics: pd.DataFrame, replicates: pd.DataFrame, robot: str, strategy: str, noise_um: float, length: int
+) -> tuple[float, float]:
     """Share of the initial deviation that calibration removes, in percent, with its standard error; NaN where not studied.
 
     Parameters
@@ -184,12 +215,14 @@ def share_compensated(metrics, replicates, robot, strategy, noise_um, length):
     cell = _by_length(metrics, robot, noise_um, strategy)
     if cell.empty:
         return np.nan, np.nan
-    at, drawn = cell.loc[length], _cell(replicates, robot, noise_um, strategy).query("length == @length")
+    at, drawn = _row_of(cell, length), _cell(replicates, robot, noise_um, strategy).query("length == @length")
     shares = 100 * (1 - drawn.deviation / drawn.initial_deviation)
     return float(100 * (1 - at.deviation / at.initial_deviation)), float(shares.std(ddof=1))
 
 
-def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length):
+def deviation_ratio(
+    metrics: pd.DataFrame, replicates: pd.DataFrame, robot: str, strategy: str, over: str, noise_um: float, length: int
+) -> tuple[float, float]:
     """How many times smaller the deviation of `over` is than that of `strategy`, with its error; NaN where not studied.
 
     Parameters
@@ -214,7 +247,9 @@ def deviation_ratio(metrics, replicates, robot, strategy, over, noise_um, length
     return float(values[0] / values[1]), float(np.std(drawn[0] / drawn[1], ddof=1))
 
 
-def per_dataset_table(accuracy, bounds, points):
+def per_dataset_table(
+    accuracy: pd.DataFrame, bounds: Mapping[str, pd.DataFrame], points: Mapping[str, Iterable[str]]
+) -> pd.DataFrame:
     """What one data set gives: accuracy on test configurations beside the Cramér-Rao bound of the same measurements.
 
     Parameters
@@ -245,11 +280,11 @@ def per_dataset_table(accuracy, bounds, points):
     for name in ("mean", "rms", "p95", "max"):
         result[f"{name}_um_std_error"] = MICRO * frame[f"{name}_std_error"]
     result["efficiency_std_error"] = 2 * result.efficiency * result.rms_um_std_error / result.rms_um
-    relative = [column for column in frame if column.startswith("relative_error_")]
+    relative = [column for column in frame.columns if column.startswith("relative_error_")]
     return result.join(frame[relative].add_suffix("_percent").rename(columns=_error_last))
 
 
-def solver_summary(frames):
+def solver_summary(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     """Which strategies are the same estimator, under either solver.
 
     Parameters
@@ -275,7 +310,7 @@ def solver_summary(frames):
         linear, exact = estimates["equation_11"], estimates["gauss_newton"]
         for strategy in exact:
             distance = {other: _largest_difference(exact[strategy], exact[other]) for other in exact if other != strategy}
-            closest = min(distance, key=distance.get, default=strategy)
+            closest = min(distance, key=distance.__getitem__, default=strategy)
             rows.append(
                 {
                     "robot": robot,
@@ -289,7 +324,7 @@ def solver_summary(frames):
     return pd.DataFrame(rows)
 
 
-def with_errors_merged(frame, digits=3):
+def with_errors_merged(frame: pd.DataFrame, digits: int = 3) -> pd.DataFrame:
     """The same table for people: each value with its standard error behind a ± sign, an infinite length as "not reached".
 
     Parameters
@@ -303,7 +338,7 @@ def with_errors_merged(frame, digits=3):
     pandas.DataFrame of str
     """
     shown = {}
-    for column in frame:
+    for column in frame.columns:
         if column.endswith("_std_error"):
             continue
         errors = frame.get(f"{column}_std_error", pd.Series(np.nan, frame.index))
@@ -311,7 +346,7 @@ def with_errors_merged(frame, digits=3):
     return pd.DataFrame(shown)
 
 
-def headed_rows(frame):
+def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
     """The table for people as rows of words, its header first, with names of columns that break at blanks.
 
     Parameters
@@ -326,7 +361,7 @@ def headed_rows(frame):
     return [[name.replace("_", " ") for name in shown.columns], *shown.to_numpy().tolist()]
 
 
-def worded(value, error, digits=3):
+def worded(value: float | str, error: float, digits: int = 3) -> str:
     """A value for people, with two digits of its standard error.
 
     Parameters
@@ -353,30 +388,37 @@ def worded(value, error, digits=3):
     return f"{value:.{decimals}f} ± {error:.{decimals}f}"
 
 
-def _largest_difference(values, others):
+def _largest_difference(values: np.ndarray, others: np.ndarray) -> float:
     return float(np.abs(values / others - 1.0).max())
 
 
-def _cell(frame, robot, noise_um, strategy):
+def _cell(frame: pd.DataFrame, robot: str, noise_um: float, strategy: str) -> pd.DataFrame:
     return frame[(frame.robot == robot) & (frame.noise_um == noise_um) & (frame.strategy == strategy)]
 
 
-def _by_length(metrics, robot, noise_um, strategy):
+def _by_length(metrics: pd.DataFrame, robot: str, noise_um: float, strategy: str) -> pd.DataFrame:
     return _cell(metrics, robot, noise_um, strategy).set_index("length")
 
 
-def _curves(drawn, name):
+def _row_of(cell: pd.DataFrame, length: int) -> pd.Series:
+    """What `_by_length` has of one length, which stands there once."""
+    row = cell.loc[length]
+    assert isinstance(row, pd.Series)
+    return row
+
+
+def _curves(drawn: pd.DataFrame, name: str) -> np.ndarray:
     """Replicates of one quantity as (replicates, lengths)."""
     return drawn.pivot(index="replicate", columns="length", values=name).to_numpy()
 
 
-def _numbered(prefix, values):
+def _numbered(prefix: str, values: Iterable[float]) -> dict[str, float]:
     return {f"{prefix}{j}": float(value) for j, value in enumerate(values, 1)}
 
 
-def _value_and_error(name, replicated):
+def _value_and_error(name: str, replicated: np.ndarray) -> dict[str, float]:
     return {name: float(replicated[0]), f"{name}_std_error": float(np.std(replicated[1:], ddof=1))}
 
 
-def _error_last(column):
+def _error_last(column: str) -> str:
     return column.replace("_std_error_percent", "_percent_std_error")

@@ -3,6 +3,10 @@
 Covariance and condition number depend on configurations and loads alone, so they are worked out once for all noise levels.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces, loaded_point, regressor
@@ -17,6 +21,12 @@ from elastocal.study.identification import (
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_experiments
 from elastocal.study.table_schemas import covariance_columns
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Iterator, Mapping
+
+    from elastocal.mechanics.chain import Chain
+    from elastocal.study.strategies import Strategy
+
 
 class Design:
     """Regressors of one block of data sets, configuration before data set.
@@ -26,7 +36,7 @@ class Design:
     experiments : dict
         Block of the experiments table.
     chain : Chain
-    points : iterable of str
+    points : collection of str
     rows : int
         6 where poses are measured, 3 where positions are.
     wrench_at : {"end_effector", "measuring_point"}
@@ -40,7 +50,9 @@ class Design:
     regressors : dict of str to ndarray (rows, n, configurations, sets)
     """
 
-    def __init__(self, experiments, chain, points, rows, wrench_at):
+    def __init__(
+        self, experiments: Mapping[str, np.ndarray], chain: Chain, points: Collection[str], rows: int, wrench_at: str
+    ) -> None:
         loads = to_experiments(experiments)
         self.joint_angles, wrench = configuration_first(loads.joint_angles), configuration_first(loads.wrench)
         loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
@@ -55,7 +67,9 @@ class Design:
         }
 
 
-def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
+def design_blocks(
+    experiment_blocks: Iterable[Mapping[str, np.ndarray]], chain: Chain, strategy: Strategy, rows: int, wrench_at: str
+) -> Iterator[dict[str, np.ndarray]]:
     """Covariances for measurements of unit variance and condition numbers of a strategy, in blocks.
 
     Parameters
@@ -85,6 +99,6 @@ def design_blocks(experiment_blocks, chain, strategy, rows, wrench_at):
         yield columns | {"condition": condition.T.ravel()}
 
 
-def configuration_first(array):
+def configuration_first(array: np.ndarray) -> np.ndarray:
     """(sets, configurations, k) to (configurations, sets, k) with memory in the order k, configurations, sets."""
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(array, (2, 1, 0), (0, 1, 2))), 0, -1)

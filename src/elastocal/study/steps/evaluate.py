@@ -1,5 +1,9 @@
 """Step 4: the metrics of one strategy from its identified compliances."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.study.evaluation import (
@@ -9,17 +13,33 @@ from elastocal.study.evaluation import (
     metrics_table,
     replicates_table,
 )
-from elastocal.study.metrics import make_judge
+from elastocal.study.metrics import Judge, make_judge
 from elastocal.study.steps.columns import data_sets, to_deflections, to_experiments
 from elastocal.study.steps.weights import to_weights
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-def judge_from(robot, test_experiments, test_deflections, wrench_at):
+    from elastocal.mechanics.robot import Robot
+
+
+def judge_from(
+    robot: Robot, test_experiments: Mapping[str, np.ndarray], test_deflections: Mapping[str, np.ndarray], wrench_at: str
+) -> Judge:
     """Score sheet from the tables of the test configurations; see `metrics.make_judge`."""
     return make_judge(robot, to_experiments(test_experiments), to_deflections(test_deflections), wrench_at)
 
 
-def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage_joints, method, deviation_of, lengths):
+def evaluated(
+    identified_blocks: Iterable[Mapping[str, np.ndarray]],
+    weight_blocks: Iterable[Mapping[str, np.ndarray]],
+    test_weights: Mapping[str, np.ndarray],
+    judge: Judge,
+    first_stage_joints: Sequence[int],
+    method: str,
+    deviation_of: str,
+    lengths: Sequence[int],
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Tables of metrics, bootstrap replicates and accuracy of one strategy.
 
     Parameters
@@ -41,9 +61,10 @@ def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage
     -------
     metrics, replicates, accuracy : dict of str to ndarray
     """
-    joints, evaluated_rows, sums = len(judge.reference), np.asarray(lengths) - 1, []
+    joints, evaluated_rows = len(judge.reference), np.asarray(lengths) - 1
+    sums: list[np.ndarray] = []
 
-    def weighted():
+    def weighted() -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Estimates with their weights, one pass for both views of them."""
         for block, counts in zip(identified_blocks, weight_blocks, strict=True):
             sets = data_sets(block)
@@ -55,5 +76,5 @@ def evaluated(identified_blocks, weight_blocks, test_weights, judge, first_stage
     return (
         metrics_table(averages, judge.reference, first_stage_joints),
         replicates_table(averages, judge.reference, first_stage_joints),
-        accuracy_table(sum(sums), lengths),
+        accuracy_table(sum(sums, np.zeros(())), lengths),
     )

@@ -1,5 +1,9 @@
 """Step 3: one strategy on measured data sets, every prefix length."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.study.gauss_newton import identify_exactly
@@ -7,8 +11,16 @@ from elastocal.study.identification import Measurements, estimate_compliance
 from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections
 from elastocal.study.steps.design import Design, configuration_first
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-def paired_blocks(experiments, deflections):
+    from elastocal.mechanics.chain import Chain
+    from elastocal.study.strategies import Strategy
+
+
+def paired_blocks(
+    experiments: Iterable[dict[str, np.ndarray]], deflections: Mapping[str, Iterable[dict[str, np.ndarray]]]
+) -> Iterator[tuple[dict[str, np.ndarray], dict[str, dict[str, np.ndarray]]]]:
     """Blocks of the experiments with those of the deflections of the same data sets.
 
     Parameters
@@ -26,7 +38,15 @@ def paired_blocks(experiments, deflections):
         yield block, dict(zip(deflections, measured, strict=True))
 
 
-def identified_blocks(blocks, designs, chain, strategy, rows, wrench_at, start=None):
+def identified_blocks(
+    blocks: Iterable[tuple[Mapping[str, np.ndarray], Mapping[str, Mapping[str, np.ndarray]]]],
+    designs: Iterable[Mapping[str, np.ndarray]],
+    chain: Chain,
+    strategy: Strategy,
+    rows: int,
+    wrench_at: str,
+    start: float | None = None,
+) -> Iterator[dict[str, np.ndarray]]:
     """Compliances in blocks; not a number where the design says that a prefix does not determine them.
 
     Parameters
@@ -78,7 +98,15 @@ class Situation:
         For equation 11.
     """
 
-    def __init__(self, experiments, deflections, chain, strategy, rows, wrench_at):
+    def __init__(
+        self,
+        experiments: Mapping[str, np.ndarray],
+        deflections: Mapping[str, Mapping[str, np.ndarray]],
+        chain: Chain,
+        strategy: Strategy,
+        rows: int,
+        wrench_at: str,
+    ) -> None:
         self.chain, self.strategy = chain, strategy
         self.design = Design(experiments, chain, strategy.points, rows, wrench_at)
         self.measured = {name: configuration_first(to_deflections(deflections[name]))[..., :rows] for name in strategy.points}
@@ -87,9 +115,9 @@ class Situation:
             for name in strategy.points
         }
 
-    def solved_exactly(self, start, lengths):
+    def solved_exactly(self, start: float, lengths: Sequence[int]) -> np.ndarray:
         """Compliances by Gauss-Newton from `start`, (lengths, n, sets); see `gauss_newton.identify_exactly`."""
-        start = np.full(self.chain.coordinates, start)
+        starts = np.full(self.chain.coordinates, start)
         return identify_exactly(
-            self.strategy, self.chain, self.design.joint_angles, self.design.torques, self.measured, start, lengths
+            self.strategy, self.chain, self.design.joint_angles, self.design.torques, self.measured, starts, lengths
         )

@@ -1,11 +1,22 @@
 """Step 2: noise on the ideal deflections."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.mechanics.components import COMPONENT_NAMES
 from elastocal.study.simulation import measurement_noise
 from elastocal.study.steps.columns import block_shape, data_sets
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
-def measured_blocks(ideal_blocks, key, seed, noise):
+    import numpy as np
+
+
+def measured_blocks(
+    ideal_blocks: Iterable[dict[str, np.ndarray]], key: str, seed: int, noise: float
+) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections as measured: ideal plus independent normal noise on every component.
 
     Parameters

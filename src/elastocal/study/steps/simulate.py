@@ -1,11 +1,25 @@
 """Step 1: random configurations and wrenches, and the deflections that they cause, without noise."""
 
-from elastocal.study.simulation import random_experiments, true_deflections
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.study.simulation import Loading, random_experiments, true_deflections
 from elastocal.study.steps import SETS_PER_BLOCK
 from elastocal.study.steps.columns import data_sets, deflection_columns, experiment_columns, to_experiments
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
 
-def experiment_blocks(chain, limits, key, seed, loading, purpose, data_sets, configurations):
+    import numpy as np
+
+    from elastocal.mechanics.chain import Chain
+    from elastocal.mechanics.robot import Robot
+
+
+def experiment_blocks(
+    chain: Chain, limits: np.ndarray, key: str, seed: int, loading: Loading, purpose: str, data_sets: int, configurations: int
+) -> Iterator[dict[str, np.ndarray]]:
     """Random experiments, in blocks of data sets.
 
     Parameters
@@ -31,7 +45,9 @@ def experiment_blocks(chain, limits, key, seed, loading, purpose, data_sets, con
         yield experiment_columns(sets, random_experiments(chain, limits, seed, key, loading, purpose, sets, configurations))
 
 
-def ideal_blocks(experiments, robot, wrench_at):
+def ideal_blocks(
+    experiments: Iterable[Mapping[str, np.ndarray]], robot: Robot, wrench_at: str
+) -> Iterator[dict[str, np.ndarray | str]]:
     """Deflections without noise of every measuring point.
 
     Parameters

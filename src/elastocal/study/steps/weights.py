@@ -1,14 +1,21 @@
 """Step 4a: the bootstrap weights of one robot, drawn once for all strategies and noise levels."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
 from elastocal.study.steps import SETS_PER_BLOCK
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
 DATA_SETS, TESTS = "data sets", "test configurations"
 
 
-def weight_blocks(key, seed, data_sets, tests, replicates):
+def weight_blocks(key: str, seed: int, data_sets: int, tests: int, replicates: int) -> Iterator[dict[str, np.ndarray | str]]:
     """How often each data set and each test configuration counts in each bootstrap replicate, in blocks.
 
     Parameters
@@ -31,13 +38,13 @@ def weight_blocks(key, seed, data_sets, tests, replicates):
     yield _columns(TESTS, range(tests), bootstrap_test_weights(seed, key, tests, replicates))
 
 
-def to_weights(columns):
+def to_weights(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Weights (1 + replicates, members) of a block of the weights table; replicate 0 counts each member once."""
     counts = columns["count"].reshape(-1, columns["replicate"].max())
     return np.vstack([np.ones(len(counts)), counts.T])
 
 
-def _columns(members, numbers, weights):
+def _columns(members: str, numbers: Sequence[int], weights: np.ndarray) -> dict[str, np.ndarray | str]:
     counts = weights[1:].T
     return {
         "members": members,
