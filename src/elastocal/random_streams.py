@@ -4,13 +4,19 @@ Every stream is named by (seed, robot, purpose, data set): the first two make th
 its position. How many sets are drawn, in which order, by how many cores or in which blocks cannot change a number.
 """
 
+from __future__ import annotations
+
 import hashlib
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
 
-def stream(seed, robot, purpose, data_set):
+
+def stream(seed: int, robot: str, purpose: str, data_set: int) -> np.random.Generator:
     """Generator for one purpose in one data set.
 
     Parameters
@@ -30,7 +36,9 @@ def stream(seed, robot, purpose, data_set):
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, data_set, use]))
 
 
-def draw(seed, robot, purpose, data_sets, sampler):
+def draw(
+    seed: int, robot: str, purpose: str, data_sets: Iterable[int], sampler: Callable[[np.random.Generator], np.ndarray]
+) -> np.ndarray:
     """One array for each data set, stacked.
 
     Parameters
@@ -57,7 +65,7 @@ def draw(seed, robot, purpose, data_sets, sampler):
 
 
 @lru_cache
-def _names(seed, robot, purpose):
+def _names(seed: int, robot: str, purpose: str) -> tuple[np.ndarray, int]:
     """Key and position of the streams of one purpose."""
     key = np.frombuffer(hashlib.sha256(f"{seed}/{robot}".encode()).digest()[:16], np.uint64)
     return key, int.from_bytes(hashlib.sha256(purpose.encode()).digest()[:8], "little")

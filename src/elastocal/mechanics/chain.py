@@ -18,13 +18,19 @@ References
    23, 2007.
 """
 
+from __future__ import annotations
+
 import math
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 AXES = "xyz"
 _TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
@@ -72,7 +78,7 @@ class MeasuringPoint:
 
     name: str
     after: int
-    offset_m: tuple = (0.0, 0.0, 0.0)
+    offset_m: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -88,40 +94,40 @@ class Chain:
         Number of coordinates that the transforms refer to.
     """
 
-    transforms: tuple
-    points: tuple
+    transforms: tuple[Transform, ...]
+    points: tuple[MeasuringPoint, ...]
     coordinates: int
 
     @property
-    def end_effector(self):
+    def end_effector(self) -> MeasuringPoint:
         """The last measuring point, where the external wrench is stated."""
         return self.points[-1]
 
-    def point(self, name):
+    def point(self, name: str) -> MeasuringPoint:
         """The measuring point called `name`; KeyError names those there are."""
         for point in self.points:
             if point.name == name:
                 return point
         raise KeyError(f"measuring point {name!r}; the chain has {', '.join(p.name for p in self.points)}")
 
-    def moved_by(self, point):
+    def moved_by(self, point: MeasuringPoint) -> tuple[int, ...]:
         """Indices of the coordinates before `point`, each once: those that can move it."""
         transforms = self.transforms[: point.after]
         return tuple(dict.fromkeys(t.coordinate for t in transforms if t.coordinate is not None))
 
     @property
-    def prismatic(self):
+    def prismatic(self) -> tuple[bool, ...]:
         """Whether each coordinate is a shift and not a turn, tuple of bool."""
         kinds = {t.coordinate: t.kind == "T" for t in self.transforms if t.coordinate is not None}
         return tuple(kinds.get(coordinate, False) for coordinate in range(self.coordinates))
 
-    def is_passive(self, place):
+    def is_passive(self, place: int) -> bool:
         """Whether the transform at a place is moved by a coordinate that moves one before it as well."""
         coordinate = self.transforms[place].coordinate
         return coordinate is not None and any(t.coordinate == coordinate for t in self.transforms[:place])
 
 
-def parse_chain(text, lengths_m, source):
+def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain:
     """Read the chain notation.
 
     Parameters
@@ -143,7 +149,10 @@ def parse_chain(text, lengths_m, source):
         A token outside the notation, an unknown or unused length, joints that are not q1..qn in order, a joint that turns in
         one place and shifts in another, no measuring point, a measuring point named twice.
     """
-    transforms, points, used, kinds = [], [], set(), {}
+    transforms: list[Transform] = []
+    points: list[MeasuringPoint] = []
+    used: set[str] = set()
+    kinds: dict[str, str] = {}
     for word in text.split():
         token = _TOKEN.fullmatch(word)
         if not token:
@@ -179,7 +188,7 @@ def parse_chain(text, lengths_m, source):
     return Chain(tuple(transforms), tuple(points), len(kinds))
 
 
-def notation(chain):
+def notation(chain: Chain) -> str:
     """A chain in the notation that `parse_chain` reads, with its lengths as numbers.
 
     Parameters
@@ -198,7 +207,7 @@ def notation(chain):
     return " ".join(words)
 
 
-def _word(transform):
+def _word(transform: Transform) -> str:
     turns = transform.kind == "R"
     if transform.coordinate is not None:
         sign, argument = transform.sign, f"q{transform.coordinate + 1}"
@@ -209,7 +218,7 @@ def _word(transform):
     return f"{transform.kind}{AXES[transform.axis]}({'-' if sign < 0 else ''}{argument})"
 
 
-def stretches(chain):
+def stretches(chain: Chain) -> tuple[tuple[int, tuple[float, ...]], ...]:
     """Rigid stretches between the joints, as (transforms before the far end, vector in the frame of the chain there).
 
     Rotations by a fixed angle inside a stretch are not supported here, as in any chain that turns at its joints only.

@@ -9,18 +9,30 @@ References
 .. [1] Murray, R. M., Li, Z. and Sastry, S. S., A Mathematical Introduction to Robotic Manipulation, CRC Press, 1994.
 """
 
+from __future__ import annotations
+
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.products import product, product_difference, product_sum
 
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
+
 # So many configurations at a time keep all intermediate arrays in a second-level cache.
 BLOCK = 8192
 
+# Components of a vector in the base frame, each a number or an ndarray (S,); and the three axes of a frame.
+Vector = list[float | np.ndarray]
+Axes = list[Vector]
 
-def blocks(size):
+
+def blocks(size: int) -> list[slice]:
     """Cut so many configurations into blocks of `BLOCK`.
 
     Parameters
@@ -53,12 +65,14 @@ class Screw:
     place: int
     kind: str
     sign: float
-    axis: list
-    origin: list
+    axis: Vector
+    origin: Vector | None
     coordinate: int
 
 
-def sweep(chain, coordinates, points, lines=False):
+def sweep(
+    chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint], lines: bool = False
+) -> tuple[list[tuple[Axes, Vector]], list[Screw]]:
     """Walk the chain up to the last of the points.
 
     Parameters
@@ -83,8 +97,10 @@ def sweep(chain, coordinates, points, lines=False):
     still = set(np.flatnonzero(~coordinates.any(axis=1)).tolist())
     rotations = [transform for transform in transforms if transform.kind == "R" and transform.coordinate not in still]
     turns = iter(_cosines_and_sines(coordinates, rotations))
-    axes = before_turns = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    origin, turned_about = [0.0, 0.0, 0.0], None
+    axes: Axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    before_turns = axes
+    origin: Vector = [0.0, 0.0, 0.0]
+    turned_about: int | None = None
     screws = []
     frames = {0: (axes, origin)}
     for number, transform in enumerate(transforms):
@@ -109,21 +125,24 @@ def sweep(chain, coordinates, points, lines=False):
     return [(frames[point.after][0], _offset(*frames[point.after], point.offset_m)) for point in points], screws
 
 
-def _offset(axes, origin, offset_m):
+def _offset(axes: Axes, origin: Vector, offset_m: Sequence[float]) -> Vector:
     for axis, length in zip(axes, offset_m, strict=True):
         origin = _moved(origin, length, axis)
     return origin
 
 
-def _lies_on(axis, transforms, point):
+def _lies_on(axis: int, transforms: Sequence[Transform], point: MeasuringPoint) -> bool:
     """Whether transforms along and about one axis are all that lies between this axis and the point."""
     offset = [length for direction, length in enumerate(point.offset_m) if direction != axis]
     return not any(offset) and all(transform.axis == axis for transform in transforms)
 
 
-def _cosines_and_sines(coordinates, rotations):
+def _cosines_and_sines(
+    coordinates: np.ndarray, rotations: Sequence[Transform]
+) -> list[tuple[float | np.ndarray, float | np.ndarray]]:
     """Cosine and sine of each rotation, counted from the first of those before it that turn about the same axis."""
-    angles, turned_about = [], None
+    angles: list[float | np.ndarray] = []
+    turned_about: int | None = None
     for rotation in rotations:
         angle = rotation.constant if rotation.coordinate is None else product(rotation.sign, coordinates[rotation.coordinate])
         angles.append(angles[-1] + angle if rotation.axis == turned_about else angle)
@@ -132,7 +151,7 @@ def _cosines_and_sines(coordinates, rotations):
     return [(math.cos(angle), math.sin(angle)) if type(angle) is float else next(moving) for angle in angles]
 
 
-def _cosines_and_sines_of_arrays(angles, size):
+def _cosines_and_sines_of_arrays(angles: Sequence[float | np.ndarray], size: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """By the tangent of half the angle (Weierstrass substitution), which is faster in numpy than either of them."""
     tangent = np.empty((len(angles), size))
     for half, angle in zip(tangent, angles, strict=True):
@@ -146,7 +165,7 @@ def _cosines_and_sines_of_arrays(angles, size):
     return zip(scale, tangent, strict=True)
 
 
-def _turned(axes, about, cosine, sine):
+def _turned(axes: Axes, about: int, cosine: float | np.ndarray, sine: float | np.ndarray) -> Axes:
     """Axes of a frame after it has turned about one of them."""
     second, third = axes[about - 2], axes[about - 1]
     axes = list(axes)
@@ -155,11 +174,11 @@ def _turned(axes, about, cosine, sine):
     return axes
 
 
-def _moved(origin, amount, axis):
+def _moved(origin: Vector, amount: float | np.ndarray, axis: Vector) -> Vector:
     return [product_sum(amount, a, 1.0, o) for o, a in zip(origin, axis, strict=True)]
 
 
-def store_pose(axes, origin, position, rotation):
+def store_pose(axes: Axes, origin: Vector, position: np.ndarray, rotation: np.ndarray) -> None:
     """Write a frame of a walk to arrays.
 
     Parameters

@@ -14,15 +14,25 @@ References
    Machine Theory 44, 2009.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.kinematics import jacobians, poses
 from elastocal.mechanics.pose_differences import pose_differences
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
-def wrench_of_offset_force(force, offset_m, rotation=None):
+    from elastocal.mechanics.chain import Chain, MeasuringPoint
+
+
+def wrench_of_offset_force(
+    force: np.ndarray, offset_m: Sequence[float] | np.ndarray, rotation: np.ndarray | None = None
+) -> np.ndarray:
     """Wrench at the end-effector of a force whose line of action is shifted from it.
 
     Parameters
@@ -44,7 +54,7 @@ def wrench_of_offset_force(force, offset_m, rotation=None):
     return np.concatenate([force, np.cross(lever, force)], axis=-1)
 
 
-def generalized_forces(jacobian, wrench):
+def generalized_forces(jacobian: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     """Torques (forces) on the coordinates of a chain, J^T w (the right-hand factor of equation 7).
 
     The principle of virtual work, by which statics is dual to kinematics [1]_.
@@ -63,10 +73,10 @@ def generalized_forces(jacobian, wrench):
     ----------
     .. [1] Siciliano, B., Sciavicco, L., Villani, L. and Oriolo, G., Robotics: Modelling, Planning and Control, Springer, 2009.
     """
-    return sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6))
+    return np.asarray(sum(jacobian[..., row, :] * wrench[..., row, None] for row in range(6)))
 
 
-def loaded_point(chain, point, wrench_at):
+def loaded_point(chain: Chain, point: MeasuringPoint, wrench_at: str) -> MeasuringPoint:
     """Where the wrench acts that deflects a measuring point (interpretation R6).
 
     Parameters
@@ -83,7 +93,7 @@ def loaded_point(chain, point, wrench_at):
     return replace(chain.end_effector, offset_m=(0.0, 0.0, 0.0)) if wrench_at == "end_effector" else point
 
 
-def joint_torques(chain, joint_angles, wrench, at):
+def joint_torques(chain: Chain, joint_angles: np.ndarray, wrench: np.ndarray, at: MeasuringPoint) -> np.ndarray:
     """Torques that a wrench puts on the joints.
 
     Parameters
@@ -103,7 +113,7 @@ def joint_torques(chain, joint_angles, wrench, at):
     return generalized_forces(jacobians(chain, joint_angles, at), wrench)
 
 
-def regressor(jacobian, torques, out=None):
+def regressor(jacobian: np.ndarray, torques: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     """Matrix A of equation 10, with columns J_j J_j^T w, so that the deflection is A c (equation 9).
 
     Parameters
@@ -123,7 +133,9 @@ def regressor(jacobian, torques, out=None):
     return np.multiply(jacobian, torques[..., None, :], out=out)
 
 
-def exact_deflections(chain, coordinates, spring_deflections, point):
+def exact_deflections(
+    chain: Chain, coordinates: np.ndarray, spring_deflections: np.ndarray, point: MeasuringPoint
+) -> np.ndarray:
     """Deflection of a measuring point by the exact kinematics: the pose at q + theta against the pose at q.
 
     Parameters

@@ -4,13 +4,23 @@ Arrays come and go with the batch in front, ``(..., 6, n)``, but lie in memory c
 runs along the batch; slices such as ``jacobian[..., 0, 2]`` are contiguous.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
 from elastocal.mechanics.products import product, product_difference
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
 
-def poses(chain, coordinates, point):
+    from elastocal.mechanics.chain import Chain, MeasuringPoint
+    from elastocal.mechanics.chain_walk import Screw, Vector
+
+
+def poses(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> tuple[np.ndarray, np.ndarray]:
     """Position and orientation of a measuring point in the base frame (equations 1-4).
 
     Parameters
@@ -31,7 +41,7 @@ def poses(chain, coordinates, point):
     return position[0], rotation[0]
 
 
-def poses_of_points(chain, coordinates, points):
+def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> tuple[np.ndarray, np.ndarray]:
     """Poses of several measuring points in one walk along the chain.
 
     Parameters
@@ -55,7 +65,9 @@ def poses_of_points(chain, coordinates, points):
     return _each_batch_first(position, batch), _each_batch_first(rotation, batch)
 
 
-def poses_and_jacobians(chain, coordinates, point, out=None):
+def poses_and_jacobians(
+    chain: Chain, coordinates: np.ndarray, point: MeasuringPoint, out: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pose of a measuring point and its geometric Jacobian with respect to every coordinate of the chain.
 
     Parameters
@@ -102,7 +114,7 @@ def poses_and_jacobians(chain, coordinates, point, out=None):
     return _batch_first(position, batch), _batch_first(rotation, batch), _batch_first(jacobian, batch)
 
 
-def jacobians(chain, coordinates, point):
+def jacobians(chain: Chain, coordinates: np.ndarray, point: MeasuringPoint) -> np.ndarray:
     """Geometric Jacobian of a measuring point, where its pose is not needed.
 
     Parameters
@@ -123,34 +135,35 @@ def jacobians(chain, coordinates, point):
     return _batch_first(jacobian, batch)
 
 
-def _component_first(coordinates):
+def _component_first(coordinates: np.ndarray) -> tuple[np.ndarray, tuple[int, ...]]:
     coordinates = np.asarray(coordinates, float)
     batch = coordinates.shape[:-1]
     return np.moveaxis(coordinates, -1, 0).reshape(coordinates.shape[-1], -1), batch
 
 
-def _component_first_view(array, axes):
+def _component_first_view(array: np.ndarray, axes: int) -> np.ndarray:
     """Memory of a result of this module, component first."""
     components = np.moveaxis(array, range(-axes, 0), range(axes))
     return components.reshape(*components.shape[:axes], -1)
 
 
-def _batch_first(components, batch):
+def _batch_first(components: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     shape = components.shape[:-1]
     components = components.reshape(*shape, *batch)
     return np.moveaxis(components, range(len(shape)), range(-len(shape), 0))
 
 
-def _each_batch_first(components, batch):
+def _each_batch_first(components: np.ndarray, batch: tuple[int, ...]) -> np.ndarray:
     """As `_batch_first`, behind an axis of points."""
     shape = components.shape[1:-1]
     components = components.reshape(len(components), *shape, *batch)
     return np.moveaxis(components, range(1, 1 + len(shape)), range(-len(shape), 0))
 
 
-def _store_twists(screws, after, target, jacobian):
+def _store_twists(screws: Iterable[Screw], after: int, target: Vector, jacobian: np.ndarray) -> None:
     """Columns of a Jacobian; a coordinate that moves several transforms has the sum of their twists."""
-    levers, filled = {}, set()
+    levers: dict[int, Vector] = {}
+    filled: set[int] = set()
     for screw in screws:
         if screw.place >= after:
             break
@@ -165,7 +178,7 @@ def _store_twists(screws, after, target, jacobian):
         jacobian[:, coordinate] = 0.0
 
 
-def _store_twist(screw, target, levers, twist):
+def _store_twist(screw: Screw, target: Vector, levers: dict[int, Vector], twist: np.ndarray) -> None:
     axis, origin = screw.axis, screw.origin
     linear, angular = twist[:3], twist[3:]
     if screw.kind == "T":
@@ -184,11 +197,11 @@ def _store_twist(screw, target, levers, twist):
         twist *= -1.0
 
 
-def _store(vector, out):
+def _store(vector: Vector, out: np.ndarray) -> None:
     for component, place in zip(vector, out, strict=True):
         place[:] = component
 
 
-def _store_cross(a, b, out):
+def _store_cross(a: Vector, b: Vector, out: np.ndarray) -> None:
     for i, place in enumerate(out):
         np.subtract(product(a[i - 2], b[i - 1]), product(a[i - 1], b[i - 2]), out=place)

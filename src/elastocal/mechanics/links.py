@@ -1,13 +1,19 @@
 """Equation 5: the extended model, a six-dimensional spring at the end of each link, from a thick-walled tube."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 
+if TYPE_CHECKING:
+    from elastocal.mechanics.robot import Link, Robot, Tube
 
-def tube_compliance(tube, length_m):
+
+def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
     """Compliance of a cantilever tube at its tip, beam along x (Euler-Bernoulli bending [1]_, St Venant torsion [2]_).
 
     Parameters
@@ -44,7 +50,7 @@ def tube_compliance(tube, length_m):
     return compliance
 
 
-def link_compliance(link):
+def link_compliance(link: Link) -> np.ndarray:
     """Compliance of a link at its far end, in the frame of the chain there.
 
     Parameters
@@ -60,10 +66,10 @@ def link_compliance(link):
     helper = np.eye(3)[np.argmin(np.abs(along))]
     across = np.cross(along, helper) / np.linalg.norm(np.cross(along, helper))
     turn = np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
-    return turn @ tube_compliance(link.tube, np.linalg.norm(link.vector_m)) @ turn.T
+    return turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
 
 
-def extended_chain(robot):
+def extended_chain(robot: Robot) -> Chain:
     """The robot's chain with Tx Ty Tz Rx Ry Rz springs (equation 5) at the far end of each link.
 
     Links of the virtual joint method: each yields in a six-dimensional virtual joint [1]_.
@@ -82,7 +88,8 @@ def extended_chain(robot):
     .. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism
        and Machine Theory 44, 2009.
     """
-    transforms, count, new_index = [], robot.joints, {}
+    transforms: list[Transform] = []
+    count, new_index = robot.joints, {}
     ends = {link.after for link in robot.links}
     for index in range(len(robot.chain.transforms) + 1):
         if index in ends:
@@ -96,7 +103,7 @@ def extended_chain(robot):
     return Chain(tuple(transforms), points, count)
 
 
-def spring_compliance(robot):
+def spring_compliance(robot: Robot) -> np.ndarray:
     """Aggregated compliance of all springs of the extended chain, the inverse of K_theta in equation 7.
 
     Parameters
@@ -117,7 +124,7 @@ def spring_compliance(robot):
     return compliance
 
 
-def with_tube(robot, tube):
+def with_tube(robot: Robot, tube: Tube) -> Robot:
     """The same robot with every link made of `tube`.
 
     Parameters

@@ -3,12 +3,20 @@
 Arrays are component first, with the configurations behind.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.mechanics.chain import Chain, MeasuringPoint
 
 
 @dataclass(frozen=True)
@@ -38,7 +46,7 @@ class Motion:
     place: np.ndarray
     coordinate: np.ndarray
 
-    def jacobian(self, after, position, rows=6, chosen=slice(None)):
+    def jacobian(self, after: int, position: np.ndarray, rows: int = 6, chosen: slice | np.ndarray = slice(None)) -> np.ndarray:
         """Geometric Jacobian of points behind so many transforms of the chain.
 
         Parameters
@@ -66,7 +74,7 @@ class Motion:
         moved[3:] = angular[: rows - 3]
         return self._behind_none(moved, after)
 
-    def generalized_forces(self, after, force, moment):
+    def generalized_forces(self, after: int, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
         """Force or torque on each coordinate by a wrench on what lies behind so many transforms of the chain.
 
         Parameters
@@ -82,16 +90,16 @@ class Motion:
         on_each = np.einsum("ik...,i...->k...", self.twist, np.concatenate([force, moment]))
         return self._behind_none(on_each, after)
 
-    def by_coordinate(self, values):
+    def by_coordinate(self, values: np.ndarray) -> np.ndarray:
         """Values (..., K', S) of the transforms of the first coordinates, or of all, summed for each: (..., C', S)."""
         if self._one_each:
             return values
         coordinate = self.coordinate[: values.shape[-2]]
         out = np.zeros((*values.shape[:-2], coordinate[-1] + 1, values.shape[-1]))
-        np.add.at(out, (..., coordinate, slice(None)), values)
+        np.add.at(out, (..., coordinate, slice(None)), values)  # type: ignore[arg-type]  # The stubs know no slices here.
         return out
 
-    def _behind_none(self, values, after):
+    def _behind_none(self, values: np.ndarray, after: int) -> np.ndarray:
         """By coordinate, without transforms behind a place of the chain."""
         behind = self.place >= after
         if behind.any():
@@ -99,11 +107,11 @@ class Motion:
         return self.by_coordinate(values)
 
     @cached_property
-    def _one_each(self):
+    def _one_each(self) -> bool:
         return len(np.unique(self.coordinate)) == len(self.coordinate)
 
 
-def motion(chain, coordinates, points):
+def motion(chain: Chain, coordinates: np.ndarray, points: Sequence[MeasuringPoint]) -> Motion:
     """Poses of several measuring points and the twist of every transform that moves, in one walk along the chain.
 
     Parameters
@@ -129,6 +137,7 @@ def motion(chain, coordinates, points):
         for number, frame in enumerate(frames):
             store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
         for screw in screws:
+            assert screw.origin is not None  # A walk with lines finds a point of each axis.
             for i in range(3):
                 axis[i, order[screw.place], part], origin[i, order[screw.place], part] = screw.axis[i], screw.origin[i]
     driven, places = np.array(moving, int).T

@@ -3,7 +3,7 @@
 import numpy as np
 
 
-def pose_differences(position, rotation, position_0, rotation_0):
+def pose_differences(position: np.ndarray, rotation: np.ndarray, position_0: np.ndarray, rotation_0: np.ndarray) -> np.ndarray:
     """How far one pose is from another: displacement (m) and rotation vector (rad), both in base axes.
 
     Parameters
@@ -27,7 +27,7 @@ def pose_differences(position, rotation, position_0, rotation_0):
     return np.moveaxis(difference, 0, -1)
 
 
-def rotation_vectors(rotation):
+def rotation_vectors(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors of rotation matrices, for angles below pi.
 
     The logarithm on SO(3) [1]_, by the arctangent of sine and cosine, so that small angles keep their digits.

@@ -1,7 +1,14 @@
 """Products of numbers and arrays, and sums of two, in which a plain 0 or 1 costs nothing."""
 
+from __future__ import annotations
 
-def product(a, b):
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
+
+
+def product(a: float | np.ndarray, b: float | np.ndarray) -> float | np.ndarray:
     """a b; by a plain 1 the other factor itself, not a copy.
 
     Parameters
@@ -25,7 +32,9 @@ def product(a, b):
     return a * b
 
 
-def product_sum(a, b, c, d):
+def product_sum(
+    a: float | np.ndarray, b: float | np.ndarray, c: float | np.ndarray, d: float | np.ndarray
+) -> float | np.ndarray:
     """a b + c d; the sum reuses the memory of a product that nobody else holds.
 
     Parameters
@@ -47,7 +56,9 @@ def product_sum(a, b, c, d):
     return first
 
 
-def product_difference(a, b, c, d):
+def product_difference(
+    a: float | np.ndarray, b: float | np.ndarray, c: float | np.ndarray, d: float | np.ndarray
+) -> float | np.ndarray:
     """a b - c d; the difference reuses the memory of a product that nobody else holds.
 
     Parameters

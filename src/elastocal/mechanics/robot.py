@@ -1,10 +1,16 @@
 """A robot: its chain, and what is known of its elasticity, its weight and its gears."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from elastocal.mechanics.chain import Chain
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 # m/s² (ISO 80000-3), on a floor; as scipy.constants.g, whose import costs a job of the study more than its work.
 STANDARD_GRAVITY = 9.80665
@@ -43,7 +49,7 @@ class Link:
     """
 
     after: int
-    vector_m: tuple
+    vector_m: tuple[float, ...]
     tube: Tube
 
 
@@ -64,7 +70,7 @@ class Mass:
 
     link: int
     mass_kg: float
-    centre_m: tuple
+    centre_m: tuple[float, ...]
     relative_std: float
 
 
@@ -114,21 +120,21 @@ class Robot:
     chain: Chain
     compliance: np.ndarray
     joint_limits: np.ndarray
-    links: tuple
+    links: tuple[Link, ...]
     reported_matrix: np.ndarray
     reported_offset: np.ndarray
-    masses: tuple = ()
-    gravity_m_s2: tuple = STANDING
-    gear_ratio: tuple | None = None
+    masses: tuple[Mass, ...] = ()
+    gravity_m_s2: tuple[float, ...] = STANDING
+    gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
 
     @property
-    def joints(self):
+    def joints(self) -> int:
         """Number of joints."""
         return self.chain.coordinates
 
-    def model_angles(self, reported):
+    def model_angles(self, reported: np.ndarray) -> np.ndarray:
         """The chain's joint angles from those that the controller reports.
 
         Parameters
@@ -142,7 +148,7 @@ class Robot:
         """
         return reported @ self.reported_matrix.T + self.reported_offset
 
-    def reported_angles(self, angles):
+    def reported_angles(self, angles: np.ndarray) -> np.ndarray:
         """Joint angles as the controller reports them from the chain's.
 
         Parameters
@@ -157,7 +163,15 @@ class Robot:
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
 
-def with_target_offset(holder, offset_m):
+@overload
+def with_target_offset(holder: Chain, offset_m: Sequence[float]) -> Chain: ...
+
+
+@overload
+def with_target_offset(holder: Robot, offset_m: Sequence[float]) -> Robot: ...
+
+
+def with_target_offset(holder: Chain | Robot, offset_m: Sequence[float]) -> Chain | Robot:
     """A chain, or the robot around it, with the same target offset on every measuring point (T_tool, interpretation R5).
 
     Parameters

@@ -17,8 +17,11 @@ component of the centre over its distance from the origin (0.1 m at least). Grav
 on a tilted foot has another.
 """
 
+from __future__ import annotations
+
 import math
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,12 +29,18 @@ from elastocal.errors import InputError
 from elastocal.mechanics.chain import notation, parse_chain, stretches
 from elastocal.mechanics.robot import STANDING, Compensator, Link, Mass, Robot, Tube
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from elastocal.mechanics.chain import Chain
+
 # The longest serial arms of the market reach 4.7 m and their lengths, the column's included, sum to 7; any of them written in
 # centimetres, inches or millimetres is beyond this.
 LONGEST_REACH_M = 10.0
 
 
-def robot_from_document(document, source="robot"):
+def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> Robot:
     """Make a robot from the contents of its file, already validated against the robot schema.
 
     Parameters
@@ -78,7 +87,7 @@ def robot_from_document(document, source="robot"):
     )
 
 
-def document_of(robot):
+def document_of(robot: Robot) -> dict[str, Any]:
     """A robot as the contents of its file, the inverse of `robot_from_document`.
 
     Parameters
@@ -91,7 +100,7 @@ def document_of(robot):
     dict
         Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
     """
-    document = {
+    document: dict[str, Any] = {
         "name": robot.name,
         "chain": notation(robot.chain),
         "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
@@ -113,7 +122,7 @@ def document_of(robot):
     return document
 
 
-def joint_limits(limits_deg, chain, source):
+def joint_limits(limits_deg: Sequence[Sequence[float]], chain: Chain, source: str) -> np.ndarray:
     """Joint limits in rad, of prismatic joints in m.
 
     Parameters
@@ -143,12 +152,12 @@ def joint_limits(limits_deg, chain, source):
     return np.array(limits_deg, float) * _per_degree(chain)[:, None]
 
 
-def _per_degree(chain):
+def _per_degree(chain: Chain) -> np.ndarray:
     """What one degree, or of prismatic joints one metre, of a robot file is in SI units, ndarray (n,)."""
     return np.where(chain.prismatic, 1.0, math.radians(1.0))
 
 
-def _masses(described, joints, source):
+def _masses(described: Sequence[dict[str, Any]], joints: int, source: str) -> tuple[Mass, ...]:
     masses = sorted((Mass(**entry | {"centre_m": tuple(map(float, entry["centre_m"]))}) for entry in described), key=_link_of)
     for index, entry in enumerate(described):
         if entry["link"] > joints:
@@ -161,17 +170,17 @@ def _masses(described, joints, source):
     return tuple(masses)
 
 
-def _link_of(mass):
+def _link_of(mass: Mass) -> int:
     return mass.link
 
 
-def _gravity(vector, source):
+def _gravity(vector: Sequence[float], source: str) -> tuple[float, ...]:
     if not any(vector):
         raise InputError(source, "gravity_m_s2", str(list(vector)), "a vector with a length, in base axes")
     return tuple(map(float, vector))
 
 
-def _gear_ratio(ratios, joints, source):
+def _gear_ratio(ratios: Sequence[float | None] | None, joints: int, source: str) -> tuple[float | None, ...] | None:
     if ratios is None:
         return None
     if len(ratios) != joints:
@@ -179,7 +188,7 @@ def _gear_ratio(ratios, joints, source):
     return tuple(ratios)
 
 
-def _compensator(described, joints, source):
+def _compensator(described: Mapping[str, Any] | None, joints: int, source: str) -> Compensator | None:
     if described is None:
         return None
     if described["joint"] > joints:
@@ -187,14 +196,14 @@ def _compensator(described, joints, source):
     return Compensator(**described)
 
 
-def _check_reach(chain, key, source):
+def _check_reach(chain: Chain, key: str, source: str) -> None:
     reach = sum(abs(transform.constant) for transform in chain.transforms if transform.kind == "T")
     if reach > LONGEST_REACH_M:
         allowed = f"lengths in metres (not millimetres) that reach {LONGEST_REACH_M:g} m at most"
         raise InputError(source, key, f"a chain that reaches {reach:.4g} m", allowed)
 
 
-def _links(chain, described, source):
+def _links(chain: Chain, described: Mapping[str, Any] | None, source: str) -> tuple[Link, ...]:
     if described is None:
         return ()
     odd = {

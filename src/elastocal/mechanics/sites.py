@@ -11,15 +11,21 @@ References
    Machine Theory 44, 2009.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
 from elastocal.mechanics.kinematics import poses
-from elastocal.mechanics.motion import motion
-from elastocal.mechanics.robot import STANDING, Compensator, Robot
+from elastocal.mechanics.motion import Motion, motion
+from elastocal.mechanics.robot import STANDING, Compensator, Mass, Robot
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 # Below this a link is a point.
 _SHORTEST_M = 1e-6
@@ -65,50 +71,50 @@ class Sites:
 
     chain: Chain
     joints: int
-    base: tuple
-    tilt: tuple
-    link_end: tuple
-    joint_axes: tuple
+    base: tuple[int, ...]
+    tilt: tuple[tuple[int, ...], ...]
+    link_end: tuple[tuple[int, ...], ...]
+    joint_axes: tuple[int, ...]
     link_vectors_m: np.ndarray
     link_rotations: np.ndarray
-    joint_signs: tuple
-    prismatic: tuple
-    masses: tuple = ()
-    gravity_m_s2: tuple = STANDING
-    gear_ratio: tuple | None = None
+    joint_signs: tuple[float, ...]
+    prismatic: tuple[bool, ...]
+    masses: tuple[Mass, ...] = ()
+    gravity_m_s2: tuple[float, ...] = STANDING
+    gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
 
-    def far_end(self, link):
+    def far_end(self, link: int) -> MeasuringPoint:
         """The far end of a link, 0 for the column, as a measuring point."""
         return MeasuringPoint("far end", self._behind(self.link_end[link][-1]))
 
-    def body(self, link):
+    def body(self, link: int) -> MeasuringPoint:
         """The frame in which the centre of mass of a link is stated: behind its joint, or the foot for the column."""
         return MeasuringPoint("body", self._behind(self.tilt[link - 1][-1] if link else self.base[-1]))
 
-    def _behind(self, coordinate):
+    def _behind(self, coordinate: int) -> int:
         return 1 + next(place for place, t in enumerate(self.chain.transforms) if t.coordinate == coordinate)
 
     @cached_property
-    def followed(self):
+    def followed(self) -> tuple[MeasuringPoint, ...]:
         """Points whose motion tells the load on the coordinates: the end, the far ends of links 0..n, and what has a mass."""
         end = MeasuringPoint("end", self.chain.end_effector.after)
         far_ends = [self.far_end(link) for link in range(self.joints + 1)]
         return (end, *far_ends, *(self.body(mass.link) for mass in self.masses))
 
     @property
-    def down(self):
+    def down(self) -> np.ndarray:
         """Unit vector along gravity, base axes."""
         return np.array(self.gravity_m_s2) / np.linalg.norm(self.gravity_m_s2)
 
     @property
-    def shoulder(self):
+    def shoulder(self) -> int | None:
         """Index of the first joint that the weight of its links can turn, or None."""
         loaded = (j for j in range(self.joints) if self.carried_links(j))
         return next(loaded, None)
 
-    def carried_links(self, joint):
+    def carried_links(self, joint: int) -> list[int]:
         """Links with a length behind a joint whose weight can turn it, as numbers from 1.
 
         Parameters
@@ -123,7 +129,7 @@ class Sites:
         links = [k for k in range(joint + 1, self.joints + 1) if np.linalg.norm(self.link_vectors_m[k]) > _SHORTEST_M]
         return [k for k in links if self._longest_levers[k, joint] > _SHORTEST_M]
 
-    def longest_weight_torque_Nm(self, joint):  # noqa: N802 - units in names keep their case
+    def longest_weight_torque_Nm(self, joint: int) -> float:  # noqa: N802 - units in names keep their case
         """Torque on a joint by the weight of all declared masses behind it, each at its longest lever.
 
         Parameters
@@ -140,11 +146,11 @@ class Sites:
         behind = [mass for mass in self.masses if mass.link > joint]
         return float(sum(mass.mass_kg * gravity * 0.5 * (levers[mass.link - 1] + levers[mass.link]) for mass in behind))
 
-    def transverse_axes(self, link):
+    def transverse_axes(self, link: int) -> list[int]:
         """The two axes of the frame at the far end of a link that are least along it."""
         return sorted(np.argsort(np.abs(self.link_vectors_m[link]), kind="stable")[:2].tolist())
 
-    def moment_turns(self, link, axis, joint):
+    def moment_turns(self, link: int, axis: int, joint: int) -> bool:
         """Whether a first moment along an axis of the frame at the far end of a link can turn a joint by its weight.
 
         Parameters
@@ -162,14 +168,14 @@ class Sites:
         return bool(self._largest_turns[link, axis, joint] > _SHORTEST_M)
 
     @cached_property
-    def _at_random(self):
+    def _at_random(self) -> Motion:
         """Motion of the far ends of all links over some poses."""
         coordinates = np.zeros((16, self.chain.coordinates))
         coordinates[:, : self.joints] = np.random.default_rng(0).uniform(-np.pi, np.pi, (16, self.joints))
         return motion(self.chain, coordinates, [self.far_end(link) for link in range(self.joints + 1)])
 
     @cached_property
-    def _longest_levers(self):
+    def _longest_levers(self) -> np.ndarray:
         """Of the weight of each link on each joint over some poses, ndarray (n + 1, n), m."""
         levers = []
         for link, position in enumerate(self._at_random.position):
@@ -178,7 +184,7 @@ class Sites:
         return np.array(levers)
 
     @cached_property
-    def _largest_turns(self):
+    def _largest_turns(self) -> np.ndarray:
         """Torque on each joint by a unit moment along each axis of each link over some poses, ndarray (n + 1, 3, n)."""
         found = []
         for link, rotation in enumerate(self._at_random.rotation):
@@ -189,7 +195,7 @@ class Sites:
         return np.array(found)
 
 
-def sites_of(holder):
+def sites_of(holder: Robot | Chain) -> Sites:
     """Put a site at the foot, behind each joint and at the far end of each link.
 
     Parameters
@@ -207,7 +213,13 @@ def sites_of(holder):
     chain = holder
     springs = _Springs(chain.coordinates)
     base = springs.add("TTTRRR")
-    tilt, link_end, axes, signs, links, moved, start = [], [], [], [], [], {}, 0
+    tilt: list[tuple[int, ...]] = []
+    link_end: list[tuple[int, ...]] = []
+    axes: list[int] = []
+    signs: list[float] = []
+    links: list[tuple[np.ndarray, np.ndarray]] = []
+    moved: dict[int, int] = {}
+    start = 0
     # A point at the end of a link is moved by the link's end; one inside a link is not.
     for index, transform in enumerate((*chain.transforms, None)):
         passive = transform is not None and chain.is_passive(index)
@@ -233,10 +245,11 @@ def sites_of(holder):
 class _Springs:
     """Transforms so far, and the number of coordinates that they use."""
 
-    def __init__(self, count):
-        self.transforms, self.count = [], count
+    def __init__(self, count: int) -> None:
+        self.transforms: list[Transform] = []
+        self.count = count
 
-    def add(self, kinds):
+    def add(self, kinds: str) -> tuple[int, ...]:
         first = self.count
         for number, kind in enumerate(kinds):
             self.transforms.append(Transform(kind, number % 3, 0.0, first + number))
@@ -244,7 +257,7 @@ class _Springs:
         return tuple(range(first, self.count))
 
 
-def _link(fixed):
+def _link(fixed: Sequence[Transform]) -> tuple[np.ndarray, np.ndarray]:
     """Vector along fixed transforms in the frame at their end, and rotation from that frame to the one at their start."""
     end = MeasuringPoint("end", len(fixed))
     position, rotation = poses(Chain(tuple(fixed), (end,), 1), np.zeros((1, 1)), end)
