@@ -1,6 +1,9 @@
 """What every step needs of a campaign, put together again from its tables."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,12 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import Observations, averaged, without_outlying_repeats
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.mechanics.sites import sites_of
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from elastocal.effects.protocol import Candidate
 
 
 @dataclass(frozen=True)
@@ -33,10 +42,10 @@ class Case:
     campaign: Campaign
     observations: Observations
     model: Model
-    candidates: dict
+    candidates: dict[str, Candidate]
 
 
-def case_from(descriptions, columns):
+def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:
     """Put a campaign together.
 
     Parameters
@@ -59,12 +68,12 @@ def case_from(descriptions, columns):
     return Case(campaign, averaged(without_outlying_repeats(campaign.measurements)), model, candidates)
 
 
-def noise_facts(noise):
+def noise_facts(noise: Noise) -> dict[str, Any]:
     """Noise as a JSON document."""
     return asdict(noise) | {"joint_rad": noise.joint_rad.tolist()}
 
 
-def noise_from(facts):
+def noise_from(facts: Mapping[str, Any]) -> Noise:
     """Noise from its JSON document, or from a verdict, which tells more of it."""
     known = {entry.name: facts["noise"][entry.name] for entry in fields(Noise)}
     return Noise(**known | {"joint_rad": np.array(known["joint_rad"])})

@@ -1,16 +1,28 @@
 """Where the robot yields to under its loads and effects, as coordinates of its sites."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects import declared_weight
 from elastocal.effects.conditions import MASS_PARAMETERS, at_coordinates, conditions_of, with_springs
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import States
 
 # Fixed-point iterations of the load at the displaced pose. Each shrinks what is left by deflection over reach, some 1 / 500 at
 # 3 kN, from ten micrometres at the commanded pose.
 _PASSES = 2
 
 
-def conditions(model, estimate, states, coordinates=None):
+def conditions(model: Model, estimate: Estimate, states: States, coordinates: np.ndarray | None = None) -> Conditions:
     """What the effects of a model may depend on, in some states.
 
     By fixed-point iteration: loads at the displaced pose, then the displacement under these loads.
@@ -35,24 +47,24 @@ def conditions(model, estimate, states, coordinates=None):
     return around
 
 
-def joint_compliances(model, estimate):
+def joint_compliances(model: Model, estimate: Estimate) -> np.ndarray:
     """Joint compliances of an estimate, ndarray (n,), rad/(N m): the identified ones where they are parameters."""
     return _values_of("joint_compliance", model, estimate, model.nominal_compliance)
 
 
-def mass_corrections(model, estimate):
+def mass_corrections(model: Model, estimate: Estimate) -> np.ndarray:
     """By how much the declared masses of an estimate are off the robot file, ndarray (4 m,): see `Conditions`."""
     return _values_of(declared_weight.EFFECT, model, estimate, np.zeros(MASS_PARAMETERS * len(model.sites.masses)))
 
 
-def _values_of(name, model, estimate, otherwise):
+def _values_of(name: str, model: Model, estimate: Estimate, otherwise: np.ndarray) -> np.ndarray:
     for effect, values in zip(model.effects, estimate.coefficients, strict=True):
         if effect.effect == name:
             return values
     return otherwise
 
 
-def with_springs_of(model, estimate, conditions):
+def with_springs_of(model: Model, estimate: Estimate, conditions: Conditions) -> Conditions:
     """Conditions with the joint compliances and masses of an estimate, where they are parameters.
 
     Parameters
@@ -68,7 +80,7 @@ def with_springs_of(model, estimate, conditions):
     return with_springs(conditions, joint_compliances(model, estimate), mass_corrections(model, estimate))
 
 
-def displaced_coordinates(model, estimate, conditions):
+def displaced_coordinates(model: Model, estimate: Estimate, conditions: Conditions) -> np.ndarray:
     """Coordinates of the sites in each state: joint angles, springs under load and effects.
 
     Springs yield to the total load, the external one and the weight that the robot file declares.
@@ -89,7 +101,7 @@ def displaced_coordinates(model, estimate, conditions):
     return displaced
 
 
-def displace(displaced, effect, values, shapes, around):
+def displace(displaced: np.ndarray, effect: Candidate, values: np.ndarray, shapes: Iterable[float], around: Conditions) -> None:
     """Add what an effect does to the coordinates of the sites, in place.
 
     Parameters
@@ -98,7 +110,7 @@ def displace(displaced, effect, values, shapes, around):
     effect : Candidate
     values : ndarray (D,)
         Its linear parameters.
-    shapes : ndarray
+    shapes : ndarray (F,)
         Its shape parameters.
     around : Conditions
         Of the S states.

@@ -1,6 +1,9 @@
 """A model fitted to observations, and what is asked of it: estimate, covariance, weights, whitened sensitivities."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,15 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.whitening import Whitening, whitening
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Parameter
+    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 
 @dataclass(frozen=True)
@@ -46,34 +58,34 @@ class Fit:
        American Statistical Association 81, 1986.
     """
 
-    model: object
-    estimate: object
+    model: Model
+    estimate: Estimate
     noise: Noise
     held: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
     whitener: Whitening
     residual: np.ndarray
-    joint_jacobian: np.ndarray
-    conditions: object
+    joint_jacobian: np.ndarray | None
+    conditions: Conditions | None
     converged: bool = True
 
     @property
-    def parameters(self):
+    def parameters(self) -> list[tuple[str, Parameter]]:
         """As `parameters.parameters`."""
         return parameters(self.model, self.estimate)
 
-    def values_of(self, key):
-        """Linear parameters and shapes of one effect."""
+    def values_of(self, key: str) -> tuple[np.ndarray, np.ndarray]:
+        """Linear parameters (D,) and shapes (F,) of one effect."""
         number = [effect.key for effect in self.model.effects].index(key)
         return self.estimate.coefficients[number], self.estimate.shapes[number]
 
-    def whitened(self, values):
+    def whitened(self, values: np.ndarray) -> np.ndarray:
         """Rows (M, rows, ...) weighted and whitened as in the fit."""
         weights = np.sqrt(self.weights).reshape(-1, *[1] * (values.ndim - 1))
         return self.whitener.apply(values * weights)
 
-    def sensitivities(self, observations):
+    def sensitivities(self, observations: Observations) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
         """Sensitivities of the observations that were fitted, as they are and whitened, in parts of whole poses.
 
         Parameters
@@ -96,8 +108,8 @@ class Fit:
             white = whitening(some, self.jacobian_at(line, seen), self.noise)
             yield seen, line.sensitivities, white.apply(line.sensitivities * np.sqrt(self.weights[seen])[:, None, None])
 
-    def jacobian_at(self, line, seen):
-        """Jacobian of some observations with respect to the joints: as it was kept, or that of their `Linearization`."""
+    def jacobian_at(self, line: Linearization, seen: slice) -> np.ndarray:
+        """Jacobian of some observations with respect to the joints: as kept, or of their `Linearization`, (M', rows, n)."""
         if self.joint_jacobian is None:
             return line.coordinate_jacobian[..., : self.model.sites.joints]
         return self.joint_jacobian[seen]

@@ -7,7 +7,15 @@ from scipy.linalg import solve_triangular
 _BOUND_TO_SHAPE = 0.5
 
 
-def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False):
+def solve_identifiable(
+    left: np.ndarray,
+    right: np.ndarray,
+    plausible: np.ndarray,
+    frozen: bool | np.ndarray = False,
+    penalty: float | np.ndarray = 0.0,
+    present: float | np.ndarray = 0.0,
+    nonlinear: bool | np.ndarray = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Least squares over the parameters that the data can tell.
 
     A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
@@ -46,7 +54,15 @@ def solve_identifiable(left, right, plausible, frozen=False, penalty=0.0, presen
     return solve_normal(scaled.T @ scaled, scaled.T @ right, plausible, frozen, penalty, present, nonlinear)
 
 
-def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0, nonlinear=False):
+def solve_normal(
+    gram: np.ndarray,
+    along: np.ndarray,
+    plausible: np.ndarray,
+    frozen: bool | np.ndarray = False,
+    penalty: float | np.ndarray = 0.0,
+    present: float | np.ndarray = 0.0,
+    nonlinear: bool | np.ndarray = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """As `solve_identifiable`, from products of sensitivities in plausible sizes.
 
     Parameters
@@ -73,7 +89,7 @@ def solve_normal(gram, along, plausible, frozen=False, penalty=0.0, present=0.0,
     return step, covariance, held
 
 
-def identifiable(gram, frozen, nonlinear):
+def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
     """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
 
     Forward selection in the order given, by the pivots of a sequential Cholesky decomposition, then backward elimination.
@@ -91,7 +107,7 @@ def identifiable(gram, frozen, nonlinear):
     -------
     ndarray of bool (P,)
     """
-    kept = []
+    kept: list[int] = []
     factor = np.zeros_like(gram)
     for number in range(len(gram)):
         if frozen[number]:

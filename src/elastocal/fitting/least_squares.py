@@ -1,6 +1,9 @@
 """Robust generalized least squares on the composite model, by Gauss-Newton steps on exact predictions."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,13 +13,26 @@ from elastocal.fitting.parameters import parameters
 from elastocal.fitting.registration import registered
 from elastocal.fitting.robust import SETTLED, robustly
 
+if TYPE_CHECKING:
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
+
 # Largest step that remains in a fit from which others start, in standard errors.
 ON_THE_WAY = 0.1
 # A fit to more observations starts from the fit to so many of them.
 _MOST_STARTED_FROM = 30_000
 
 
-def fit(model, observations, noise, start=None, reweighted=False, settled=SETTLED):
+def fit(
+    model: Model,
+    observations: Observations,
+    noise: Noise,
+    start: Estimate | None = None,
+    reweighted: bool = False,
+    settled: float = SETTLED,
+) -> Fit:
     """Fit a model by robust generalized least squares [1]_ and Gauss-Newton steps [2]_, see `robust.robustly`.
 
     Parameters
@@ -52,7 +68,7 @@ def fit(model, observations, noise, start=None, reweighted=False, settled=SETTLE
     return robustly(model, observations, around, noise, start, reweighted=reweighted, settled=settled)
 
 
-def fit_frames(fitted, model, observations, noise, own_targets=True):
+def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noise, own_targets: bool = True) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 
     Parameters

@@ -1,6 +1,9 @@
 """Sensitivities of the measurements: the Jacobian of the chain times the displacement of its coordinates per parameter."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +12,13 @@ from elastocal.effects.conditions import Conditions, with_springs
 from elastocal.fitting.displacement import displace, displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
 from elastocal.mechanics.motion import motion
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 # Relative step of the central difference in a shape parameter.
 _SHAPE_STEP = 1e-4
@@ -40,7 +50,7 @@ class Linearization:
     conditions: Conditions
 
 
-def linearize(model, estimate, observations, conditions):
+def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
     """Residuals of a model and their sensitivities.
 
     Sensitivities are analytic, but for shapes (central differences) and for what springs do by way of other effects (forward
@@ -92,7 +102,12 @@ def linearize(model, estimate, observations, conditions):
     return Linearization(residual, jacobian, sensitivities, replace(around, motion=moved))
 
 
-def effect_columns(effects, conditions, coordinate_jacobian, state):
+def effect_columns(
+    effects: Iterable[tuple[Candidate, Iterable[float]]],
+    conditions: Conditions,
+    coordinate_jacobian: np.ndarray,
+    state: np.ndarray,
+) -> np.ndarray:
     """Sensitivities of the measurements to the linear parameters of effects.
 
     Parameters
@@ -112,7 +127,7 @@ def effect_columns(effects, conditions, coordinate_jacobian, state):
     return _columns(laws, coordinate_jacobian, state)
 
 
-def _columns(laws, coordinate_jacobian, state):
+def _columns(laws: Sequence[Mapping[int, np.ndarray]], coordinate_jacobian: np.ndarray, state: np.ndarray) -> np.ndarray:
     columns = np.empty((coordinate_jacobian.shape[1], len(laws), len(state)))
     jacobian = np.moveaxis(coordinate_jacobian, 0, -1)
     for number, law in enumerate(laws):
@@ -120,7 +135,7 @@ def _columns(laws, coordinate_jacobian, state):
     return np.moveaxis(columns, -1, 0)
 
 
-def _target_columns(rotation, mask, rows):
+def _target_columns(rotation: np.ndarray, mask: np.ndarray, rows: int) -> np.ndarray:
     """Shift of a target along the axes of its measuring point and, for poses, its turn about them."""
     columns = np.zeros((len(mask), rows, rows))
     for first in range(0, rows, 3):
@@ -128,7 +143,9 @@ def _target_columns(rotation, mask, rows):
     return columns
 
 
-def _shape_columns(effect, values, shapes, conditions, jacobian, state):
+def _shape_columns(
+    effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions, jacobian: np.ndarray, state: np.ndarray
+) -> np.ndarray:
     columns = np.zeros((*jacobian.shape[:2], len(shapes)))
     for number in range(len(shapes)):
         shape = effect.shapes[number]
@@ -142,7 +159,7 @@ def _shape_columns(effect, values, shapes, conditions, jacobian, state):
     return columns
 
 
-def _spring_laws(spring, model, estimate, around):
+def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Conditions) -> list[dict[int, np.ndarray]]:
     """Displacements per unit of compliances or of errors of masses, with all that they do by way of other effects."""
     laws = spring.displacement(around)
     through = _through_compliance if spring.effect == "joint_compliance" else _through_load
@@ -150,7 +167,7 @@ def _spring_laws(spring, model, estimate, around):
     if not others:
         return laws
 
-    def of_others(springs):
+    def of_others(springs: Conditions) -> np.ndarray:
         displaced = np.zeros_like(around.load)
         for other in others:
             displace(displaced, *other, springs)
@@ -168,11 +185,11 @@ def _spring_laws(spring, model, estimate, around):
     return laws
 
 
-def _through_compliance(effect):
+def _through_compliance(effect: Candidate) -> bool:
     """Whether an effect is a load that the joint compliances turn into angles."""
     return effect.family in ("gravity", "load")
 
 
-def _through_load(effect):
+def _through_load(effect: Candidate) -> bool:
     """Whether an effect goes with the total load."""
     return "load" in effect.needs and effect.effect not in _SPRINGS

@@ -1,6 +1,15 @@
 """How much of a long campaign a fit holds at once: what is beyond comes in parts and is found again in each step."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.fitting.displacement import conditions
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 # Values of sensitivities that a fit holds at once, of which there are five copies: observations beyond come in parts, which are
 # linearised again in each step.
@@ -11,17 +20,17 @@ _MOST_AT_ONCE = 4000
 _MOST_STATES = 20_000
 
 
-def observations_at_once(rows, columns):
+def observations_at_once(rows: int, columns: int) -> int:
     """How many observations are linearised at once; what a linearisation makes beside parameters is as 60 of them."""
     return max(min(_MOST_HELD // (rows * max(columns, 60)), _MOST_AT_ONCE), 1)
 
 
-def held_at_once(observations, columns):
+def held_at_once(observations: Observations, columns: int) -> bool:
     """Whether the sensitivities of all observations to so many parameters are held at once."""
     return observations.rows * len(observations) * max(columns, 60) <= _MOST_HELD
 
 
-def kept_conditions(model, estimate, observations):
+def kept_conditions(model: Model, estimate: Estimate, observations: Observations) -> Conditions | None:
     """Conditions of all states, or None where these are too many to keep them.
 
     Parameters

@@ -1,12 +1,21 @@
 """What the measurements are modelled by: nominal robot, frames, targets, any set of effects, and values of what is unknown."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.effects import declared_weight
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.mechanics.sites import Sites, sites_of
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.campaigns.campaign import Campaign, Target
+    from elastocal.effects.protocol import Candidate
 
 
 @dataclass(frozen=True)
@@ -33,20 +42,20 @@ class Model:
     """
 
     sites: Sites
-    targets: tuple
+    targets: tuple[Target, ...]
     fitted_frames: bool
     rows: int
     nominal_compliance: np.ndarray
-    effects: tuple = ()
+    effects: tuple[Candidate, ...] = ()
     time_zero_s: float = 0.0
-    row_span: tuple | None = None
+    row_span: tuple[int, int] | None = None
 
     @property
-    def identifies_compliance(self):
+    def identifies_compliance(self) -> bool:
         """Whether the joint compliances are parameters."""
         return any(effect.effect == "joint_compliance" for effect in self.effects)
 
-    def with_effects(self, effects):
+    def with_effects(self, effects: Iterable[Candidate]) -> Model:
         """The same model with more effects."""
         return replace(self, effects=(*self.effects, *effects))
 
@@ -68,15 +77,15 @@ class Estimate:
         Shape parameters of each effect.
     """
 
-    sessions: tuple
+    sessions: tuple[int, ...]
     frame_rotation: np.ndarray
     frame_position: np.ndarray
     target_offset: np.ndarray
     target_rotation: np.ndarray
-    coefficients: tuple = ()
-    shapes: tuple = ()
+    coefficients: tuple[np.ndarray, ...] = ()
+    shapes: tuple[np.ndarray, ...] = ()
 
-    def with_effects(self, effects):
+    def with_effects(self, effects: Sequence[Candidate]) -> Estimate:
         """The same estimate with more effects, all of them at zero."""
         return replace(
             self,
@@ -85,7 +94,7 @@ class Estimate:
         )
 
 
-def declared_model(campaign, effects=()):
+def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Model:
     """The model that a campaign declares.
 
     Parameters

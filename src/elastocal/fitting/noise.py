@@ -5,7 +5,10 @@ Repeats of a state tell both: each repeat is a fresh approach, so that the joint
 targets together, while the sensor errs for each target on its own.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import helmert
@@ -15,6 +18,12 @@ from scipy.stats import chi2
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import each_approach, select_states, without_outlying_repeats
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.fitting.model import Estimate, Model
 
 # Fewer contrasts of repeats than this do not separate the joints' part from the sensor's.
 FEWEST_FOR_JOINTS = 60
@@ -55,11 +64,11 @@ class Noise:
     pose_rad: float = 0.0
 
     @property
-    def of_measurements(self):
+    def of_measurements(self) -> Noise:
         """The same without what the measurements of a pose have in common."""
         return replace(self, pose_rad=0.0)
 
-    def scaled(self, factor):
+    def scaled(self, factor: float) -> Noise:
         """The same with the noise of single measurements multiplied."""
         return replace(
             self,
@@ -69,7 +78,7 @@ class Noise:
         )
 
 
-def declared_noise(campaign):
+def declared_noise(campaign: Campaign) -> Noise | None:
     """Noise as a campaign declares it, without a joint part; None where it does not."""
     if not campaign.noise:
         return None
@@ -77,7 +86,7 @@ def declared_noise(campaign):
     return Noise("declared", position, campaign.noise.get("orientation_rad", position), np.zeros(campaign.robot.joints))
 
 
-def noise_from_repeats(model, estimate, measurements):
+def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
     """Noise by restricted maximum likelihood from the differences between repeats.
 
     The likelihood is that of error contrasts [1]_, here of orthonormal Helmert contrasts of repeats; L-BFGS-B [2]_ finds its
@@ -133,7 +142,9 @@ def noise_from_repeats(model, estimate, measurements):
     return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
 
 
-def chosen_noise(campaign, model, estimate, measurements):
+def chosen_noise(
+    campaign: Campaign, model: Model, estimate: Estimate, measurements: Measurements
+) -> tuple[Noise | None, list[str]]:
     """Noise from repeats where there are enough, else as declared.
 
     A ratio of the two outside the chi-squared interval of 99 % of a variance is a warning.
@@ -163,7 +174,7 @@ def chosen_noise(campaign, model, estimate, measurements):
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
 
 
-def measurement_covariances(noise, jacobians, rows):
+def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
     """Covariance of all measurements of one approach.
 
     Parameters
@@ -186,7 +197,7 @@ def measurement_covariances(noise, jacobians, rows):
     return covariance
 
 
-def _contrasts(model, estimate, measurements):
+def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Orthonormal contrasts between repeats (G, k * rows) and their Jacobians (G, k, rows, n), for each number k of targets."""
     if not len(measurements) or not np.ptp(measurements.repeat):
         return [], []
@@ -214,7 +225,8 @@ def _contrasts(model, estimate, measurements):
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
     first = np.flatnonzero(np.diff(state, prepend=-1))
     many = np.diff(first, append=len(state))
-    contrasts, jacobians = {}, {}
+    contrasts: dict[int, list[np.ndarray]] = {}
+    jacobians: dict[int, list[np.ndarray]] = {}
     for repeats, count in np.unique(np.column_stack([many, seen[first]]), axis=0):
         mine = first[(many == repeats) & (seen[first] == count)]
         of_first = start[mine][:, None] + np.arange(count)
@@ -224,10 +236,12 @@ def _contrasts(model, estimate, measurements):
         jacobian = line.coordinate_jacobian[of_first][..., : model.sites.joints]
         contrasts.setdefault(count, []).append(found)
         jacobians.setdefault(count, []).append(np.repeat(jacobian, repeats - 1, axis=0))
-    return tuple([np.concatenate(parts) for parts in found.values()] for found in (contrasts, jacobians))
+    return [np.concatenate(parts) for parts in contrasts.values()], [np.concatenate(parts) for parts in jacobians.values()]
 
 
-def _negative_log_likelihood(logs, contrasts, jacobians, rows):
+def _negative_log_likelihood(
+    logs: np.ndarray, contrasts: Sequence[np.ndarray], jacobians: Sequence[np.ndarray], rows: int
+) -> tuple[float, np.ndarray]:
     """Minus the logarithm of the restricted likelihood, and its derivatives by the logarithms of the deviations."""
     values = np.exp(logs)
     sensors = rows // 3

@@ -1,6 +1,9 @@
 """Steps 2 and 3: the noise of the measurements, and the model as declared."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,16 +12,21 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.registration import registered
 
+if TYPE_CHECKING:
+    from typing import Any
+
+    from elastocal.fitting.case import Case
+
 _ASSUMED_M = 1e-4
 
 
-def estimated_noise(case):
+def estimated_noise(case: Case) -> tuple[Noise, list[str]]:
     """Noise as `noise_of`, and the warnings, as objects."""
     facts = noise_of(case)
     return noise_from(facts), facts["warnings"]
 
 
-def noise_of(case):
+def noise_of(case: Case) -> dict[str, Any]:
     """Noise from repeats or as declared; from the residual of the declared model where there is neither.
 
     Parameters

@@ -1,5 +1,9 @@
 """Normal equations of a step, added up over measurements that are held whole or come in parts of whole poses."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.conditions import at_states, with_springs
@@ -10,6 +14,13 @@ from elastocal.fitting.memory import held_at_once, kept_conditions, observations
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.whitening import Whitening, whitening
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 
 class Parts:
@@ -30,54 +41,59 @@ class Parts:
         Plausible size of each parameter.
     """
 
-    def __init__(self, model, observations, noise, around, plausible):
+    def __init__(
+        self, model: Model, observations: Observations, noise: Noise, around: Conditions | None, plausible: np.ndarray
+    ) -> None:
         self.model, self.observations, self.noise, self.plausible = model, observations, noise, plausible
         held = held_at_once(observations, len(plausible))
         most = len(observations) if held else observations_at_once(observations.rows, len(plausible))
         self.slices = parts_of(observations, most)
         self.whole = len(self.slices) == 1 and around is not None
         self.parts = [observations] if self.whole else [part_at(observations, *edges) for edges in self.slices]
-        self.around = [around] if self.whole else [None] * len(self.parts)
+        self.around: list[Conditions | None] = [around] if self.whole else [None] * len(self.parts)
         if not self.whole and around is not None:
             self.around = [at_states(around, states) for states, _ in self.slices]
-        self.coordinates = [None] * len(self.parts)
-        self.whiteners = [None] * len(self.parts)
+        self.coordinates: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self.whiteners: dict[int, Whitening] = {}
         # Of so many states that conditions are not kept neither is this.
         shape = len(observations), observations.rows, model.sites.joints
         self.jacobian = None if around is None else np.zeros(shape)
-        self.line = None
+        self.line: Linearization | None = None
 
-    def linearize(self, estimate):
+    def linearize(self, estimate: Estimate) -> None:
         """Go to an estimate."""
         self.estimate = estimate
         if self.whole:
-            self.line = linearize(self.model, estimate, self.observations, self.around[0])
+            self.line = linearize(self.model, estimate, self.observations, self._around(0))
             self.residual = self.line.residual
         else:
             self.residual = np.concatenate(
                 [residuals(self.model, estimate, part, self._around(number)) for number, part in enumerate(self.parts)]
             )
 
-    def whiten(self):
+    def whiten(self) -> None:
         """Take loads and whitening at the present estimate."""
         self.origin = self.estimate
-        if self.whole:
+        if self.line is not None:
             self.around = [self.line.conditions]
             self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
-            self.whiteners = [whitening(self.observations, self.jacobian, self.noise)]
-        elif self.whiteners[0] is None:
+            self.whiteners = {0: whitening(self.observations, self.jacobian, self.noise)}
+        elif not self.whiteners:
             for number, part in enumerate(self.parts):
                 if self.noise.pose_rad or self.noise.joint_rad.any():
                     self._linearized(number, part)
                 else:
                     self.whiteners[number] = whitening(part, None, self.noise)
 
-    def normal_equations(self, weights):
-        """Gram matrix of the whitened sensitivities, in plausible sizes, and their products with the residual."""
+    def normal_equations(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gram matrix (P, P) of the whitened sensitivities, in plausible sizes, and their products with the residual, (P,).
+
+        Observations count by their weights, ndarray (M,).
+        """
         size = len(self.plausible)
         gram, along, root = np.zeros((size, size)), np.zeros(size), np.sqrt(weights)
         for number, (part, (_, seen)) in enumerate(zip(self.parts, self.slices, strict=True)):
-            line = self.line if self.whole else self._linearized(number, part)
+            line = self._linearized(number, part) if self.line is None else self.line
             whitener, mine = self.whiteners[number], root[seen]
             right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
             left = _of_rotation_vectors(line.sensitivities, line.residual) * mine[:, None, None]
@@ -87,11 +103,11 @@ class Parts:
             along += left.T @ right
         return gram, along
 
-    def distance(self):
+    def distance(self) -> np.ndarray:
         """Whitened distance of each observation from the prediction, ndarray (M,)."""
         return np.sqrt(np.concatenate([(part**2).mean(axis=1) for part in self._whitened(self.residual)]))
 
-    def squares(self, weights, estimate=None):
+    def squares(self, weights: np.ndarray, estimate: Estimate | None = None) -> float:
         """Sum of squares of the residual, weighted and whitened as in `normal_equations`; of this or another estimate."""
         residual = self.residual
         if estimate is not None:
@@ -100,7 +116,7 @@ class Parts:
         residual = self._in_axes_of_step(residual, self.estimate if estimate is None else estimate)
         return float(sum((part**2).sum() for part in self._whitened(residual * np.sqrt(weights)[:, None])))
 
-    def _in_axes_of_step(self, residual, estimate):
+    def _in_axes_of_step(self, residual: np.ndarray, estimate: Estimate) -> np.ndarray:
         """A residual in the base axes of an estimate in those of the one by which it is whitened."""
         turn = self.origin.frame_rotation.transpose(0, 2, 1) @ estimate.frame_rotation
         if (turn == np.eye(3)).all():
@@ -110,10 +126,10 @@ class Parts:
         vectors = residual.reshape(len(residual), -1, 3)
         return (vectors @ turn[session].transpose(0, 2, 1)).reshape(residual.shape)
 
-    def fit(self, estimate, held, covariance, weights, converged):
+    def fit(self, estimate: Estimate, held: np.ndarray, covariance: np.ndarray, weights: np.ndarray, converged: bool) -> Fit:
         """The `Fit` of these measurements."""
-        model, around = self.model, None
-        if self.whole:
+        model = self.model
+        if self.line is not None:
             springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
             around = with_springs(self.line.conditions, *springs)
             residual = residuals(model, estimate, self.observations, around)
@@ -124,24 +140,24 @@ class Parts:
         whitener = Whitening(
             tuple(
                 (members + edges[1].start, factor)
-                for edges, found in zip(self.slices, self.whiteners, strict=True)
+                for edges, found in zip(self.slices, self.whiteners.values(), strict=True)
                 for members, factor in found.blocks
             )
         )
         return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, self.jacobian, around, converged)
 
-    def _around(self, number, estimate=None):
+    def _around(self, number: int, estimate: Estimate | None = None) -> Conditions:
         kept = self.around[number]
         if kept is not None:
             return kept
         states, coordinates = self.parts[number].states, None
-        if self.coordinates[number] is not None:
+        if number in self.coordinates:
             moved, displaced = self.coordinates[number]
             coordinates = np.zeros((len(states), self.model.sites.chain.coordinates))
             coordinates[:, moved] = displaced
         return conditions(self.model, estimate or self.estimate, states, coordinates)
 
-    def _linearized(self, number, part):
+    def _linearized(self, number: int, part: Observations) -> Linearization:
         around = self._around(number)
         line = linearize(self.model, self.estimate, part, around)
         if self.around[number] is None:
@@ -156,12 +172,12 @@ class Parts:
         self.whiteners[number] = whitening(part, jacobian, self.noise)
         return line
 
-    def _whitened(self, residual):
-        pairs = zip(self.whiteners, self.slices, strict=True)
+    def _whitened(self, residual: np.ndarray) -> list[np.ndarray]:
+        pairs = zip(self.whiteners.values(), self.slices, strict=True)
         return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
 
 
-def _of_rotation_vectors(sensitivities, residual):
+def _of_rotation_vectors(sensitivities: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2).
 
     Bortz's equation [1]_.

@@ -1,11 +1,19 @@
 """Measurements as the loop uses them: repeats averaged, grouped by the state of the robot in which they were taken."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.groups import groups_of
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from elastocal.campaigns.campaign import Measurements
 
 # Measurements this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
@@ -42,7 +50,7 @@ class States:
     temperature_c: np.ndarray | None = None
     row: np.ndarray | None = None
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.pose)
 
 
@@ -67,21 +75,21 @@ class Observations:
     position: np.ndarray
     rotation: np.ndarray | None
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.state)
 
     @property
-    def rows(self):
+    def rows(self) -> int:
         """Numbers in one observation: 3 for a position, 6 for a pose."""
         return 3 if self.rotation is None else 6
 
     @property
-    def cluster(self):
+    def cluster(self) -> np.ndarray:
         """ndarray (M,): number of the (session, pose) that each observation belongs to, 0 .. P-1."""
         return state_clusters(self.states)[self.state]
 
 
-def state_clusters(states):
+def state_clusters(states: States | Measurements) -> np.ndarray:
     """Number of the (session, pose) of each state, 0 .. P-1.
 
     Parameters
@@ -96,7 +104,7 @@ def state_clusters(states):
     return groups_of(np.column_stack([states.session, states.pose]))[1]
 
 
-def averaged(measurements):
+def averaged(measurements: Measurements) -> Observations:
     """Observations with the repeats averaged that were approached alike.
 
     Parameters
@@ -111,7 +119,7 @@ def averaged(measurements):
     return _observations(measurements, _approached_alike(measurements))
 
 
-def each_approach(measurements):
+def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]:
     """Observations of every single approach: repeats are states of their own.
 
     Parameters
@@ -129,7 +137,7 @@ def each_approach(measurements):
     return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
 
 
-def without_outlying_repeats(measurements):
+def without_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and target.
 
     Hampel's identifier [1]_: distances from the median, here in units of the median absolute deviation of all repeats. An
@@ -159,7 +167,7 @@ def without_outlying_repeats(measurements):
     return measurements.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
 
 
-def _medians(values, group):
+def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Median of each column in each group, ndarray (G, k)."""
     count = np.bincount(group)
     start = np.concatenate([[0], np.cumsum(count)[:-1]])
@@ -167,18 +175,18 @@ def _medians(values, group):
     return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
 
 
-def _approached_alike(measurements):
+def _approached_alike(measurements: Measurements) -> np.ndarray:
     key = np.column_stack([measurements.session, measurements.pose, measurements.load])
     return key if measurements.approach is None else np.column_stack([key, measurements.approach])
 
 
-def _observations(measurements, key):
+def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     first, state_of = groups_of(key)
     pairs = np.column_stack([state_of, measurements.target])
     first_pair, pair_of = groups_of(pairs)
     pairs = pairs[first_pair]
 
-    def of_states(values):
+    def of_states(values: np.ndarray | None) -> np.ndarray | None:
         return None if values is None else _means(values, state_of)
 
     repeats = np.full(len(first), len(measurements))
@@ -189,8 +197,8 @@ def _observations(measurements, key):
         session=measurements.session[first],
         pose=measurements.pose[first],
         load=measurements.load[first],
-        joint_angles=of_states(measurements.joint_angles),
-        wrench=of_states(measurements.wrench),
+        joint_angles=_means(measurements.joint_angles, state_of),
+        wrench=_means(measurements.wrench, state_of),
         repeats=repeats,
         approach=None if measurements.approach is None else measurements.approach[first],
         time_s=of_states(measurements.time_s),
@@ -203,7 +211,7 @@ def _observations(measurements, key):
     return Observations(states, pairs[:, 0], pairs[:, 1], _means(measurements.position, pair_of), rotation)
 
 
-def select_states(observations, kept):
+def select_states(observations: Observations, kept: np.ndarray) -> Observations:
     """The part of some observations that was taken in some of their states.
 
     Parameters
@@ -215,9 +223,7 @@ def select_states(observations, kept):
     -------
     Observations
     """
-    states = States(
-        **{name: None if value is None else value[kept] for name, value in vars(observations.states).items()},
-    )
+    states = _states_at(observations.states, kept)
     mask = kept[observations.state]
     number = np.cumsum(kept) - 1
     rotation = None if observations.rotation is None else observations.rotation[mask]
@@ -226,7 +232,7 @@ def select_states(observations, kept):
     )
 
 
-def parts_of(observations, most):
+def parts_of(observations: Observations, most: int) -> list[tuple[slice, slice]]:
     """Some observations in parts of whole poses, in their order.
 
     Parameters
@@ -249,7 +255,7 @@ def parts_of(observations, most):
     return [(slice(a, b), slice(c, d)) for a, b, c, d in edges]
 
 
-def part_at(observations, states, seen):
+def part_at(observations: Observations, states: slice, seen: slice) -> Observations:
     """One of the `parts_of` observations.
 
     Parameters
@@ -262,14 +268,19 @@ def part_at(observations, states, seen):
     -------
     Observations
     """
-    some = States(**{name: None if value is None else value[states] for name, value in vars(observations.states).items()})
+    some = _states_at(observations.states, states)
     rotation = None if observations.rotation is None else observations.rotation[seen]
     return Observations(
         some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation
     )
 
 
-def spread_poses(observations, most):
+def _states_at(states: States, chosen: np.ndarray | slice) -> States:
+    values: dict[str, Any] = {name: None if value is None else value[chosen] for name, value in vars(states).items()}
+    return States(**values)
+
+
+def spread_poses(observations: Observations, most: int) -> np.ndarray:
     """Which states belong to poses evenly spread over a campaign, so many that about `most` observations are left.
 
     Parameters
@@ -291,7 +302,7 @@ def spread_poses(observations, most):
     return chosen[pose]
 
 
-def sample_of(observations, most):
+def sample_of(observations: Observations, most: int) -> Observations:
     """About so many observations at poses spread over a campaign, or all where the sample would miss a session or a target.
 
     Parameters
@@ -310,7 +321,7 @@ def sample_of(observations, most):
     return some if sessions and np.isin(observations.target, some.target).all() else observations
 
 
-def _means(values, group):
+def _means(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     count = np.bincount(group)
     if len(count) == len(values):
         # Nothing to average, whatever the order.
@@ -322,7 +333,7 @@ def _means(values, group):
     return total / count.reshape(-1, *[1] * (values.ndim - 1))
 
 
-def _mean_rotations(rotations, group):
+def _mean_rotations(rotations: Rotation, group: np.ndarray) -> np.ndarray:
     """Mean of rotations close to each other: the mean turn from the first of each group.
 
     The first step towards the Riemannian mean [1]_.

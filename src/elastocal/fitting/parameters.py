@@ -1,10 +1,17 @@
 """Everything that a model leaves open as one vector of parameters: their names, ranges and values, and a step of them all."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.effects.protocol import Parameter
 from elastocal.fitting.model import Estimate
+
+if TYPE_CHECKING:
+    from elastocal.fitting.model import Model
 
 _LENGTH = ("dx", "dy", "dz")
 _TURN = ("rx", "ry", "rz")
@@ -12,7 +19,7 @@ _TURN = ("rx", "ry", "rz")
 _ANYWHERE_M, _ANYWHERE_RAD = 1.0, 1.0
 
 
-def parameters(model, estimate):
+def parameters(model: Model, estimate: Estimate) -> list[tuple[str, Parameter]]:
     """Everything that is fitted, in the order of the sensitivities.
 
     Parameters
@@ -39,20 +46,20 @@ def parameters(model, estimate):
     return found
 
 
-def nonlinear_parameters(model, estimate):
+def nonlinear_parameters(model: Model, estimate: Estimate) -> np.ndarray:
     """Which of the `parameters` are shapes, ndarray of bool (P,)."""
     shapes = {(effect.key, shape.name) for effect in model.effects for shape in effect.shapes}
     return np.array([(owner, parameter.name) in shapes for owner, parameter in parameters(model, estimate)], bool)
 
 
-def limits(model, estimate):
+def limits(model: Model, estimate: Estimate) -> np.ndarray:
     """Lowest and highest value of each of the `parameters`, ndarray (P, 2): the ranges of shapes, infinite for all others."""
     ranges = {(effect.key, shape.name): (shape.lowest, shape.highest) for effect in model.effects for shape in effect.shapes}
     listed = [ranges.get((owner, p.name), (-np.inf, np.inf)) for owner, p in parameters(model, estimate)]
     return np.array(listed).reshape(-1, 2)
 
 
-def parameter_values(model, estimate):
+def parameter_values(model: Model, estimate: Estimate) -> np.ndarray:
     """Present values of all that is fitted, in the order of `parameters`.
 
     Frames and targets are fitted by steps from where they are and count as zero.
@@ -71,7 +78,7 @@ def parameter_values(model, estimate):
     return np.concatenate([np.zeros(sum(owned)), *effects])
 
 
-def stepped(model, estimate, step):
+def stepped(model: Model, estimate: Estimate, step: np.ndarray) -> Estimate:
     """An estimate after a step of all parameters, in the order of `parameters`.
 
     Parameters
@@ -86,7 +93,7 @@ def stepped(model, estimate, step):
     """
     left = list(step)
 
-    def take(count):
+    def take(count: int) -> np.ndarray:
         taken, left[:] = np.array(left[:count]), left[count:]
         return taken
 

@@ -1,6 +1,9 @@
 """What a model predicts: exact poses of the targets, and residuals of the measurements, both in base axes."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,8 +11,16 @@ from elastocal.fitting.displacement import displaced_coordinates
 from elastocal.mechanics.kinematics import poses_of_points
 from elastocal.mechanics.pose_differences import pose_differences
 
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
+    from elastocal.mechanics.chain import MeasuringPoint
 
-def predict(model, estimate, observations, conditions):
+
+def predict(
+    model: Model, estimate: Estimate, observations: Observations, conditions: Conditions
+) -> tuple[np.ndarray, np.ndarray]:
     """Exact poses of the targets, in base axes.
 
     Parameters
@@ -31,7 +42,7 @@ def predict(model, estimate, observations, conditions):
     return position[seen], rotation[seen] @ estimate.target_rotation[observations.target]
 
 
-def residuals(model, estimate, observations, conditions):
+def residuals(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> np.ndarray:
     """Measured less predicted, in base axes.
 
     Parameters
@@ -48,7 +59,7 @@ def residuals(model, estimate, observations, conditions):
     return differences(measured_in_base(estimate, observations), position, rotation)
 
 
-def measured_in_base(estimate, observations):
+def measured_in_base(estimate: Estimate, observations: Observations) -> tuple[np.ndarray, np.ndarray | None]:
     """Measured poses, taken from the frames of the sessions into base axes.
 
     Returns
@@ -62,7 +73,7 @@ def measured_in_base(estimate, observations):
     return position, None if observations.rotation is None else into_base @ observations.rotation
 
 
-def differences(measured, position, rotation):
+def differences(measured: tuple[np.ndarray, np.ndarray | None], position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Measured less predicted poses, both in base axes.
 
     Parameters
@@ -77,12 +88,13 @@ def differences(measured, position, rotation):
     ndarray (M, rows)
         m and, where poses are measured, rad.
     """
-    if measured[1] is None:
-        return measured[0] - position
-    return pose_differences(*measured, position, rotation)
+    measured_position, measured_rotation = measured
+    if measured_rotation is None:
+        return measured_position - position
+    return pose_differences(measured_position, measured_rotation, position, rotation)
 
 
-def target_points(model, estimate):
-    """The targets as points of the kinematic chain, where an estimate has them: a list of `Point`."""
+def target_points(model: Model, estimate: Estimate) -> list[MeasuringPoint]:
+    """The targets as points of the kinematic chain, where an estimate has them: a list of `MeasuringPoint`."""
     points = [model.sites.chain.point(target.point) for target in model.targets]
     return [replace(point, offset_m=tuple(at)) for point, at in zip(points, estimate.target_offset, strict=True)]

@@ -1,5 +1,9 @@
 """Where the robot stands and where its targets sit, roughly and from nothing: the start of every fit."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -7,13 +11,17 @@ from elastocal.fitting.model import Estimate
 from elastocal.fitting.observations import sample_of
 from elastocal.mechanics.kinematics import poses
 
+if TYPE_CHECKING:
+    from elastocal.fitting.model import Model
+    from elastocal.fitting.observations import Observations
+
 # Of more observations than this a sample tells where a fit starts.
 _MOST = 50_000
 _ROUNDS = 200
 _SETTLED_M = 1e-9
 
 
-def registered(model, observations):
+def registered(model: Model, observations: Observations) -> Estimate:
     """Frames and targets of a model that its nominal kinematics explain best, by alternating closed-form steps.
 
     Block coordinate descent: frames by the Kabsch algorithm [1]_ for Wahba's problem [2]_, given the targets; positions of
@@ -66,10 +74,10 @@ def registered(model, observations):
             break
     turns = np.tile(np.eye(3), (len(model.targets), 1, 1))
     if observations.rotation is not None:
-        seen = frames[0][session].transpose(0, 2, 1) @ observations.rotation
+        turned = frames[0][session].transpose(0, 2, 1) @ observations.rotation
         for index in unknown:
             mask = observations.target == index
-            turns[index] = Rotation.from_matrix(nominal_rotation[mask].transpose(0, 2, 1) @ seen[mask]).mean().as_matrix()
+            turns[index] = Rotation.from_matrix(nominal_rotation[mask].transpose(0, 2, 1) @ turned[mask]).mean().as_matrix()
     nothing = Estimate(tuple(sessions.tolist()), *frames, offsets, turns).with_effects(model.effects)
     start = [
         model.nominal_compliance.copy() if effect.effect == "joint_compliance" else values
@@ -78,7 +86,7 @@ def registered(model, observations):
     return Estimate(nothing.sessions, *frames, offsets, turns, tuple(start), nothing.shapes)
 
 
-def _frames(placed, measured, session, count):
+def _frames(placed: np.ndarray, measured: np.ndarray, session: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
     for number in range(count):
         mask = session == number
@@ -88,5 +96,5 @@ def _frames(placed, measured, session, count):
     return rotation, position
 
 
-def _into_base(frames, session, vectors):
+def _into_base(frames: tuple[np.ndarray, np.ndarray], session: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return (frames[0][session].transpose(0, 2, 1) @ vectors[..., None])[..., 0]

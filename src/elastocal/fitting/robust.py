@@ -1,5 +1,9 @@
 """Gauss-Newton steps of a robust fit: outliers lose weight, and a step that does not help is halved."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.stats import chi2
 from statsmodels.robust.norms import HuberT
@@ -7,6 +11,13 @@ from statsmodels.robust.norms import HuberT
 from elastocal.fitting.identifiability import solve_normal
 from elastocal.fitting.normal_equations import Parts
 from elastocal.fitting.parameters import limits, nonlinear_parameters, parameter_values, parameters, stepped
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
@@ -21,7 +32,16 @@ _ROUNDING = 1e-9
 _HUBER_QUANTILE = 0.99
 
 
-def robustly(model, observations, around, noise, estimate, frozen=False, reweighted=False, settled=SETTLED):
+def robustly(
+    model: Model,
+    observations: Observations,
+    around: Conditions | None,
+    noise: Noise,
+    estimate: Estimate,
+    frozen: bool | np.ndarray = False,
+    reweighted: bool = False,
+    settled: float = SETTLED,
+) -> Fit:
     """Iteratively reweighted least squares with Huber's weights [1]_ by Gauss-Newton steps, each halved until it helps enough.
 
     Where errors are independent, weighted squares are a bound of Huber's objective that touches it at the present estimate
@@ -70,7 +90,7 @@ def robustly(model, observations, around, noise, estimate, frozen=False, reweigh
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
-    def objective(estimate, squares):
+    def objective(estimate: Estimate, squares: float) -> float:
         """Half the weighted squares of the residual and of what has a prior."""
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 

@@ -1,10 +1,19 @@
 """Generalized least squares: residuals and sensitivities divided by the noise of the states in which they were taken."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.fitting.noise import measurement_covariances
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 
 @dataclass(frozen=True)
@@ -17,9 +26,9 @@ class Whitening:
         For the states, or the poses, with k observations: their indices, and the inverse Cholesky factor of their covariance.
     """
 
-    blocks: tuple
+    blocks: tuple[tuple[np.ndarray, np.ndarray], ...]
 
-    def apply(self, values):
+    def apply(self, values: np.ndarray) -> np.ndarray:
         """Whitened values.
 
         Parameters
@@ -38,7 +47,7 @@ class Whitening:
         return whitened
 
 
-def whitening(observations, jacobian, noise):
+def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening:
     """Whitening of averaged observations.
 
     For generalized least squares [1]_: inverse Cholesky factors of the covariance of what errs together.
@@ -62,11 +71,13 @@ def whitening(observations, jacobian, noise):
     """
     if not noise.pose_rad and not noise.joint_rad.any():
         return Whitening(tuple(_of_sensor_alone(observations, noise)))
+    # Where joints err, it takes a Jacobian to see it.
+    assert jacobian is not None
     blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise)]
     return Whitening(tuple(blocks))
 
 
-def _of_sensor_alone(observations, noise):
+def _of_sensor_alone(observations: Observations, noise: Noise) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Blocks where nothing is correlated: one factor for all that are averages of as many repeats, held once."""
     precision = np.diag(1.0 / np.repeat([noise.position_m, noise.orientation_rad], 3)[: observations.rows])
     repeats = observations.states.repeats[observations.state]
@@ -75,7 +86,7 @@ def _of_sensor_alone(observations, noise):
         yield members, np.broadcast_to(np.sqrt(number) * precision, (len(members), *precision.shape))
 
 
-def _covariances(observations, jacobian, noise):
+def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Observations with correlated errors (G, k) and their covariance (G, k * rows, k * rows), for each number k.
 
     Those of a state share the approach; where poses have an error in common, those of all states of a pose share it.
@@ -94,7 +105,7 @@ def _covariances(observations, jacobian, noise):
         yield members, alike * measurement_covariances(noise, jacobian[members], rows) + common
 
 
-def _members(group):
+def _members(group: np.ndarray) -> list[np.ndarray]:
     """Observations of each state or pose, for each number of them in one: arrays (G, k)."""
     seen = np.bincount(group)
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
