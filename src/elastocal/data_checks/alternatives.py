@@ -6,9 +6,12 @@ targets that stand elsewhere, then two changes together. Senses, axes and units 
 is fitted.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import combinations, permutations, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -24,6 +27,13 @@ from elastocal.data_checks.placement import (
     trimmed_rms,
 )
 from elastocal.data_checks.protocol import Fault, Value
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.campaigns.campaign import Campaign, Measurements, Target
+    from elastocal.data_checks.placement import Placement
+    from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = (
     ("wrong_sign", "swapped_axes", "wrong_unit", "wrong_frame", "wrong_target"),
@@ -86,9 +96,9 @@ class Change:
 
     name: str
     detail: str
-    correct: Callable = field(compare=False)
-    joints: tuple = ()
-    parameters: tuple = ()
+    correct: Callable[[Campaign, Measurements], tuple[Campaign, Measurements]] = field(compare=False)
+    joints: tuple[int, ...] = ()
+    parameters: tuple[Value, ...] = ()
     placement: str = ""
 
 
@@ -100,17 +110,17 @@ class Misfit:
     orientation_rad: float
 
     @property
-    def together(self):
+    def together(self) -> float:
         """Both as a length, m."""
         return float(np.hypot(self.position_m, IMPLAUSIBLE_M / IMPLAUSIBLE_RAD * self.orientation_rad))
 
     @property
-    def implausible(self):
+    def implausible(self) -> bool:
         """Whether no geometric error and no deflection could make it."""
         return self.position_m > IMPLAUSIBLE_M or self.orientation_rad > IMPLAUSIBLE_RAD
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """The simplest ways to read the file otherwise that let absurd measurements fit.
 
     Parameters
@@ -132,8 +142,9 @@ def find(campaign, measurements):
     return [replace(fault, detail=f"{fault.detail} (positions alone: orientations do not go with them)") for fault in found]
 
 
-def _one_after_the_other(campaign, some):
-    campaign, found = replace(campaign, measurements=some), []
+def _one_after_the_other(campaign: Campaign, some: Measurements) -> list[Fault]:
+    campaign = replace(campaign, measurements=some)
+    found: list[Fault] = []
     for _ in range(_ROUNDS):
         new, campaign, some = _mended(campaign, some)
         known = {(fault.name, fault.detail) for fault in found}
@@ -144,7 +155,7 @@ def _one_after_the_other(campaign, some):
     return found
 
 
-def single_changes(campaign):
+def single_changes(campaign: Campaign) -> list[Change]:
     """Every discrete change that is tried alone.
 
     Parameters
@@ -163,7 +174,7 @@ def single_changes(campaign):
     return [*found, *_axes(campaign.frame == "tracker" and not oriented, oriented)]
 
 
-def placements(campaign):
+def placements(campaign: Campaign) -> list[Change]:
     """Changes that fit where the base or the targets are, as far as the campaign says that it knows them.
 
     Parameters
@@ -179,7 +190,7 @@ def placements(campaign):
         found.append(Change("wrong_frame", "", lambda c, r: (replace(c, frame="tracker"), r), placement="frame"))
     if any(target.offset_m is not None for target in campaign.targets):
 
-        def unknown(campaign, measurements):
+        def unknown(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
             seen = set(measurements.target.tolist())
             targets = [replace(t, offset_m=None) if number in seen else t for number, t in enumerate(campaign.targets)]
             return replace(campaign, targets=tuple(targets)), measurements
@@ -188,7 +199,7 @@ def placements(campaign):
     return found
 
 
-def pairs(campaign):
+def pairs(campaign: Campaign) -> list[tuple[Change, ...]]:
     """Two changes at once, where neither alone lets the measurements fit.
 
     Parameters
@@ -210,7 +221,7 @@ def pairs(campaign):
     return [*found, *combinations(_single_senses(campaign.robot.joints), 2)]
 
 
-def _mended(campaign, measurements):
+def _mended(campaign: Campaign, measurements: Measurements) -> tuple[list[Fault], Campaign, Measurements]:
     """Faults of the simplest alternative that mends the measurements, and campaign and measurements as they are then read."""
     written = robustly_placed(campaign, measurements)
     # All measurements but a few, or all: a joint may move in a few poses only.
@@ -223,25 +234,26 @@ def _mended(campaign, measurements):
         for measure in measures:
             before = _misfit(written, measure)
             winners = [winner for stage in tried if (winner := _winner(stage, before, measure))]
+            if not winners:
+                continue
             # What is fitted is preferred to what is discrete only where it is far better.
-            winner = winners[0] if winners else None
+            winner = winners[0]
             for other in winners[1:]:
                 if other.after.together < winner.after.together / FAR_BETTER:
                     winner = other
-            if winner:
-                return winner.faults(written, before, measurements), winner.tried.campaign, winner.tried.measurements
+            return winner.faults(written, before, measurements), winner.tried.campaign, winner.tried.measurements
     return [], campaign, measurements
 
 
 @dataclass(frozen=True)
 class _Tried:
-    changes: tuple
-    campaign: object
-    measurements: object
-    placement: object
+    changes: tuple[Change, ...]
+    campaign: Campaign
+    measurements: Measurements
+    placement: Placement
 
 
-def _tried(campaign, measurements, changes):
+def _tried(campaign: Campaign, measurements: Measurements, changes: tuple[Change, ...]) -> _Tried:
     for change in changes:
         campaign, measurements = change.correct(campaign, measurements)
     return _Tried(changes, campaign, measurements, placed(campaign, measurements))
@@ -250,12 +262,12 @@ def _tried(campaign, measurements, changes):
 @dataclass(frozen=True)
 class _Winner:
     tried: _Tried
-    placement: object
+    placement: Placement
     after: Misfit
-    evidence: tuple
-    alike: tuple
+    evidence: tuple[float, float]
+    alike: tuple[str, ...]
 
-    def faults(self, written, before, measurements):
+    def faults(self, written: Placement, before: Misfit, measurements: Measurements) -> list[Fault]:
         """One fault for each change."""
         found = []
         for change in self.tried.changes:
@@ -270,7 +282,7 @@ class _Winner:
         return found
 
 
-def _winner(tried, before, measure):
+def _winner(tried: Sequence[_Tried], before: Misfit, measure: Callable[[np.ndarray], float]) -> _Winner | None:
     """The first of the alternatives that fit best, if it convinces."""
     if not tried:
         return None
@@ -298,11 +310,11 @@ def _winner(tried, before, measure):
     return None
 
 
-def _misfit(placement, measure):
+def _misfit(placement: Placement, measure: Callable[[np.ndarray], float]) -> Misfit:
     return Misfit(measure(placement.distance), 0.0 if placement.turn is None else measure(placement.turn))
 
 
-def _extent(placement, measurements):
+def _extent(placement: Placement, measurements: Measurements) -> float:
     """RMS distance of the predicted places of a target from their middle, m."""
     largest = 0.0
     for group in np.unique(np.column_stack([measurements.session, measurements.target]), axis=0):
@@ -311,7 +323,7 @@ def _extent(placement, measurements):
     return largest
 
 
-def _evidence(written, corrected, extent_m):
+def _evidence(written: Misfit, corrected: Misfit, extent_m: float) -> tuple[float, float] | None:
     """RMS before and after, of positions or else of orientations; None where a correction does not convince."""
     positions = written.position_m, corrected.position_m
     orientations = written.orientation_rad, corrected.orientation_rad
@@ -327,7 +339,7 @@ def _evidence(written, corrected, extent_m):
     return None
 
 
-def _senses(joints):
+def _senses(joints: int) -> list[Change]:
     """Joints counted the other way round, or from their neighbours."""
     unit, found = np.eye(joints), _single_senses(joints)
     for j in range(joints - 1):
@@ -338,7 +350,7 @@ def _senses(joints):
     return found
 
 
-def _single_senses(joints):
+def _single_senses(joints: int) -> list[Change]:
     return [
         Change(
             "wrong_sign",
@@ -350,7 +362,7 @@ def _single_senses(joints):
     ]
 
 
-def _lengths_of_positions():
+def _lengths_of_positions() -> list[Change]:
     found = []
     for unit, metres in _LENGTHS.items():
         detail = f"the positions look like {unit}: measurements fit {metres:g} times the written positions"
@@ -359,7 +371,7 @@ def _lengths_of_positions():
     return found
 
 
-def _lengths_of_targets(campaign):
+def _lengths_of_targets(campaign: Campaign) -> list[Change]:
     """Of all targets, or of one where there are several."""
     known = [target.name for target in campaign.targets if target.offset_m is not None and any(target.offset_m)]
     groups = [known, *([name] for name in known if len(known) > 1)] if known else []
@@ -375,16 +387,20 @@ def _lengths_of_targets(campaign):
     return found
 
 
-def _rotations():
+def _rotations() -> list[Change]:
     detail = "the rotation vectors fit turned round, as if they took base axes into the target's"
     found = [Change("wrong_sign", detail, _with_rotations(np.negative))]
     for factor, words in _TURNS.items():
+
+        def divided(turned: np.ndarray, factor: float = factor) -> np.ndarray:
+            return turned / factor
+
         detail = f"the rotation vectors look like {words}: measurements fit {1 / factor:.4g} times the written rotation vectors"
         value = Value("radians for each unit of rotation vector written", 1 / factor, "rad")
-        found.append(Change("wrong_unit", detail, _with_rotations(lambda turned, factor=factor: turned / factor), (), (value,)))
+        found.append(Change("wrong_unit", detail, _with_rotations(divided), (), (value,)))
     for letters, words in _EULER.items():
 
-        def vectors(turned, letters=letters):
+        def vectors(turned: np.ndarray, letters: str = letters) -> np.ndarray:
             return Rotation.from_euler(letters, turned).as_rotvec()
 
         detail = f"the columns of the rotation vector look like {words}, in rad"
@@ -392,7 +408,7 @@ def _rotations():
     return found
 
 
-def _axes(mirrored_only, oriented):
+def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
     """Axes exchanged or turned round, those of the fewest changes first; rotation vectors as written, or exchanged as well."""
     if mirrored_only:
         detail = "the measurements are mirrored: two axes are exchanged, or one is turned round, or joints have the wrong sense"
@@ -415,7 +431,7 @@ def _axes(mirrored_only, oriented):
     return found
 
 
-def _axes_told(matrix):
+def _axes_told(matrix: np.ndarray) -> str:
     """Such as ``x = -y, y = x``: what is to be read for the axes that change."""
     told = []
     for axis, row in zip("xyz", matrix, strict=True):
@@ -426,8 +442,8 @@ def _axes_told(matrix):
     return ", ".join(told)
 
 
-def _with_angles(matrix):
-    def correct(campaign, measurements):
+def _with_angles(matrix: np.ndarray) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         # The sign of a column of the file, which counts from where the controller counts.
         reported = campaign.robot.reported_angles(measurements.joint_angles)
         return campaign, replace(measurements, joint_angles=campaign.robot.model_angles(reported @ matrix.T))
@@ -435,12 +451,14 @@ def _with_angles(matrix):
     return correct
 
 
-def _with_positions(matrix):
+def _with_positions(matrix: np.ndarray) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
     return _with_positions_and_rotations(matrix, None)
 
 
-def _with_positions_and_rotations(matrix, turning):
-    def correct(campaign, measurements):
+def _with_positions_and_rotations(
+    matrix: np.ndarray, turning: np.ndarray | None
+) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         vectors = measurements.rotation_vector
         vectors = vectors if turning is None or vectors is None else vectors @ turning.T
         return campaign, replace(measurements, position=measurements.position @ matrix.T, rotation_vector=vectors)
@@ -448,17 +466,22 @@ def _with_positions_and_rotations(matrix, turning):
     return correct
 
 
-def _with_rotations(function):
-    def correct(campaign, measurements):
-        return campaign, replace(measurements, rotation_vector=function(measurements.rotation_vector))
+def _with_rotations(
+    function: Callable[[np.ndarray], np.ndarray],
+) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
+        vectors = measurements.rotation_vector
+        return campaign, replace(measurements, rotation_vector=None if vectors is None else function(vectors))
 
     return correct
 
 
-def _with_offsets(names, factor):
-    def correct(campaign, measurements):
+def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
+    def correct(campaign: Campaign, measurements: Measurements) -> tuple[Campaign, Measurements]:
         targets = [
-            replace(target, offset_m=tuple(factor * value for value in target.offset_m)) if target.name in names else target
+            replace(target, offset_m=tuple(factor * value for value in target.offset_m))
+            if target.offset_m is not None and target.name in names
+            else target
             for target in campaign.targets
         ]
         return replace(campaign, targets=tuple(targets)), measurements
@@ -466,7 +489,7 @@ def _with_offsets(names, factor):
     return correct
 
 
-def _frame_told(estimate, before, after):
+def _frame_told(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:
     """Sentence and numbers of a base that stands elsewhere, and whether that is too far for physics."""
     parameters, away, turned = [], 0.0, 0.0
     for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
@@ -485,7 +508,7 @@ def _frame_told(estimate, before, after):
     return f"measurements would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
-def _targets_told(targets, written, fitted):
+def _targets_told(targets: Sequence[Target], written: Estimate, fitted: Estimate) -> tuple[str, tuple[Value, ...]]:
     parameters, farthest, turned = [], ("", 0.0), 0.0
     for number, target in enumerate(targets):
         offset = fitted.target_offset[number]

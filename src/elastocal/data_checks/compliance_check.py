@@ -1,9 +1,18 @@
 """Joint compliances that no robot has: negative, or many times off what its data sheet says."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M
 from elastocal.fitting.displacement import joint_compliances
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.fitting.fit_result import Fit
 
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's.
@@ -12,7 +21,7 @@ MOST_OFF_NOMINAL = 5.0
 _SURE = 2.0
 
 
-def fitted_compliance_warnings(fitted):
+def fitted_compliance_warnings(fitted: Fit) -> list[str]:
     """`compliance_warnings` of a fit.
 
     Parameters
@@ -33,7 +42,9 @@ def fitted_compliance_warnings(fitted):
     return compliance_warnings(joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance)
 
 
-def compliance_warnings(compliance, std_error, nominal):
+def compliance_warnings(
+    compliance: np.ndarray | Sequence[float], std_error: np.ndarray | Sequence[float], nominal: np.ndarray | Sequence[float]
+) -> list[str]:
     """Name the identified joint compliances that are negative, or far off nominal either way.
 
     Parameters
@@ -64,5 +75,5 @@ def compliance_warnings(compliance, std_error, nominal):
     ]
 
 
-def _off(value, nominal):
+def _off(value: float, nominal: float) -> str:
     return f"negative, nominal {nominal:.3g}" if value < 0 else f"{value / nominal:.2g} times nominal"

@@ -1,9 +1,16 @@
 """Positions that stay where they are while the robot moves, or joint angles that do not move while the measurements do."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, placed, spread
 from elastocal.data_checks.protocol import Fault, Value
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 NAMES, FAMILY, AFTER = ("constant_columns",), "data", ()
 
@@ -12,7 +19,7 @@ _SAME_M, _SAME_RAD = 1e-6, 1e-6
 _FEWEST_POSES = 3
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Columns that are the same in all poses and cannot be.
 
     Parameters
@@ -55,7 +62,7 @@ def find(campaign, measurements):
     return list({fault.detail.split(" of ")[0]: fault for fault in reversed(found)}.values())
 
 
-def _extents(points):
+def _extents(points: np.ndarray) -> np.ndarray:
     """Standard deviations of points along their principal axes, rising, ndarray (3,), m."""
     off = points - points.mean(axis=0)
     return np.sqrt(np.maximum(np.linalg.eigvalsh(off.T @ off / len(points)), 0.0))

@@ -3,7 +3,10 @@
 No NAMES: what the faults of loads have in common.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.constants import g, pound_force
@@ -13,6 +16,12 @@ from elastocal.fitting.identifiability import solve_identifiable
 from elastocal.fitting.observations import state_clusters
 from elastocal.mechanics.elastostatics import generalized_forces, regressor
 from elastocal.mechanics.kinematics import poses_and_jacobians
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.fitting.model import Estimate
 
 _MANY_POSES = 150
 # Compliances of a robot and those of its data sheet differ by no more; all together by less.
@@ -103,7 +112,7 @@ class UnitFound:
     rms_corrected: float
 
 
-def deflections(campaign, measurements):
+def deflections(campaign: Campaign, measurements: Measurements) -> Deflections | None:
     """Differences between the loads of each pose; where there is one load a pose, all of the deflection.
 
     Frames, targets and geometry are taken off as means of each target in each pose (within transformation) or, where the loads
@@ -149,7 +158,7 @@ def deflections(campaign, measurements):
     return Deflections(flat[0][:, 0], flat[1], flat[2], count)
 
 
-def unit_of_loads(deflected):
+def unit_of_loads(deflected: Deflections) -> UnitFound | None:
     """The sign and unit that explain the deflections far better than the loads as written.
 
     Parameters
@@ -208,9 +217,9 @@ class StateDeflections:
     jacobian: np.ndarray
     end_jacobian: np.ndarray
     targets: np.ndarray
-    rows: tuple
+    rows: tuple[tuple[int, ...], ...]
 
-    def misfits(self, compliance, seen=None):
+    def misfits(self, compliance: np.ndarray, seen: np.ndarray | None = None) -> np.ndarray:
         """RMS over the targets of what the load of each state (columns) leaves of the deflections of each state (rows).
 
         Parameters
@@ -234,11 +243,11 @@ class StateDeflections:
         total += square.reshape(len(square), -1) @ products.T
         return np.sqrt(np.maximum(total, 0.0) / self.targets[:, None])
 
-    def sizes(self):
+    def sizes(self) -> np.ndarray:
         """RMS over the targets of the deflections of each state, ndarray (S,), m."""
         return np.sqrt((self.seen**2).sum(axis=(1, 2)) / self.targets)
 
-    def compliance(self, states, loads, nominal):
+    def compliance(self, states: np.ndarray, loads: np.ndarray, nominal: np.ndarray) -> np.ndarray:
         """Compliances that fit the deflections of some states best under some loads, near the nominal ones.
 
         Parameters
@@ -256,7 +265,7 @@ class StateDeflections:
         return nominal * np.clip(ratios, *_RATIOS_OF_ROBOTS)
 
 
-def state_deflections(campaign, measurements):
+def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDeflections | None:
     """Deflections of every loaded state that has an unloaded one of its pose beside it.
 
     Parameters
@@ -305,7 +314,7 @@ def state_deflections(campaign, measurements):
     )
 
 
-def _ratios(deflected, expected):
+def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Compliance over nominal of the joints that are well known, rows left by sigma clipping, and their RMS residual."""
     joints = expected.shape[1]
     kept = np.ones(len(deflected.seen), bool)
@@ -326,13 +335,15 @@ def _ratios(deflected, expected):
     return step[well], kept, level
 
 
-def _some_poses(measurements):
+def _some_poses(measurements: Measurements) -> Measurements:
     pose = state_clusters(measurements)
     chosen = np.unique(np.linspace(0, pose.max(), _MANY_POSES).round().astype(int))
     return measurements.select(np.isin(pose, chosen))
 
 
-def _linearized(campaign, measurements, estimate):
+def _linearized(
+    campaign: Campaign, measurements: Measurements, estimate: Estimate
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Measured less predicted without load (N, 3), Jacobians of target and end, rotation of the target's point, positions."""
     chain, angles = campaign.robot.chain, measurements.joint_angles
     position, rotation = np.empty((len(measurements), 3)), np.empty((len(measurements), 3, 3))
@@ -349,14 +360,22 @@ def _linearized(campaign, measurements, estimate):
     return measured - position, jacobian, end, rotation, position
 
 
-def _centred(values, group):
+def _centred(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     """Values less the mean of their group."""
     total = np.zeros((group.max() + 1, *values.shape[1:]))
     np.add.at(total, group, values)
     return values - (total / np.maximum(np.bincount(group), 1).reshape(-1, *[1] * (values.ndim - 1)))[group]
 
 
-def _off_geometry(campaign, measurements, residual, parts, jacobian, rotation, position):
+def _off_geometry(
+    campaign: Campaign,
+    measurements: Measurements,
+    residual: np.ndarray,
+    parts: Sequence[np.ndarray],
+    jacobian: np.ndarray,
+    rotation: np.ndarray,
+    position: np.ndarray,
+) -> list[np.ndarray]:
     """Residual and parts less what frames, targets and joint offsets can explain of them."""
     columns = [jacobian]
     if campaign.frame == "tracker":

@@ -1,7 +1,14 @@
 """Measurements that this robot cannot have made, however the file is read: nothing can be traced in them."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.data_checks.placement import IMPLAUSIBLE_M, IMPLAUSIBLE_RAD, placed, rms, robustly_placed, spread, trimmed_rms
 from elastocal.data_checks.protocol import Fault, Value
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 NAMES, FAMILY, AFTER = ("implausible_measurements",), "data", ("constant_columns", "alternatives", "shuffled_rows")
 
@@ -9,7 +16,7 @@ NAMES, FAMILY, AFTER = ("implausible_measurements",), "data", ("constant_columns
 _FARTHEST_M, _FARTHEST_RAD = 5 * IMPLAUSIBLE_M, 5 * IMPLAUSIBLE_RAD
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Measurements absurdly far from the nominal robot, for a reason that no other fault names.
 
     Parameters

@@ -4,13 +4,20 @@ A load has no size that is absurd in itself. Only the compliances tell: all join
 than nominally. One between a half and two is nobody's unit.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.data_checks.deflections import deflections, unit_of_loads
 from elastocal.data_checks.protocol import Fault, Value
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 NAMES, FAMILY, AFTER = ("wrong_sign", "wrong_unit"), "data", ("constant_columns", "alternatives")
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Sign and unit in which the loads explain the measurements, where they are not those that they must have.
 
     Parameters

@@ -3,6 +3,10 @@
 They stop nothing: every fit gives them little weight. They are named so that somebody can look at them.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.data_checks.placement import (
@@ -23,6 +27,9 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import averaged, part_at, parts_of, select_states, spread_poses
 from elastocal.fitting.prediction import residuals
 
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
+
 NAMES, FAMILY, AFTER = ("outliers",), "data", ("constant_columns", "alternatives", "loads", "shuffled_rows", "implausible")
 
 # Robust standard deviations of the measurements of one target.
@@ -40,7 +47,7 @@ _MOST_FITTED = 20_000
 _ALIKE = 1e-3
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Measurements far from the declared model.
 
     Lengths of residuals against their robust standard deviation, see `placement.robust_sigma`.
@@ -90,5 +97,5 @@ def find(campaign, measurements):
     return [Fault(NAMES[0], (), detail, (share,), evidence, tuple(rows.tolist()), False)]
 
 
-def _rms(values):
+def _rms(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).sum(axis=1).mean()))

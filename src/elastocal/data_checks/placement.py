@@ -3,7 +3,10 @@
 No NAMES: what the faults of positions have in common.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,6 +18,10 @@ from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import registered
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.pose_differences import rotation_vectors
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.fitting.model import Estimate
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -43,27 +50,27 @@ class Placement:
     predicted_rotation, measured_rotation : ndarray (N, 3, 3) or None
     """
 
-    estimate: object
+    estimate: Estimate
     predicted: np.ndarray
     measured: np.ndarray
     predicted_rotation: np.ndarray | None
     measured_rotation: np.ndarray | None
 
     @property
-    def distance(self):
+    def distance(self) -> np.ndarray:
         """From the predicted to the measured position, ndarray (N,), m."""
         return np.linalg.norm(self.measured - self.predicted, axis=1)
 
     @property
-    def turn(self):
+    def turn(self) -> np.ndarray | None:
         """Angle between predicted and measured orientation, ndarray (N,), rad; None where positions are measured."""
-        if self.measured_rotation is None:
+        if self.measured_rotation is None or self.predicted_rotation is None:
             return None
         relative = self.measured_rotation @ self.predicted_rotation.transpose(0, 2, 1)
         return np.linalg.norm(rotation_vectors(relative), axis=1)
 
 
-def placed(campaign, measurements):
+def placed(campaign: Campaign, measurements: Measurements) -> Placement:
     """Fit frames and targets to all measurements alike.
 
     Parameters
@@ -78,7 +85,7 @@ def placed(campaign, measurements):
     return placed_by(campaign, measurements, _registered(campaign, measurements))
 
 
-def robustly_placed(campaign, measurements):
+def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement:
     """Fit frames and targets to the measurements that agree with each other.
 
     Least trimmed squares by concentration steps [1]_ from the fit to all, trimmed for each target in each session; then one
@@ -112,7 +119,7 @@ def robustly_placed(campaign, measurements):
     return found
 
 
-def placed_by(campaign, measurements, estimate):
+def placed_by(campaign: Campaign, measurements: Measurements, estimate: Estimate) -> Placement:
     """Measurements beside the nominal robot in given frames and targets, without loads: they move it by millimetres only.
 
     Parameters
@@ -135,7 +142,7 @@ def placed_by(campaign, measurements, estimate):
     return Placement(estimate, predicted, measured, expected, seen)
 
 
-def spread(measurements, poses=MANY_POSES):
+def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
     """Measurements of some poses all over the campaign, at the lowest load of each.
 
     Parameters
@@ -156,7 +163,7 @@ def spread(measurements, poses=MANY_POSES):
     return measurements.select(np.sort(np.concatenate(chosen)))
 
 
-def single_observations(measurements):
+def single_observations(measurements: Measurements) -> Observations:
     """Every measurement as an observation in a state of its own.
 
     Parameters
@@ -183,18 +190,18 @@ def single_observations(measurements):
     return Observations(states, np.arange(len(measurements)), measurements.target, measurements.position, rotation)
 
 
-def rms(values):
-    """Root of the mean square."""
+def rms(values: np.ndarray) -> float:
+    """Root of the mean square, of an array of any shape."""
     return float(np.sqrt((values**2).mean()))
 
 
-def trimmed_rms(distance):
-    """RMS without the largest tenth."""
+def trimmed_rms(distance: np.ndarray) -> float:
+    """RMS of distances (N,) without the largest tenth."""
     return rms(np.sort(distance)[: max(int((1 - _TRIMMED) * len(distance)), 1)])
 
 
-def robust_sigma(distance, components):
-    """Standard deviation of each component of vectors, from the median of their lengths.
+def robust_sigma(distance: np.ndarray, components: int) -> float:
+    """Standard deviation of each component of vectors, from the median of their lengths (N,).
 
     The median absolute deviation [1]_ for vectors: divided by the median of the chi distribution.
 
@@ -206,7 +213,7 @@ def robust_sigma(distance, components):
     return float(np.median(distance) / np.sqrt(chi2.median(components)))
 
 
-def _groups(measurements):
+def _groups(measurements: Measurements) -> list[np.ndarray]:
     """Indices of the measurements of each target in each session."""
     pairs = np.column_stack([measurements.session, measurements.target])
     _, number = np.unique(pairs, axis=0, return_inverse=True)
@@ -214,6 +221,6 @@ def _groups(measurements):
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
 
 
-def _registered(campaign, measurements):
+def _registered(campaign: Campaign, measurements: Measurements) -> Estimate:
     model = replace(declared_model(campaign), effects=())
     return registered(model, single_observations(measurements))

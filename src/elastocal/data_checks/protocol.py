@@ -54,10 +54,10 @@ class Fault:
     """
 
     name: str
-    joints: tuple
+    joints: tuple[int, ...]
     detail: str
-    parameters: tuple
-    evidence: tuple
-    rows: tuple
+    parameters: tuple[Value, ...]
+    evidence: tuple[float, float]
+    rows: tuple[int, ...]
     decisive: bool
-    alternatives: tuple = ()
+    alternatives: tuple[str, ...] = ()

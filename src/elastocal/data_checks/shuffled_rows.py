@@ -13,7 +13,10 @@ References
 .. [2] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -33,6 +36,12 @@ from elastocal.data_checks.placement import (
 )
 from elastocal.data_checks.protocol import Fault, Value
 from elastocal.fitting.observations import state_clusters
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.data_checks.deflections import StateDeflections
+    from elastocal.data_checks.placement import Placement
+    from elastocal.fitting.model import Estimate
 
 NAMES, FAMILY, AFTER = ("shuffled_rows",), "data", ("constant_columns", "alternatives", "loads")
 
@@ -67,7 +76,7 @@ class _Shift:
     kind: str
 
 
-def find(campaign, measurements):
+def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     """Rows whose measured columns, or whose loads, belong to other rows.
 
     Parameters
@@ -82,7 +91,7 @@ def find(campaign, measurements):
     return [*_of_positions(campaign, measurements), *_of_loads(campaign, measurements)]
 
 
-def _of_positions(campaign, measurements):
+def _of_positions(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     some = robustly_placed(campaign, spread(measurements))
     # One fit to some poses serves all: it only has to be good to a few centimetres.
     as_written = placed_by(campaign, measurements, some.estimate)
@@ -95,7 +104,7 @@ def _of_positions(campaign, measurements):
     return found or _matched(measurements, as_written, as_written, as_written)
 
 
-def _shifted(campaign, measurements, as_written):
+def _shifted(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
     """All rows fit once the measured columns are moved by one row."""
     shifts = [_Shift(steps, kind) for kind in ("row", "row of its target", "pose") for steps in (1, -1)]
     moved = [_moved(measurements, shift) for shift in shifts]
@@ -112,7 +121,7 @@ def _shifted(campaign, measurements, as_written):
     return [Fault(NAMES[0], (), detail, (Value("shift", float(shift.steps), "–"),), (rms(before), rms(after)), (), True)]
 
 
-def _moved(measurements, shift):
+def _moved(measurements: Measurements, shift: _Shift) -> Measurements:
     """Measurements with the measured columns moved down; those that fall off the end are left out."""
     order = np.argsort(measurements.row, kind="stable")
     key = np.zeros((len(measurements), 1), int)
@@ -132,7 +141,7 @@ def _moved(measurements, shift):
     return _with_measured(measurements, np.maximum(source, 0)).select(source >= 0)
 
 
-def _with_measured(measurements, source):
+def _with_measured(measurements: Measurements, source: np.ndarray) -> Measurements:
     """Measurements with the measured columns of other rows."""
     turned = measurements.rotation_vector
     return replace(
@@ -140,7 +149,7 @@ def _with_measured(measurements, source):
     )
 
 
-def _all_matched(campaign, measurements, as_written):
+def _all_matched(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Fault]:
     """Frames, targets and rows found together, from the main axes of all points: most rows are out of place."""
     starts = [as_written.estimate]
     if campaign.frame == "tracker":
@@ -161,7 +170,7 @@ def _all_matched(campaign, measurements, as_written):
     return _matched(measurements, as_written, beside, None)
 
 
-def _by_main_axes(campaign, measurements, as_written):
+def _by_main_axes(campaign: Campaign, measurements: Measurements, as_written: Placement) -> list[Estimate]:
     """Estimates whose frames turn the main axes of the predicted points into those of the measured ones."""
     found, estimate = [], as_written.estimate
     unknown = [target.offset_m is None for target in campaign.targets]
@@ -180,12 +189,12 @@ def _by_main_axes(campaign, measurements, as_written):
     return found
 
 
-def _main_axes(points):
+def _main_axes(points: np.ndarray) -> np.ndarray:
     axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2].T
     return axes * [1.0, 1.0, np.sign(np.linalg.det(axes))]
 
 
-def _matched(measurements, as_written, beside, rest):
+def _matched(measurements: Measurements, as_written: Placement, beside: Placement, rest: Placement | None) -> list[Fault]:
     """The fault that some rows fit in the places of each other; `rest` says how well rows fit that are in place."""
     distance = beside.distance
     out = distance > IMPLAUSIBLE_M
@@ -215,7 +224,7 @@ def _matched(measurements, as_written, beside, rest):
     return [Fault(NAMES[0], (), detail, (share,), (before, after), concerned, True)]
 
 
-def _places(position, rotation):
+def _places(position: np.ndarray, rotation: np.ndarray | None) -> np.ndarray:
     """Positions and, where they are measured, orientations as points whose distances are in m, ndarray (N, 3 or 12)."""
     if rotation is None:
         return position
@@ -223,7 +232,9 @@ def _places(position, rotation):
     return np.concatenate([position, _ARM_M / np.sqrt(2) * rotation.reshape(len(rotation), 9)], axis=1)
 
 
-def _gaps(measurements, predicted, measured, rows):
+def _gaps(
+    measurements: Measurements, predicted: np.ndarray, measured: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """For each of some rows the distance to the nearest measured place among them, and the row of that place."""
     left, source = np.empty(len(rows)), np.empty(len(rows), int)
     for session in np.unique(measurements.session[rows]):
@@ -234,7 +245,7 @@ def _gaps(measurements, predicted, measured, rows):
     return left, source
 
 
-def _spacing(measurements, predicted, rows):
+def _spacing(measurements: Measurements, predicted: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """For each of some rows how far the next place is among those predicted for them."""
     spacing = np.zeros(len(rows))
     for session in np.unique(measurements.session[rows]):
@@ -242,13 +253,13 @@ def _spacing(measurements, predicted, rows):
         points = predicted[rows[members]]
         # One of each place.
         places = points[np.unique(np.round(points / _SAME_PLACE_M), axis=0, return_index=True)[1]]
-        near = cKDTree(places).query(points, k=min(4, len(places)))[0].reshape(len(points), -1)
+        near = np.reshape(cKDTree(places).query(points, k=min(4, len(places)))[0], (len(points), -1))
         other = np.where(near > 2 * _SAME_PLACE_M, near, np.inf).min(axis=1)
         spacing[members] = np.where(np.isfinite(other), other, 0.0)
     return spacing
 
 
-def _of_loads(campaign, measurements):
+def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     states = state_deflections(campaign, measurements)
     if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
         return []
@@ -267,7 +278,7 @@ def _of_loads(campaign, measurements):
     return _all_loads_matched(states, nominal)
 
 
-def _some_loads_matched(states, compliance, missed, out):
+def _some_loads_matched(states: StateDeflections, compliance: np.ndarray, missed: np.ndarray, out: np.ndarray) -> list[Fault]:
     """Most loads are in place and tell how well the others must fit where they belong."""
     sigma = np.median(missed[~out])
     if (out & (missed > _MISSED_MORE * sigma)).sum() < _FEWEST_ROWS:
@@ -283,7 +294,7 @@ def _some_loads_matched(states, compliance, missed, out):
     return _loads_fault(states, rows[back], rows[there[back]], missed[rows[back]], left[back])
 
 
-def _all_loads_matched(states, nominal):
+def _all_loads_matched(states: StateDeflections, nominal: np.ndarray) -> list[Fault]:
     """Most loads are out of place; the matching must fit far better than one of deflections that these loads did not make."""
     every, compliance = np.arange(len(states.wrench)), nominal
     before = np.diag(states.misfits(nominal))
@@ -299,7 +310,9 @@ def _all_loads_matched(states, nominal):
     return _loads_fault(states, every, there, before, left)
 
 
-def _loads_fault(states, here, there, before, left):
+def _loads_fault(
+    states: StateDeflections, here: np.ndarray, there: np.ndarray, before: np.ndarray, left: np.ndarray
+) -> list[Fault]:
     moved = here != there
     if moved.sum() < _FEWEST_ROWS or rms(left[moved]) > rms(before[moved]) / FAR_BETTER:
         return []
