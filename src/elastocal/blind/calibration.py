@@ -5,6 +5,10 @@ its mechanisms. Of a mechanism that the catalogue does not have every set that h
 compliances absorb at any size is as good as nothing, and no measurement could tell the two apart.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 
@@ -13,6 +17,9 @@ from elastocal.blind.robots import PROOF, TUNED
 from elastocal.blind.scores import NONE, kind_of
 from elastocal.plant.defects import OUTSIDE
 from elastocal.random_streams import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
 OTHER = "other"
 CREDIBLE = 0.95
@@ -23,7 +30,7 @@ _COLUMNS += ["held", "set_size", "set_probability", "nothing", "alarm_p_value"]
 _RELIABILITY = ["robots", "group", "from", "to", "stated", "hits", "cases", "rate", "low", "high"]
 
 
-def stated(truth, verdict):
+def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any] | None:
     """What was stated of a case, and whether it is so.
 
     Parameters
@@ -66,7 +73,7 @@ def stated(truth, verdict):
     }
 
 
-def is_true(mechanisms, truth):
+def is_true(mechanisms: Collection[str], truth: Mapping[str, Any]) -> bool:
     """Whether a set of mechanisms is what is true of a case.
 
     Parameters
@@ -86,7 +93,7 @@ def is_true(mechanisms, truth):
     return set(mechanisms) == set(effects) - absorbed
 
 
-def credible(ranked):
+def credible(ranked: Sequence[tuple[frozenset[str], float]]) -> list[tuple[frozenset[str], float]]:
     """The smallest set of hypotheses that reaches 95 %, that of highest posterior probability; all of them where they do not.
 
     Parameters
@@ -102,7 +109,7 @@ def credible(ranked):
     return list(ranked[: int(np.searchsorted(reached, CREDIBLE)) + 1])
 
 
-def statements(entries):
+def statements(entries: Iterable[tuple[Mapping[str, Any], Mapping[str, Any]]]) -> pd.DataFrame:
     """One row for each case of which something was stated.
 
     Parameters
@@ -118,7 +125,7 @@ def statements(entries):
     return pd.DataFrame([row for row in (stated(*entry) for entry in entries) if row], columns=_COLUMNS)
 
 
-def expected_calibration_error(probability, correct, bins=_BINS):
+def expected_calibration_error(probability: np.ndarray, correct: np.ndarray, bins: int = _BINS) -> np.ndarray:
     """Mean distance between what is stated and how often it is so: sum over bins of n_b / n |mean stated - share correct|.
 
     Parameters
@@ -152,8 +159,8 @@ def expected_calibration_error(probability, correct, bins=_BINS):
     return sum(np.abs(((probability - correct) * (which == b)).sum(axis=-1)) for b in range(bins)) / probability.shape[-1]
 
 
-def by_chance(probability, draws, bins=_BINS):
-    """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities, float.
+def by_chance(probability: np.ndarray, draws: np.random.Generator, bins: int = _BINS) -> float:
+    """Mean of `expected_calibration_error` of verdicts that are calibrated, at the same stated probabilities (n,), float.
 
     Outcomes are drawn by what is stated, as in consistency resampling [1]_, where what is stated is drawn too.
 
@@ -166,7 +173,7 @@ def by_chance(probability, draws, bins=_BINS):
     return float(expected_calibration_error(probability, so, bins).mean()) if len(probability) else float("nan")
 
 
-def calibration_error(rows, seed):
+def calibration_error(rows: pd.DataFrame, seed: int) -> dict[str, Any]:
     """Expected calibration error with a basic bootstrap interval [1]_ of 95 % over cases.
 
     Parameters
@@ -186,18 +193,19 @@ def calibration_error(rows, seed):
        1997.
     """
     probability, correct = rows.stated.to_numpy(float), rows.correct.to_numpy(bool)
-    found = {"hits": None, "cases": len(rows), "rate": float(expected_calibration_error(probability, correct))}
+    error = float(expected_calibration_error(probability, correct))
+    found = {"hits": None, "cases": len(rows), "rate": error}
     if len(rows) < 2:
         return found | {"low": np.nan, "high": np.nan, "by_chance": np.nan}
     draws = stream(seed, "blind", "calibration error", 0)
     picked = draws.integers(len(rows), size=(_RESAMPLES, len(rows)))
     again = expected_calibration_error(probability[picked], correct[picked])
     # The basic interval: a resample of a calibrated sample is less calibrated than the sample, by what the sample is already.
-    low, high = 2.0 * found["rate"] - np.quantile(again, [0.975, 0.025])
+    low, high = 2.0 * error - np.quantile(again, [0.975, 0.025])
     return found | {"low": max(float(low), 0.0), "high": max(float(high), 0.0), "by_chance": by_chance(probability, draws)}
 
 
-def reliability(rows, bins=_BINS):
+def reliability(rows: pd.DataFrame, bins: int = _BINS) -> pd.DataFrame:
     """Data of the reliability diagram [1]_.
 
     Parameters
@@ -223,11 +231,13 @@ def reliability(rows, bins=_BINS):
         mine = rows[rows.robots == robots]
         for group in ("all", *sorted(set(mine.group))):
             part = mine if group == "all" else mine[mine.group == group]
-            for number, inside in part.groupby(_bin_of(part.stated.to_numpy(float), bins)):
+            which = _bin_of(part.stated.to_numpy(float), bins)
+            for number in sorted(set(which.tolist())):
+                inside = part[which == number]
                 ends = {"from": number / bins, "to": (number + 1) / bins, "stated": inside.stated.mean()}
                 found.append({"robots": robots, "group": group} | ends | rate(inside.correct))
     return pd.DataFrame(found, columns=_RELIABILITY)
 
 
-def _bin_of(probability, bins):
+def _bin_of(probability: np.ndarray, bins: int) -> np.ndarray:
     return np.clip((np.asarray(probability) * bins).astype(int), 0, bins - 1)

@@ -4,18 +4,26 @@ The plant's side. It is told the name of a case, angles and loads, and makes the
 sealed file, and what it writes is a campaign like the first.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from elastocal.blind.cases import declared_of, defects_of, design_of, robot_file, specimen_of
+from elastocal.blind.cases import Case, declared_of, defects_of, design_of, robot_file, specimen_of
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.follow_up import ARMS, LADDER, POSES, folder_name
-from elastocal.plant.campaigns import continued, schedule_of
+from elastocal.plant.campaigns import Design, continued, schedule_of
 from elastocal.plant.defects import with_defects
 from elastocal.plant.random_numbers import stream
 
+if TYPE_CHECKING:
+    import numpy as np
 
-def carry_out(case, shown, wrench, folder, robots_folder):
+    from elastocal.plant.arm import Arm
+
+
+def carry_out(case: Case, shown: np.ndarray, wrench: np.ndarray, folder: str | Path, robots_folder: str | Path) -> None:
     """Carry out a proposal and its random counterpart, and write the campaign of the case with what was read further.
 
     Parameters
@@ -48,7 +56,7 @@ def carry_out(case, shown, wrench, folder, robots_folder):
             )
 
 
-def random_experiment(arm, design, count, seed):
+def random_experiment(arm: Arm, design: Design, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Poses and loads drawn as those of the campaign were.
 
     Parameters

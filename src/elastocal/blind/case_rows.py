@@ -1,27 +1,34 @@
 """One row a case: what the verdict is worth, how large the effect was, which errors were left, and what the oracle did."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from elastocal.blind.cases import impossible_on
 from elastocal.blind.scores import outcome
 from elastocal.plant.defects import KINDS
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
 # Effects that lie wholly within another effect or the joint compliances, by effect and joints of the ground truth, with what it
 # is not distinguishable from. Left out are aliases that a known frame, known targets and points at the elbow and wrist resolve:
 # offset of joint 1 and base, last link and tool, tilt of joint 1 and base, coupling of joints 2 and 3 and upper arm.
-EXACT_ALIASES = {
+EXACT_ALIASES: dict[tuple[str, tuple[int, ...]], str] = {
     ("force_scale", ()): "joint_compliance",
     ("compensator_torque", (2,)): "transmission_harmonic",
     ("transmission_harmonic", (2,)): "compensator_torque",
     ("link_weight", (2,)): "compensator_torque",
 }
 _STD_ERRORS = 2.0
-_ERRORS = ("before_rms_m", "after_rms_m", "noise_floor_rms_m", "reduction", "reduction_std_error")
+_ERRORS: tuple[str, ...] = ("before_rms_m", "after_rms_m", "noise_floor_rms_m", "reduction", "reduction_std_error")
 _ERRORS += ("worse", "warned", "worse_unwarned", "adopted", "worse_adopted")
 _COVARIATES = {need for kind in KINDS.values() for need in kind.needs}
 
 
-def case_row(truth, verdict, oracle):
+def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> dict[str, Any]:
     """Everything that the scores count of a case.
 
     Parameters
@@ -54,7 +61,7 @@ def case_row(truth, verdict, oracle):
     )
 
 
-def _size(truth):
+def _size(truth: Mapping[str, Any]) -> dict[str, Any]:
     """How large the effects are; for several the squares add up."""
     defects, noise = truth["defects"], truth["noise"]
     raw, retained = (sum(defect["signal"][kind] for defect in defects) for kind in ("raw", "retained"))
@@ -70,21 +77,21 @@ def _size(truth):
     }
 
 
-def _is_alias(defect, robot):
+def _is_alias(defect: Mapping[str, Any], robot: str) -> bool:
     """Whether an effect lies wholly within another one that the robot can have."""
     alias = EXACT_ALIASES.get((defect["effect"], tuple(defect["joints"])))
     return alias is not None and alias not in impossible_on(robot)
 
 
-def _places(effects, name):
+def _places(effects: Iterable[Mapping[str, Any]], name: str) -> dict[str, set[int]]:
     """Joints of each effect; those of one mechanism at several joints together."""
-    found = {}
+    found: dict[str, set[int]] = {}
     for effect in effects:
         found.setdefault(effect[name], set()).update(effect["joints"])
     return found
 
 
-def _errors(verdict):
+def _errors(verdict: Mapping[str, Any]) -> dict[str, Any]:
     """Held-out errors, and whether they got worse by more than chance with an effect that was adopted."""
     held = verdict["heldout"]
     if held is None:
@@ -110,7 +117,7 @@ def _errors(verdict):
     }
 
 
-def _of_oracle(oracle):
+def _of_oracle(oracle: Mapping[str, Any] | None) -> dict[str, Any]:
     if oracle is None:
         return {"oracle_p_value": np.nan, "oracle_detected": np.nan, "oracle_rms_m": np.nan}
     return {

@@ -4,30 +4,38 @@ A case is named by a hash, so that neither its folder nor its place in a list te
 adding cases, or making them in another order or in blocks, changes none that is there.
 """
 
+from __future__ import annotations
+
 import hashlib
 from dataclasses import asdict, dataclass, field, replace
 from itertools import combinations, product
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.blind.folders import write_blind_campaign, write_truth
 from elastocal.io.atomic_writes import atomic_write
-from elastocal.plant.arm import arm_from_file
+from elastocal.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal.plant.campaigns import FLANGE, Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.drives import PoseError, Repeatability
-from elastocal.plant.physical_robot import specimen
+from elastocal.plant.physical_robot import PhysicalRobot, specimen
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import Tracker
 from elastocal.plant.weights import declared_masses, on_stretches, usual_gravity_torque
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
+
+    _Sized = tuple[Defect, dict[str, Any]]
+
 # Robot files of config/robots. Nobody has looked at a diagnosis of the first two before the engine was frozen.
 PROOF, TUNED = ("iiwa14", "gp180"), ("kuka", "fanuc", "abb")
 ROBOTS = (*TUNED, *PROOF)
 # What an arm without a gravity compensator cannot have.
-_WITHOUT_COMPENSATOR = {"iiwa14": ("compensator_torque", "compensator_stiffness")}
+_WITHOUT_COMPENSATOR: dict[str, tuple[str, ...]] = {"iiwa14": ("compensator_torque", "compensator_stiffness")}
 LEVELS = (10.0, 25.0, 50.0, 200.0)
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
 FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
@@ -66,7 +74,7 @@ _IMPLAUSIBLE = 3.0
 USUAL_DESIGN = Design()
 
 # Settings by name: what is other than usual about the design, the tracker and the drives.
-SETTINGS = {
+SETTINGS: dict[str, dict[str, Any]] = {
     "usual": {},
     # Without repeats there is nothing but the word of the campaign.
     **{f"declared_noise_times_{ratio:g}": {"declared_ratio": ratio} for ratio in (0.5, 0.8, 0.9, 1.1, 1.5)},
@@ -89,7 +97,7 @@ SETTINGS = {
     "without_covariates": {"design": {"covariates": ()}},
 }
 # Designs of the confounding sweep, by name: the fewer points, loads and the narrower the joints, the more alike effects are.
-SWEEP_DESIGNS = {
+SWEEP_DESIGNS: dict[str, dict[str, Any]] = {
     f"{points}, {loads}, {joints}": {"design": read | loaded | reached}
     for points, read in (("all points", {}), ("flange", {"points": (FLANGE,)}))
     for loads, loaded in (("ladder", {}), ("one load", {"ladder": (0.0, 1.0)}))
@@ -109,7 +117,7 @@ SWEEP_LEVEL = 50.0
 HARD = ("pose_common_15urad", "force_3kN", "off_line_centres", "outliers_2_percent")
 _HARD_NULLS = tuple(name for name in SETTINGS if name != "usual" and not name.startswith("without"))
 # Effects that cannot be seen without what a setting leaves out.
-_UNSEEN = {
+_UNSEEN: dict[str, tuple[str, ...]] = {
     "without_approach": ("hysteresis",),
     "without_time_and_temperature": ("frame_drift", "temperature_gradient", "thermal_growth"),
     "without_covariates": ("hysteresis", "frame_drift", "temperature_gradient", "thermal_growth"),
@@ -143,14 +151,14 @@ class Case:
     key: str
     group: str
     robot: str
-    effects: tuple
-    levels: tuple
+    effects: tuple[str, ...]
+    levels: tuple[float, ...]
     setting: str
     seed: int
     alternative: str = ""
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Of its folder; tells nothing."""
         return "case_" + hashlib.sha256(f"{self.seed}/{self.key}".encode()).hexdigest()[:12]
 
@@ -194,17 +202,17 @@ class Counts:
     outside: int
     pair: int
     setting: int
-    levels: tuple = LEVELS
-    outside_levels: tuple = (50.0, 200.0)
-    pair_levels: tuple = (50.0, 200.0)
-    robots: tuple = field(default=ROBOTS)
+    levels: tuple[float, ...] = LEVELS
+    outside_levels: tuple[float, ...] = (50.0, 200.0)
+    pair_levels: tuple[float, ...] = (50.0, 200.0)
+    robots: tuple[str, ...] = field(default=ROBOTS)
     sweep: int = 0
     hard: int = 0
     several_joints: int = 0
     gear_gravity: int = 0
     moved: int = 0
     undeclared: int = 0
-    also: tuple = ()
+    also: tuple[Counts, ...] = ()
     purpose: str = ""
 
 
@@ -277,7 +285,7 @@ SIZES = {
 }
 
 
-def cases_of(counts, seed):
+def cases_of(counts: Counts, seed: int) -> list[Case]:
     """All cases of a benchmark.
 
     Parameters
@@ -291,9 +299,11 @@ def cases_of(counts, seed):
     list of Case
         In the order of their names, that is in none.
     """
-    found = []
+    found: list[Case] = []
 
-    def add(group, effects, levels, setting, number, alternative=""):
+    def add(
+        group: str, effects: tuple[str, ...], levels: tuple[float, ...], setting: str, number: int, alternative: str = ""
+    ) -> None:
         if set((*effects, alternative)) & set(impossible_on(robot)):
             return
         words = [
@@ -343,32 +353,33 @@ def cases_of(counts, seed):
     return sorted(found, key=lambda case: case.name)
 
 
-def impossible_on(robot):
+def impossible_on(robot: str) -> tuple[str, ...]:
     """Effects that a robot of `ROBOTS` cannot have, tuple of str."""
     return _WITHOUT_COMPENSATOR.get(robot, ())
 
 
-def block_of(cases, number, of):
+def block_of(cases: list[Case], number: int, of: int) -> list[Case]:
     """Every `of`-th case from `number` on, both counted from 1 as people do: a share for one job of a cluster."""
     return cases[number - 1 :: of]
 
 
-def design_of(case):
+def design_of(case: Case) -> Design:
     """How the campaign of a case is made."""
     setting = _setting(case)
     design = replace(USUAL_DESIGN, **setting.get("design", {}))
     if "declared_ratio" in setting:
         tracker = replace(Tracker(), **setting.get("tracker", {}))
-        noise = tuple(setting["declared_ratio"] * sigma for sigma in (tracker.sigma_m, tracker.sigma_rad))
+        ratio = setting["declared_ratio"]
+        noise = ratio * tracker.sigma_m, ratio * tracker.sigma_rad
         design = replace(design, repeats=1, declared_noise=noise)
     return design
 
 
-def _setting(case):
+def _setting(case: Case) -> dict[str, Any]:
     return (SWEEP_DESIGNS if case.group == "sweep" else SETTINGS)[case.setting]
 
 
-def specimen_of(case, robots_folder):
+def specimen_of(case: Case, robots_folder: str | Path) -> PhysicalRobot:
     """The robot of a case before anything is wrong with it; its weights, its tracker and its drives are the setting's.
 
     Parameters
@@ -392,21 +403,21 @@ def specimen_of(case, robots_folder):
     return robot
 
 
-def robot_file(case, robots_folder):
+def robot_file(case: Case, robots_folder: str | Path) -> Path:
     """Of which the robot of a case is a specimen."""
     return Path(robots_folder) / f"{case.robot}.yaml"
 
 
-def declared_of(case, arm):
+def declared_of(case: Case, arm: Arm) -> tuple[LinkMass, ...]:
     """What the analyst is told of the weights, tuple of LinkMass: nothing where they are what is hidden, or compensated."""
     return declared_masses(arm) if _weighs(case) else ()
 
 
-def _weighs(case):
+def _weighs(case: Case) -> bool:
     return WEIGHT not in case.effects and _setting(case).get("weighs", True)
 
 
-def defects_of(case, robot, design):
+def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]:
     """The defects of a case at the sizes that give their non-centralities.
 
     Parameters
@@ -431,7 +442,7 @@ def defects_of(case, robot, design):
     if not case.effects:
         return []
     yardstick = _yardstick(case, robot, design)
-    found = []
+    found: list[_Sized] = []
     for order, (effect, level) in enumerate(zip(case.effects, case.levels, strict=True)):
         drawn = [_drawn(case, robot, effect, case.seed + 1000 * order + draw) for draw in range(_DRAWS)]
         sized = _first_plausible(yardstick, robot, drawn, level, "retained") or _first_plausible(
@@ -443,7 +454,7 @@ def defects_of(case, robot, design):
     return found
 
 
-def _drawn(case, robot, effect, seed):
+def _drawn(case: Case, robot: PhysicalRobot, effect: str, seed: int) -> list[Defect]:
     """Defects of plausible size that belong together: one, or one mechanism at several joints."""
     arm, draws = robot.arm, stream(seed, f"joints of {effect}")
     if case.group == SEVERAL_JOINTS:
@@ -463,7 +474,7 @@ def _drawn(case, robot, effect, seed):
     return [defect]
 
 
-def angle_to_alternative(case, robot, design, bad):
+def angle_to_alternative(case: Case, robot: PhysicalRobot, design: Design, bad: PhysicalRobot) -> float:
     """Smallest angle between the contributions of a case's defects and of its alternative at any location, degrees.
 
     Parameters
@@ -480,7 +491,7 @@ def angle_to_alternative(case, robot, design, bad):
     """
     kind, yardstick = KINDS[case.alternative], _yardstick(case, robot, design)
 
-    def at(location):
+    def at(location: tuple[int, ...]) -> list[PhysicalRobot]:
         """Alternatives whose details differ and which together span what there is at a location."""
         defects = [Defect(case.alternative, location, kind.plausible_on(robot.arm), case.seed + draw) for draw in range(_DRAWS)]
         return [with_defects(robot, [defect]) for defect in defects]
@@ -488,7 +499,7 @@ def angle_to_alternative(case, robot, design, bad):
     return min(yardstick.angle_deg(bad, at(location)) for location in kind.locations(robot.arm))
 
 
-def _yardstick(case, robot, design):
+def _yardstick(case: Case, robot: PhysicalRobot, design: Design) -> Yardstick:
     targets = [robot.arm.points.index(point) for point in design.targets_on(robot.arm)]
     return Yardstick(
         robot,
@@ -499,15 +510,17 @@ def _yardstick(case, robot, design):
     )
 
 
-def _first_plausible(yardstick, robot, drawn, level, quantity):
+def _first_plausible(
+    yardstick: Yardstick, robot: PhysicalRobot, drawn: Iterable[list[Defect]], level: float, quantity: str
+) -> list[_Sized] | None:
     """The first of the drawn defects that need no implausible size, or else the least implausible; None where none have any."""
-    least = None
+    least: tuple[float, list[_Sized]] | None = None
     for number, defects in enumerate(drawn, 1):
 
-        def times(factor, defects=defects):
+        def times(factor: float, defects: list[Defect] = defects) -> list[Defect]:
             return [replace(defect, size=factor * defect.size) for defect in defects]
 
-        def robot_of_size(factor, times=times):
+        def robot_of_size(factor: float, times: Callable[[float], list[Defect]] = times) -> PhysicalRobot:
             return with_defects(robot, times(factor))
 
         largest = min(KINDS[defect.effect].largest / defect.size for defect in defects)
@@ -532,7 +545,7 @@ def _first_plausible(yardstick, robot, drawn, level, quantity):
     return None if least is None else least[1]
 
 
-def make_case(case, blind_folder, sealed_folder, robots_folder):
+def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
     """Make the campaign and the truth of a case.
 
     Parameters
@@ -559,7 +572,7 @@ def make_case(case, blind_folder, sealed_folder, robots_folder):
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
 
 
-def write_manifest(path, digests):
+def write_manifest(path: str | Path, digests: Mapping[str, str]) -> None:
     """Write the commitment that is published before any diagnosis: a line ``sha256  name`` for each truth.
 
     Parameters
@@ -572,7 +585,7 @@ def write_manifest(path, digests):
         file.writelines(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items()))
 
 
-def _drawn_pair(seed, robot, level, number):
+def _drawn_pair(seed: int, robot: str, level: float | str, number: int) -> tuple[str, str]:
     """Two effects of different names, neither of which is an alias of the compliances, and which the robot can have."""
     absent = ("force_scale", *impossible_on(robot))
     pairs = list(combinations([name for name in NAMED if name not in absent], 2))

@@ -1,10 +1,17 @@
 """Truth against what was said, as counts."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import pandas as pd
 
 from elastocal.blind.cases import GEAR_GRAVITY, MOVED, SEVERAL_JOINTS, UNDECLARED
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
 from elastocal.effects.catalogue import effects
+
+if TYPE_CHECKING:
+    from collections.abc import Collection
 
 PAIR = "pair"
 # Groups of which the settings are a column of their own: their cases are of another kind than a single effect's.
@@ -14,7 +21,7 @@ FAULT = "named: fault of the data"
 WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE)
 
 
-def confused(cases):
+def confused(cases: pd.DataFrame) -> pd.DataFrame:
     """Truth against what was said.
 
     Parameters
@@ -30,16 +37,17 @@ def confused(cases):
         its cases.
     """
     names = [*effects()]
-    said = [_said(row, names) for row in cases.itertuples()]
+    stated = zip(cases["verdict"], cases["found"], cases["holds_truth"], strict=True)
+    said = [_said(verdict, found, holds_truth, names) for verdict, found, holds_truth in stated]
     setting = cases.setting.where(cases.setting == "usual", "hard").where(~cases.group.isin(APART), cases.group)
     truth = cases.truth.where(cases.group != PAIR, PAIR)
     table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(said, cases.index, name="said"))
     return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})
 
 
-def _said(row, names):
-    if row.verdict == NAMED:
-        return row.found if row.found in names else FAULT
-    if row.verdict == CLASS:
-        return CLASS_WITH if row.holds_truth else CLASS_WITHOUT
-    return row.verdict
+def _said(verdict: str, found: str, holds_truth: bool, names: Collection[str]) -> str:
+    if verdict == NAMED:
+        return found if found in names else FAULT
+    if verdict == CLASS:
+        return CLASS_WITH if holds_truth else CLASS_WITHOUT
+    return verdict

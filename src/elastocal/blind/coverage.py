@@ -1,5 +1,9 @@
 """How often 95 % intervals of parameters hold the truth."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 from scipy.stats import norm
@@ -8,16 +12,27 @@ from scipy.stats import t as t_distribution
 from elastocal.blind.rates import rate
 from elastocal.blind.scores import NONE, kind_of
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
 COMPLIANCE = "joint_compliance"
 EXACT, FIRST_ORDER, OTHER_LAW = "exact", "to first order", "by another law"
 # How far a parameter of the plant is the catalogue's own; what is in neither list is it exactly.
-_FIRST_ORDER = ("link_geometry", "payload", "force_misalignment", "force_bias", "application_point", "base_compliance")
-_FIRST_ORDER += ("flange_flexibility", "tracker_scale")
+_FIRST_ORDER = (
+    "link_geometry",
+    "payload",
+    "force_misalignment",
+    "force_bias",
+    "application_point",
+    "base_compliance",
+    "flange_flexibility",
+    "tracker_scale",
+)
 _KEYS = ("kind", "effect", "comparable", "parameter", "level")
 _OTHER_LAW = ("lost_motion", "hysteresis")
 
 
-def intervals_of(truth, verdict):
+def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Every interval of a verdict that has a true value to hold.
 
     Wald intervals, with quantiles of Student's t where the noise has degrees of freedom.
@@ -63,7 +78,7 @@ def intervals_of(truth, verdict):
     ]
 
 
-def covered(intervals):
+def covered(intervals: pd.DataFrame) -> pd.DataFrame:
     """Shares of intervals that hold the truth.
 
     Parameters
@@ -82,8 +97,8 @@ def covered(intervals):
     if not len(intervals):
         return pd.DataFrame(columns=columns)
     of_springs = intervals.effect == COMPLIANCE
-    found = np.where(intervals.right, "compliance, effect found", "compliance, effect not found")
-    kind = np.where(~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", found))
+    fitted = np.where(intervals.right, "compliance, effect found", "compliance, effect not found")
+    kind = np.where(~of_springs, "effect", np.where(intervals.truth == NONE, "compliance, no effect", fitted))
     rows = intervals.assign(kind=kind)[intervals.setting == "usual"]
     whole = rows.assign(parameter="all")
     everything = whole[whole.kind == "effect"].assign(level="all", effect="all", comparable="all")
@@ -95,18 +110,18 @@ def covered(intervals):
     return pd.DataFrame(found, columns=columns)
 
 
-def _compliances(truth, verdict):
+def _compliances(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> Iterable[tuple[float, float, float]]:
     stated = verdict["compliance_urad_per_Nm"]
     return zip(truth["compliance_urad_per_Nm"], stated["after"], stated["std_error"], strict=True)
 
 
-def _joints_of(key):
+def _joints_of(key: str) -> list[int]:
     """Joints in the key of a candidate such as ``cross_compliance@2+5[variant]``, list of int."""
     where = key.partition("[")[0].partition("@")[2]
     return [int(joint) for joint in where.split("+")] if where else []
 
 
-def _comparable(defect, effect):
+def _comparable(defect: Mapping[str, Any], effect: Mapping[str, Any]) -> list[tuple[str, str, str, float, float, float]]:
     how = OTHER_LAW if defect["effect"] in _OTHER_LAW else FIRST_ORDER if defect["effect"] in _FIRST_ORDER else EXACT
     found = []
     for parameter in effect["parameters"]:

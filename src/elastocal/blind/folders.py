@@ -1,10 +1,13 @@
 """The folder that an analyst gets, and the sealed truth that he does not. A campaign's format is a contract of both sides."""
 
+from __future__ import annotations
+
 import hashlib
 import json
 import platform
 from dataclasses import asdict
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
@@ -12,13 +15,21 @@ import yaml
 
 from elastocal.campaigns.writing import write_campaign
 from elastocal.io.atomic_writes import atomic_write
-from elastocal.plant.campaigns import measured_table
+from elastocal.plant.campaigns import Design, measured_table
 from elastocal.plant.dynamic import DYNAMIC, dynamic_table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from elastocal.plant.arm import Arm, LinkMass
+    from elastocal.plant.physical_robot import PhysicalRobot, Schedule
 
 ROBOT_FILE = "robot.yaml"
 
 
-def robot_document(document, arm, declared, gravity_m_s2):
+def robot_document(
+    document: Mapping[str, Any], arm: Arm, declared: Sequence[LinkMass], gravity_m_s2: Iterable[float]
+) -> dict[str, Any]:
     """Contents of the campaign's own robot file.
 
     Parameters
@@ -46,7 +57,7 @@ def robot_document(document, arm, declared, gravity_m_s2):
     return told
 
 
-def campaign_document(name, arm, design):
+def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
     """Contents of campaign.yaml; nothing in it depends on the defects."""
     document = {
         "campaign": name,
@@ -63,7 +74,16 @@ def campaign_document(name, arm, design):
     return document
 
 
-def write_blind_campaign(folder, name, robot_file, robot, design, schedule, declared=(), kind="parquet"):
+def write_blind_campaign(
+    folder: str | Path,
+    name: str,
+    robot_file: str | Path,
+    robot: PhysicalRobot,
+    design: Design,
+    schedule: Schedule,
+    declared: Sequence[LinkMass] = (),
+    kind: str = "parquet",
+) -> dict[str, Any]:
     """Measure, and write what the analyst gets.
 
     Parameters
@@ -104,7 +124,15 @@ def write_blind_campaign(folder, name, robot_file, robot, design, schedule, decl
     }
 
 
-def write_dynamic_campaign(folder, name, robot_file, robot, measurements, seed, declared=()):
+def write_dynamic_campaign(
+    folder: str | Path,
+    name: str,
+    robot_file: str | Path,
+    robot: PhysicalRobot,
+    measurements: int,
+    seed: int,
+    declared: Sequence[LinkMass] = (),
+) -> None:
     """Measure a moving arm, and write what the analyst gets: for benchmarks of many measurements.
 
     Parameters
@@ -125,14 +153,14 @@ def write_dynamic_campaign(folder, name, robot_file, robot, measurements, seed, 
     _write_robot(folder, robot_file, robot, declared)
 
 
-def _write_robot(folder, robot_file, robot, declared):
+def _write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
     described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
     with atomic_write(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
         yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
 
 
-def write_truth(path, truth, campaign_folder):
+def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
     """Seal a truth document: sorted JSON, outside of the campaign's folder.
 
     Parameters

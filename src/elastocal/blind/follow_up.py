@@ -3,9 +3,15 @@
 The analyst's side, which knows neither truths nor the plant; `carrying_out` is the other side.
 """
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from elastocal.diagnosis.verdict import CLASS, NAMED
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Mapping
 
 # Poses after which a verdict is stated anew.
 POSES = (5, 10, 20)
@@ -17,7 +23,7 @@ ARMS = ("proposed", "random")
 MOST = {"smoke": 1, "quick": 2, "development": 2, "full": 2}
 
 
-def followed_up(verdicts, most):
+def followed_up(verdicts: Iterable[dict[str, Any]], most: int) -> list[dict[str, Any]]:
     """The cases that a block follows up.
 
     Parameters
@@ -36,12 +42,12 @@ def followed_up(verdicts, most):
     return sorted(classes, key=lambda verdict: verdict["campaign"])[:most]
 
 
-def folder_name(arm, poses):
+def folder_name(arm: str, poses: int) -> str:
     """Where campaigns with further poses lie: those of each arm, at each number of poses, in a folder of their own."""
     return f"{arm}_{poses}"
 
 
-def diagnosed_until_named(folder_at, diagnose):
+def diagnosed_until_named(folder_at: Mapping[int, str], diagnose: Callable[[str], dict[str, Any]]) -> dict[int, dict[str, Any]]:
     """Verdicts with more and more poses, until a single name is said.
 
     Parameters
@@ -56,7 +62,7 @@ def diagnosed_until_named(folder_at, diagnose):
     dict of int to dict
         Verdicts by the number of further poses; the last is the first that says "named", or that on all poses.
     """
-    said = {}
+    said: dict[int, dict[str, Any]] = {}
     for poses, folder in folder_at.items():
         said[poses] = diagnose(folder)
         if said[poses]["verdict"] == NAMED:
@@ -64,7 +70,7 @@ def diagnosed_until_named(folder_at, diagnose):
     return said
 
 
-def diagnosed_anew(campaigns, diagnose):
+def diagnosed_anew(campaigns: str | Path, diagnose: Callable[[str], dict[str, Any]]) -> list[dict[str, Any]]:
     """Verdicts on all that was followed up in a block.
 
     Parameters

@@ -1,5 +1,9 @@
 """Scores of the loop once more: how often the name is right after so many further poses, proposed or random."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
@@ -10,6 +14,9 @@ from elastocal.blind.rates import rate
 from elastocal.blind.scores import outcome
 from elastocal.diagnosis.verdict import CLASS
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
 _CASE_COLUMNS = ["case", "robots", "robot", "group", "setting", "truth", "level", "promised", "arm", "poses_added"]
 _CASE_COLUMNS += ["verdict", "found", "named_right", "holds_truth", "wrong_name"]
 _COLUMNS = ["robots", "arm", "poses_added", "cases", "right_name", "low", "high", "still_class", "wrong_name", "other_verdict"]
@@ -19,7 +26,12 @@ PROMISE = 16.0
 _POSES_COLUMNS = ["robots", "arm", "cases", "reached", "median_poses"]
 
 
-def followed(truths, first, anew, promised):
+def followed(
+    truths: Mapping[str, Mapping[str, Any]],
+    first: Mapping[str, Mapping[str, Any]],
+    anew: Sequence[Mapping[str, Any]],
+    promised: Mapping[str, float],
+) -> pd.DataFrame:
     """What was said of each case followed up, after each number of poses.
 
     Parameters
@@ -49,7 +61,7 @@ def followed(truths, first, anew, promised):
     return pd.DataFrame(rows, columns=_CASE_COLUMNS)
 
 
-def promised(proposals):
+def promised(proposals: pd.DataFrame) -> dict[str, float]:
     """Separation from the nearest alternative with all poses, by the name of the case, of tables of proposals.
 
     None where a proposal says that it leaves alternatives aside, for it promises no single name then.
@@ -57,16 +69,17 @@ def promised(proposals):
     if "separation" not in proposals:
         return {}
     whole = proposals["indistinguishable"].fillna("") == ""
-    return proposals["separation"].where(whole, 0.0).groupby(proposals["case"]).max().to_dict()
+    nearest = proposals["separation"].where(whole, 0.0).groupby(proposals["case"]).max()
+    return {str(case): float(separation) for case, separation in nearest.items()}
 
 
-def with_one_effect(cases):
+def with_one_effect(cases: pd.DataFrame) -> pd.Series:
     """Which rows are of cases that a single name can be right for: one effect of the catalogue that measurements can show."""
     groups = ("single", "setting", "sweep", SEVERAL_JOINTS, GEAR_GRAVITY, UNDECLARED)
     return cases["group"].isin(groups) & ~cases["truth"].isin(("none", "force_scale"))
 
 
-def with_prospects(cases):
+def with_prospects(cases: pd.DataFrame) -> pd.Series:
     """Which rows are of cases whose proposal promises as much separation as the verdict asks for.
 
     The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
@@ -74,7 +87,7 @@ def with_prospects(cases):
     return cases["promised"] >= PROMISE
 
 
-def promises_kept(cases):
+def promises_kept(cases: pd.DataFrame) -> pd.DataFrame:
     """How often an experiment that promises enough resolves the case, and how often as many random poses do.
 
     Parameters
@@ -89,7 +102,7 @@ def promises_kept(cases):
         proposal promises a separation of at least `PROMISE`; and the ratio of proposed to random poses in that.
     """
     last = cases[(cases["poses_added"] == max(POSES)) & (cases["promised"] >= PROMISE)]
-    rows = []
+    rows: list[dict[str, Any]] = []
     for robots, part in last.groupby("robots"):
         kept = {arm: rate(part.loc[part["arm"] == arm, "named_right"]) for arm in ARMS}
         for arm in ARMS:
@@ -105,7 +118,7 @@ def promises_kept(cases):
     return pd.DataFrame(rows, columns=_PROMISE_COLUMNS)
 
 
-def rates(cases):
+def rates(cases: pd.DataFrame) -> pd.DataFrame:
     """How often the name is right, with Clopper-Pearson intervals [1]_.
 
     Parameters
@@ -132,7 +145,7 @@ def rates(cases):
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
-def poses_needed(cases):
+def poses_needed(cases: pd.DataFrame) -> pd.DataFrame:
     """How many further poses it took until the right name.
 
     Parameters

@@ -5,7 +5,10 @@ for the effect has cost. It is told the effect by its name in the catalogue, not
 by time or by temperature): of these it takes the one that the residual of the declared model speaks for.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
@@ -15,15 +18,26 @@ from elastocal.diagnosis.judge import heldout_errors
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import noise_from
+from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.least_squares import fit
 from elastocal.loop.whole import cases_in
 from elastocal.plant.defects import OUTSIDE
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.fit_result import Fit
+
+    _Chosen = tuple[float, Candidate, tuple[float, ...]]
+
 LEVEL = 0.05
 
 
-def oracle(truth, verdict, folder, robots_folder, seed):
+def oracle(
+    truth: Mapping[str, Any], verdict: Mapping[str, Any], folder: str | Path, robots_folder: str | Path, seed: int
+) -> dict[str, Any] | None:
     """What knowing the effects is worth in one case.
 
     Parameters
@@ -65,7 +79,7 @@ def oracle(truth, verdict, folder, robots_folder, seed):
     return _told(members, p_value, heldout["before"])
 
 
-def members_of(effect, joints, candidates):
+def members_of(effect: str, joints: Sequence[int], candidates: Iterable[Candidate]) -> list[list[Candidate]]:
     """Candidates that an effect at some joints consists of, for each of its variants.
 
     Parameters
@@ -86,16 +100,19 @@ def members_of(effect, joints, candidates):
     return [[candidate] for candidate in mine]
 
 
-def _with_effects(declared, case, effects):
+def _with_effects(
+    declared: Fit, case: Case, effects: Iterable[tuple[str, tuple[int, ...]]]
+) -> tuple[Fit, tuple[Candidate, ...], int]:
     """Fit with the effects, their candidates, and among how many variants these were chosen."""
-    chosen, variants = [], 1
+    chosen: list[_Chosen] = []
+    variants = 1
     settings = Settings()
     for effect, joints in effects:
         listed = [member for members in members_of(effect, joints, case.candidates.values()) for member in members]
         problem = linearized(declared, case.observations, listed, settings).problem
         factors = initial_screening(problem)[1]
         # Each at the shape that fits best.
-        best = {}
+        best: dict[str, _Chosen] = {}
         for number, unit in enumerate(problem.units):
             if unit.candidate and factors[number] > best.get(unit.candidate.key, (-np.inf,))[0]:
                 best[unit.candidate.key] = factors[number], unit.candidate, unit.shapes
@@ -110,10 +127,10 @@ def _with_effects(declared, case, effects):
     return fit(declared.model.with_effects(members), case.observations, declared.noise, start), members, variants
 
 
-def _wald(fitted, members):
+def _wald(fitted: Fit, members: Sequence[Candidate]) -> float:
     """Of all coefficients at once, given the shapes."""
     places = [np.split(_parameters_of(fitted, member.key), [len(member.parameters)]) for member in members]
-    linear, shapes = (np.concatenate([place[part] for place in places] or [[]]) for part in (0, 1))
+    linear, shapes = (np.concatenate([place[part] for place in places] or [np.empty(0)]) for part in (0, 1))
     free = np.flatnonzero(~fitted.held)
     tested, kept = np.isin(free, linear), ~np.isin(free, shapes)
     if not tested.any():
@@ -124,11 +141,11 @@ def _wald(fitted, members):
     return float(chi2.sf(values @ np.linalg.solve(covariance, values), tested.sum() + (~kept).sum()))
 
 
-def _parameters_of(fitted, key):
+def _parameters_of(fitted: Fit, key: str) -> np.ndarray:
     return np.flatnonzero([owner == key for owner, _ in fitted.parameters])
 
 
-def _told(members, p_value, heldout):
+def _told(members: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "candidates": [member.key for member in members],
         "p_value": p_value,

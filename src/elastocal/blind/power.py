@@ -15,7 +15,7 @@ _UNDETECTABLE = ["robots", "effect", "setting", "level", "reason", "hits", "case
 _UNDETECTABLE += ["wrong_name", "retained_share", "times_plausible"]
 
 
-def powers(cases):
+def powers(cases: pd.DataFrame) -> pd.DataFrame:
     """Detection against the size of the effect.
 
     Parameters
@@ -50,7 +50,7 @@ def powers(cases):
     return pd.DataFrame(rows, columns=_COLUMNS)
 
 
-def undetectable(cases):
+def undetectable(cases: pd.DataFrame) -> pd.DataFrame:
     """What cannot be found, with the reason.
 
     Parameters
@@ -82,7 +82,7 @@ def undetectable(cases):
     return pd.DataFrame(rows, columns=_UNDETECTABLE)
 
 
-def _reason(part):
+def _reason(part: pd.DataFrame) -> str:
     if (part.level_of == "raw").all():
         return "absorbed by the joint compliances"
     if part.hidden.all():

@@ -1,9 +1,16 @@
 """Shares of cases with their intervals."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from statsmodels.stats.proportion import proportion_confint
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
 
-def rate(hits):
+
+def rate(hits: Iterable[bool]) -> dict[str, float]:
     """A share with its Clopper-Pearson interval [1]_ of 95 %.
 
     Parameters
@@ -33,6 +40,6 @@ def rate(hits):
     }
 
 
-def headed(head, found):
+def headed(head: str, found: Mapping[str, float]) -> dict[str, float]:
     """The figures of a rate under a name: ``<head>``, ``<head>_low``, ``<head>_high``."""
     return {head: found["rate"], f"{head}_low": found["low"], f"{head}_high": found["high"]}

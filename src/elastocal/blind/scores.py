@@ -1,5 +1,9 @@
 """What the verdict on a case is worth, given its truth."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -8,11 +12,14 @@ from elastocal.blind.robots import PROOF, TUNED
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL
 from elastocal.effects.protocol import effect_of
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
 NONE = "none"
 SILENT = (ADEQUATE, NOT_TESTABLE)
 
 
-def outcome(truth, verdict):
+def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
     """What a verdict is worth, given the truth.
 
     Whether each true effect is held by another one of those found is an assignment problem [1]_.
@@ -58,12 +65,12 @@ def outcome(truth, verdict):
     }
 
 
-def kind_of(robot):
+def kind_of(robot: str) -> str:
     """Whether a robot belongs to the proof or was tuned on."""
     return TUNED if robot in TUNED_ON else PROOF
 
 
-def _each_is_held(true, effects):
+def _each_is_held(true: Sequence[str], effects: Sequence[Mapping[str, Any]]) -> bool:
     if len(true) != len(effects):
         return False
     meant = [{effect["name"], *map(effect_of, effect["alternatives"])} for effect in effects]

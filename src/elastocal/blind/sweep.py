@@ -1,10 +1,17 @@
 """Scores of the confounding sweep: how an effect is named against the angle at which its near relative stands to it."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import pandas as pd
 from scipy.stats import binomtest
 
 from elastocal.blind.scores import outcome
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 # Upper ends of the bins, degrees.
 ANGLES = (5.0, 10.0, 20.0, 40.0, 90.0)
@@ -12,7 +19,7 @@ ANGLES = (5.0, 10.0, 20.0, 40.0, 90.0)
 OUTCOMES = ("right", "class", "wrong", "other")
 
 
-def swept(truths, verdicts):
+def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """What was said of each case of the sweep.
 
     Parameters
@@ -47,7 +54,7 @@ def swept(truths, verdicts):
     return pd.DataFrame(rows, columns=columns)
 
 
-def against_angle(cases):
+def against_angle(cases: pd.DataFrame) -> pd.DataFrame:
     """Shares of the outcomes in each bin of the angle, for each pair and for all.
 
     Parameters
@@ -74,10 +81,10 @@ def against_angle(cases):
     return pd.DataFrame(rows, columns=columns)
 
 
-def _share(hits):
+def _share(hits: pd.Series) -> tuple[float, float, float]:
     interval = binomtest(int(hits.sum()), len(hits)).proportion_ci(method="exact")
     return hits.mean(), interval.low, interval.high
 
 
-def _angles(verdict):
+def _angles(verdict: Mapping[str, Any]) -> list[float]:
     return [effect["angle_to_nearest_deg"] for effect in verdict["effects"] if effect["angle_to_nearest_deg"] is not None]

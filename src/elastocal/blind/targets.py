@@ -1,6 +1,9 @@
 """The figures of the proof, each beside its target."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +16,11 @@ from elastocal.blind.robots import PROOF, TUNED
 from elastocal.blind.scores import NONE
 from elastocal.plant.defects import OUTSIDE
 from elastocal.random_streams import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Hashable, Iterable, Iterator
+
+    _Key = tuple[str, Hashable]
 
 _RESAMPLES = 2000
 # Held-out errors this near to the oracle's count as its own.
@@ -41,16 +49,16 @@ class Target:
     below: float = np.inf
 
 
-def _at_least(share):
+def _at_least(share: float) -> Target:
     return Target(f"at least {100 * share:g} %", share, 1.0)
 
 
-def _at_most(share):
+def _at_most(share: float) -> Target:
     return Target(f"at most {100 * share:g} %", 0.0, share)
 
 
 # As the issue sets them, by what is counted and the non-centrality.
-_TARGETS = {
+_TARGETS: dict[_Key | None, Target] = {
     ("false alarms", 0.0): Target("upper limit below 4 %", 0.0, 0.04, below=0.04),
     ("false alarms", "hard"): _at_most(0.06),
     ("detected", 25.0): _at_least(0.82),
@@ -70,7 +78,7 @@ _TARGETS = {
 }
 
 
-def summarized(cases, intervals, statements, seed):
+def summarized(cases: pd.DataFrame, intervals: pd.DataFrame, statements: pd.DataFrame, seed: int) -> pd.DataFrame:
     """Every figure of the proof beside its target.
 
     Parameters
@@ -95,7 +103,7 @@ def summarized(cases, intervals, statements, seed):
     ----------
     .. [1] Efron, B. and Tibshirani, R. J., An Introduction to the Bootstrap, section 13.3, Chapman and Hall, 1993.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
     for robots in (PROOF, TUNED):
         mine = cases[cases.robots == robots]
         if len(mine):
@@ -106,7 +114,7 @@ def summarized(cases, intervals, statements, seed):
     return pd.DataFrame(rows)
 
 
-def by_setting(cases):
+def by_setting(cases: pd.DataFrame) -> pd.DataFrame:
     """What the hard settings do to the verdicts.
 
     Parameters
@@ -133,7 +141,7 @@ def by_setting(cases):
     return pd.DataFrame(rows, columns=_SETTING_COLUMNS)
 
 
-def _of_cases(cases):
+def _of_cases(cases: pd.DataFrame) -> Iterator[dict[str, Any]]:
     none = cases[cases.group == NONE]
     yield _rated("false alarms with no effect", none.detected, ("false alarms", 0.0))
     hard = cases[(cases.group == "setting") & (cases.truth == NONE)]
@@ -170,7 +178,7 @@ def _of_cases(cases):
         yield _rated(f"both of two effects, or classes with them, at {level:g} each", part.holds_truth, None)
 
 
-def _of_errors(cases, seed):
+def _of_errors(cases: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     known = cases[cases.group.isin(["single", "pair"]) & cases.detected]
     ratio = (known.after_rms_m / known.oracle_rms_m).to_numpy()
     for name, statistic in (("median", np.median), ("mean", np.mean)):
@@ -191,7 +199,7 @@ def _of_errors(cases, seed):
     yield _rated("effect adopted and held-out RMS worse by over two standard errors", adopted.worse, ("worse", None))
 
 
-def _of_statements(statements, seed):
+def _of_statements(statements: pd.DataFrame, seed: int) -> Iterator[dict[str, Any]]:
     error = calibration_error(statements, seed)
     chance = error.pop("by_chance")
     yield _named("stated probability of the most probable mechanisms: expected calibration error", error, ("calibration", None))
@@ -200,7 +208,7 @@ def _of_statements(statements, seed):
     yield _rated("95 % sets of hypotheses that hold the truth", statements.held, ("credible", None))
 
 
-def _of_intervals(intervals):
+def _of_intervals(intervals: pd.DataFrame) -> Iterator[dict[str, Any]]:
     if not len(intervals):
         return
     usual = intervals[intervals.setting == "usual"]
@@ -215,11 +223,11 @@ def _of_intervals(intervals):
         yield _rated(f"95 % intervals of joint compliances, {words}", springs[part].holds, target)
 
 
-def _rated(name, hits, target):
+def _rated(name: str, hits: Iterable[bool], target: _Key | None) -> dict[str, Any]:
     return _named(name, rate(hits), target)
 
 
-def _named(name, row, target):
+def _named(name: str, row: dict[str, Any], target: _Key | None) -> dict[str, Any]:
     aim = _TARGETS.get(target, Target("", np.nan, np.nan))
     judged = aim.words and row["cases"]
     holds = None
@@ -228,16 +236,26 @@ def _named(name, row, target):
     return {"quantity": name} | row | {"target": aim.words, "target_low": aim.low, "target_high": aim.high, "holds": holds}
 
 
-def _share(removed, removable, axis=-1):
+def _share(removed: np.ndarray, removable: np.ndarray, axis: int = -1) -> np.ndarray:
     removable = removable.sum(axis=axis)
     # Where knowing the effect does not help there is nothing to reach.
     return removed.sum(axis=axis) / np.where(removable > 0, removable, np.nan)
 
 
-def _bootstrapped(samples, statistic, draws):
+def _bootstrapped(
+    samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray], draws: np.random.Generator
+) -> tuple[float, float]:
     """Interval of 95 % over cases."""
     if len(samples[0]) < 2 or not np.isfinite(statistic(*samples)):
         return np.nan, np.nan
-    options = {"n_resamples": _RESAMPLES, "method": "percentile", "batch": _SEVERAL_AT_ONCE, "rng": draws}
-    found = bootstrap(samples, statistic, paired=True, vectorized=True, **options).confidence_interval
+    found = bootstrap(
+        samples,
+        statistic,
+        n_resamples=_RESAMPLES,
+        batch=_SEVERAL_AT_ONCE,
+        vectorized=True,
+        paired=True,
+        method="percentile",
+        rng=draws,
+    ).confidence_interval
     return float(found.low), float(found.high)

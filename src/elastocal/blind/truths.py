@@ -1,13 +1,19 @@
 """What was sealed, opened for the scores and for nothing else."""
 
+from __future__ import annotations
+
 import hashlib
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
-def opened_truths(files, manifest):
+
+def opened_truths(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
     """Open sealed files that are as promised.
 
     Parameters
@@ -26,7 +32,8 @@ def opened_truths(files, manifest):
     InputError
         A file is not the one whose hash was published.
     """
-    promised = dict(reversed(line.split()) for line in Path(manifest).read_text(encoding="utf-8").splitlines())
+    lines = Path(manifest).read_text(encoding="utf-8").splitlines()
+    promised = {name: digest for digest, name in map(str.split, lines)}
     truths = {}
     for file in sorted(files, key=lambda file: file.name):
         found = hashlib.sha256(file.read_bytes()).hexdigest()

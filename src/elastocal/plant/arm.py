@@ -4,15 +4,21 @@ The file's chain is a product of elementary transforms, ``Tz(l1) Rz(q1) Tx(l2) [
 stretches with a drive between each two of them, which is what a multibody model is built from.
 """
 
+from __future__ import annotations
+
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import yaml
 from scipy.constants import g as standard_gravity
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 _RELATIVE_STD = 0.1
 # What counts as heavy, and gears as stiff as a heavy arm's.
@@ -53,7 +59,7 @@ class Stretch:
 
     vector_m: np.ndarray
     rotation: np.ndarray
-    points: tuple
+    points: tuple[Point, ...]
 
 
 @dataclass(frozen=True)
@@ -73,7 +79,7 @@ class LinkMass:
 
     link: int
     mass_kg: float
-    centre_m: tuple
+    centre_m: tuple[float, ...]
     relative_std: float
 
 
@@ -107,63 +113,63 @@ class Arm:
     """
 
     name: str
-    stretches: tuple
+    stretches: tuple[Stretch, ...]
     axes: np.ndarray
     compliance: np.ndarray
     limits: np.ndarray
     reported_matrix: np.ndarray
     reported_offset: np.ndarray
-    masses: tuple = ()
-    gravity_m_s2: tuple = (0.0, 0.0, -standard_gravity)
+    masses: tuple[LinkMass, ...] = ()
+    gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)
     rated_kg: float | None = None
     compensated: bool = True
-    ratios: tuple = ()
+    ratios: tuple[float, ...] = ()
 
     @property
-    def joints(self):
+    def joints(self) -> int:
         """Number of drives, n."""
         return len(self.axes)
 
     @property
-    def reach_m(self):
+    def reach_m(self) -> float:
         """Length of all that joint 1 carries, stretched out."""
         return float(sum(np.linalg.norm(stretch.vector_m) for stretch in self.stretches[1:]))
 
     @property
-    def payload_kg(self):
+    def payload_kg(self) -> float:
         """Rated load; where the file has none, 8 kg m^-3 times the cube of the reach, as arms of 1 to 3 m have."""
         return 8.0 * self.reach_m**3 if self.rated_kg is None else self.rated_kg
 
     @property
-    def gear_ratio(self):
+    def gear_ratio(self) -> tuple[float, ...]:
         """Turns of the motor for one of each joint, tuple of float; usual ones where the file has none."""
         return self.ratios or tuple(_USUAL_RATIOS[joint % len(_USUAL_RATIOS)] for joint in range(self.joints))
 
     @property
-    def load_share(self):
+    def load_share(self) -> float:
         """Of the forces that suit a heavy arm, 1 from a rated load of 140 kg on."""
         return min(1.0, self.payload_kg / _HEAVY_KG)
 
     @property
-    def softness(self):
+    def softness(self) -> float:
         """How many times softer the gears are than a heavy arm's, at least 1."""
         return max(1.0, float(np.median(self.compliance)) / _STIFF_RAD_PER_NM)
 
     @property
-    def points(self):
+    def points(self) -> tuple[str, ...]:
         """Names of all measuring points, the flange last."""
         return tuple(point.name for stretch in self.stretches for point in stretch.points)
 
-    def shown_angles(self, angles):
-        """What the controller shows for angles (S, n), rad."""
+    def shown_angles(self, angles: np.ndarray) -> np.ndarray:
+        """What the controller shows, (S, n), for angles (S, n), rad."""
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
 
-    def angles_shown_as(self, shown):
-        """Angles (S, n) for which the controller shows these, rad."""
+    def angles_shown_as(self, shown: np.ndarray) -> np.ndarray:
+        """Angles (S, n) for which the controller shows these (S, n), rad."""
         return shown @ self.reported_matrix.T + self.reported_offset
 
 
-def arm_from_file(path):
+def arm_from_file(path: str | Path) -> Arm:
     """Read a robot file.
 
     Parameters
@@ -178,7 +184,7 @@ def arm_from_file(path):
         return arm_from_document(yaml.safe_load(file), Path(path).as_posix())
 
 
-def arm_from_document(document, source="robot"):
+def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm:
     """Make an arm of the contents of a robot file.
 
     Parameters
@@ -236,12 +242,12 @@ def arm_from_document(document, source="robot"):
     )
 
 
-def _link_mass(entry):
+def _link_mass(entry: Mapping[str, Any]) -> LinkMass:
     centre = tuple(map(float, entry["centre_m"]))
     return LinkMass(int(entry["link"]), float(entry["mass_kg"]), centre, float(entry.get("relative_std", _RELATIVE_STD)))
 
 
-def link_frames(arm, angles):
+def link_frames(arm: Arm, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Frames behind the rotation of each drive.
 
     Parameters
@@ -263,7 +269,7 @@ def link_frames(arm, angles):
     return np.stack(origin, axis=1), np.stack(rotation, axis=1)
 
 
-def turned(vector):
+def turned(vector: np.ndarray) -> np.ndarray:
     """Rotation matrix of a rotation vector by Rodrigues' formula [1]_, R = I + sin a K + (1 - cos a) K^2.
 
     Parameters

@@ -1,12 +1,20 @@
 """Campaigns of a physical robot: what is done with it, and the table of what is read."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.plant.physical_robot import Schedule, seen_poses
+from elastocal.plant.physical_robot import PhysicalRobot, Schedule, seen_poses
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.tracker import rotation_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.plant.arm import Arm
 
 COVARIATES = ("approach", "time", "temperature")
 # Stands for the last measuring point of any arm.
@@ -55,31 +63,31 @@ class Design:
     held_out: int = 9
     force_N: float | None = None
     force_times: float = 1.0
-    ladder: tuple = (0.0, 1.0, 0.5, -0.5, -1.0)
-    lever_m: tuple = (0.0, 0.5, 0.0)
+    ladder: tuple[float, ...] = (0.0, 1.0, 0.5, -0.5, -1.0)
+    lever_m: tuple[float, ...] = (0.0, 0.5, 0.0)
     repeats: int = 4
     repeated_poses: int = 10
     approach_each_load: bool = True
     seconds_per_state: float = 25.0
-    points: tuple = ()
-    covariates: tuple = COVARIATES
-    declared_noise: tuple | None = None
-    declared: tuple = ()
+    points: tuple[str, ...] = ()
+    covariates: tuple[str, ...] = COVARIATES
+    declared_noise: tuple[float, float] | None = None
+    declared: tuple[str, ...] = ()
     measured: str = "pose"
     frame: str = "base"
     reach: float = 1.0
 
-    def targets_on(self, arm):
+    def targets_on(self, arm: Arm) -> tuple[str, ...]:
         """Names of the measuring points that have a target."""
         return tuple(arm.points[-1] if point == FLANGE else point for point in self.points) or arm.points
 
 
-def usual_force_N(arm):  # noqa: N802 - units in names keep their case
+def usual_force_N(arm: Arm) -> float:  # noqa: N802 - units in names keep their case
     """A kilonewton on arms that carry 140 kg and more, and as much less on smaller ones."""
     return 1000.0 * arm.load_share
 
 
-def schedule_of(arm, design, seed):
+def schedule_of(arm: Arm, design: Design, seed: int) -> Schedule:
     """Draw what is done.
 
     Parameters
@@ -97,16 +105,18 @@ def schedule_of(arm, design, seed):
     angles = low + (high - low) * (0.5 + design.reach * (draws.random((design.poses, arm.joints)) - 0.5))
     direction = draws.standard_normal((design.poses, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    states, approach, previous = [], [], []
-    for pose in range(design.poses):
-        for repeat in range(design.repeats if pose < design.repeated_poses else 1):
-            for load in range(len(design.ladder) if repeat == 0 else min(2, len(design.ladder))):
-                fresh = design.approach_each_load or load == 0
+    states: list[tuple[int, int, int]] = []
+    moves: list[int] = []
+    previous: list[int] = []
+    for place in range(design.poses):
+        for again in range(design.repeats if place < design.repeated_poses else 1):
+            for rung in range(len(design.ladder) if again == 0 else min(2, len(design.ladder))):
+                fresh = design.approach_each_load or rung == 0
                 previous.append(-1 if fresh else len(states) - 1)
-                approach.append(approach[-1] + fresh if approach else 0)
-                states.append((pose, load, repeat))
+                moves.append(moves[-1] + fresh if moves else 0)
+                states.append((place, rung, again))
     pose, load, repeat = np.array(states).T
-    approach = np.array(approach)
+    approach = np.array(moves)
     # A repeat comes from the same side, so that it is one: what differs between repeats is then chance and not friction.
     sense = draws.choice([-1, 1], (design.poses, len(design.ladder), arm.joints))
     sense = sense[pose, load if design.approach_each_load else 0 * load]
@@ -120,7 +130,14 @@ def schedule_of(arm, design, seed):
     )
 
 
-def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0, ladder=(0.0, 1.0)):
+def continued(
+    schedule: Schedule,
+    angle: np.ndarray,
+    wrench: np.ndarray,
+    seconds_per_state: float = 25.0,
+    pause_s: float = 3600.0,
+    ladder: Sequence[float] = (0.0, 1.0),
+) -> Schedule:
     """A schedule with further states after it, such as a proposed experiment; nothing of what was done before changes.
 
     Parameters
@@ -144,36 +161,39 @@ def continued(schedule, angle, wrench, seconds_per_state=25.0, pause_s=3600.0, l
     angle, wrench = np.asarray(angle, float), np.asarray(wrench, float)
     new = np.concatenate([[True], (np.diff(angle, axis=0) != 0).any(axis=1)])
     pose = int(schedule.pose.max()) + np.cumsum(new)
-    rows, load = [], []
-    for state, first in enumerate(new):
+    rows: list[tuple[int, float]] = []
+    load: list[int] = []
+    for row, first in enumerate(new):
         if first:
-            rows.append((state, 0.0))
+            rows.append((row, 0.0))
             load.append(0)
-        for share in ladder[1:] if wrench[state].any() else ():
-            rows.append((state, share))
+        for part in ladder[1:] if wrench[row].any() else ():
+            rows.append((row, part))
             load.append(load[-1] + 1)
-    state, share = np.array([row for row, _ in rows]), np.array([share for _, share in rows])[:, None]
+    state, share = np.array([row for row, _ in rows]), np.array([part for _, part in rows])[:, None]
     force, moment = wrench[state, :3], wrench[state, 3:]
     square = (force**2).sum(axis=1, keepdims=True)
     lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
     count = np.arange(1, len(state) + 1)
-    further = {
-        "angle": angle[state],
-        "force": share * force,
-        "lever": lever,
-        "pose": pose[state],
-        "load": np.array(load),
-        "repeat": np.zeros(len(state), int),
-        "approach": schedule.approach.max() + count,
-        "sense": draws.choice([-1, 1], (len(state), angle.shape[1])),
-        "previous": np.full(len(state), -1),
-        "time_s": schedule.time_s[-1] + pause_s + seconds_per_state * count,
-        "training": np.ones(len(state), bool),
-    }
-    return replace(schedule, **{name: np.concatenate([getattr(schedule, name), more]) for name, more in further.items()})
+    return replace(
+        schedule,
+        angle=np.concatenate([schedule.angle, angle[state]]),
+        force=np.concatenate([schedule.force, share * force]),
+        lever=np.concatenate([schedule.lever, lever]),
+        pose=np.concatenate([schedule.pose, pose[state]]),
+        load=np.concatenate([schedule.load, np.array(load)]),
+        repeat=np.concatenate([schedule.repeat, np.zeros(len(state), int)]),
+        approach=np.concatenate([schedule.approach, schedule.approach.max() + count]),
+        sense=np.concatenate([schedule.sense, draws.choice([-1, 1], (len(state), angle.shape[1]))]),
+        previous=np.concatenate([schedule.previous, np.full(len(state), -1)]),
+        time_s=np.concatenate([schedule.time_s, schedule.time_s[-1] + pause_s + seconds_per_state * count]),
+        training=np.concatenate([schedule.training, np.ones(len(state), bool)]),
+    )
 
 
-def measured_table(robot, design, schedule):
+def measured_table(
+    robot: PhysicalRobot, design: Design, schedule: Schedule
+) -> tuple[dict[str, np.ndarray], list[tuple[int, str]]]:
     """Columns of the file of measurements.
 
     Parameters
@@ -184,7 +204,7 @@ def measured_table(robot, design, schedule):
 
     Returns
     -------
-    table : dict of str to ndarray
+    table : dict of str to ndarray (rows,)
     outliers : list of (int, str)
         State and target of every measurement that is one.
     """

@@ -1,6 +1,10 @@
-"""Where the drives really stand, against what the controller shows: errors of angle that no load is needed for."""
+"""Where the drives really stand, against what the controller shows: errors of angle that no load is needed for.
+
+Each law gives ndarray (S, n) of `Visits`, rad, unless it says otherwise.
+"""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -29,7 +33,7 @@ class Visits:
     time_s: np.ndarray
     seed: int
 
-    def each_approach(self, draws, *shape):
+    def each_approach(self, draws: np.random.Generator, *shape: int) -> np.ndarray:
         """Standard normal numbers (S, ...), the same within one approach."""
         return draws.standard_normal((int(self.approach.max()) + 1, *shape))[self.approach]
 
@@ -41,7 +45,7 @@ class ZeroOffset:
     joint: int
     offset_rad: float
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         return _one(visits, self.joint, np.full(len(visits.angle), self.offset_rad))
 
 
@@ -57,11 +61,12 @@ class TransmissionError:
     """
 
     joint: int
-    waves: tuple
+    waves: tuple[tuple[float, float, float], ...]
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         q = visits.angle[:, self.joint]
-        return _one(visits, self.joint, sum(size * np.sin(order * q + phase) for order, size, phase in self.waves))
+        turn = sum((size * np.sin(order * q + phase) for order, size, phase in self.waves), np.zeros_like(q))
+        return _one(visits, self.joint, turn)
 
 
 @dataclass(frozen=True)
@@ -72,7 +77,7 @@ class WrongRatio:
     of: int
     per_rad: float
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         return _one(visits, self.joint, self.per_rad * visits.angle[:, self.of])
 
 
@@ -81,10 +86,10 @@ class CablePull:
     """A hose that is wound by two joints at once and pulls at a third: e q_a q_b, rad/rad^2."""
 
     joint: int
-    wound: tuple
+    wound: tuple[int, int]
     per_rad2: float
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         one, other = self.wound
         return _one(visits, self.joint, self.per_rad2 * visits.angle[:, one] * visits.angle[:, other])
 
@@ -106,7 +111,7 @@ class SlippingZero:
     step_rad: float
     share: float = 0.3
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         sizes, whether = (np.random.default_rng([visits.seed, 7, part]) for part in range(2))
         # Approaches are numbered in the order of time.
         number = int(visits.approach.max()) + 1
@@ -132,8 +137,15 @@ class Runout:
     size: float
     phase_rad: float
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         return self.size * np.cos(self.order * visits.angle[:, self.joint] - self.phase_rad)
+
+
+class Castings(Protocol):
+    """What is warm."""
+
+    def of_castings(self, time_s: np.ndarray) -> np.ndarray:
+        """Temperature (S,) at times (S,), °C."""
 
 
 @dataclass(frozen=True)
@@ -143,14 +155,13 @@ class WarmBend:
     Attributes
     ----------
     per_K : float
-    warmth : object
-        Has `of_castings`, temperature at times, °C.
+    warmth : Castings
     """
 
     per_K: float
-    warmth: object
+    warmth: Castings
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         return self.per_K * (self.warmth.of_castings(visits.time_s) - _REFERENCE_C)
 
 
@@ -158,9 +169,9 @@ class WarmBend:
 class Repeatability:
     """Each approach ends a little elsewhere; `sigma_rad` (n,). No defect: what every drive does."""
 
-    sigma_rad: tuple
+    sigma_rad: tuple[float, ...]
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         draws = np.random.default_rng([visits.seed, 11])
         return np.array(self.sigma_rad) * visits.each_approach(draws, visits.angle.shape[1])
 
@@ -169,15 +180,15 @@ class Repeatability:
 class PoseError:
     """An error of the angles common to all measurements of a pose; `sigma_rad` (n,). No defect: every arm has it."""
 
-    sigma_rad: tuple
+    sigma_rad: tuple[float, ...]
 
-    def __call__(self, visits):
+    def __call__(self, visits: Visits) -> np.ndarray:
         draws = np.random.default_rng([visits.seed, 13])
         drawn = draws.standard_normal((int(visits.pose.max()) + 1, visits.angle.shape[1]))
         return np.array(self.sigma_rad) * drawn[visits.pose]
 
 
-def _one(visits, joint, turn):
+def _one(visits: Visits, joint: int, turn: np.ndarray) -> np.ndarray:
     found = np.zeros_like(visits.angle)
     found[:, joint] = turn
     return found

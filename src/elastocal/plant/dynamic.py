@@ -5,13 +5,20 @@ so the path is slow. Deflections change far more slowly than measurements come: 
 between.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from elastocal.plant.campaigns import FLANGE, Design
-from elastocal.plant.physical_robot import Schedule, at_rest, driven
+from elastocal.plant.physical_robot import PhysicalRobot, Schedule, at_rest, driven
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.statics import places
+
+if TYPE_CHECKING:
+    from elastocal.plant.arm import Arm
 
 # Waves of each joint's path: how many, and between which periods.
 _WAVES, _PERIODS_S = 5, (30.0, 240.0)
@@ -21,7 +28,7 @@ _AT_ONCE = 50_000
 DYNAMIC = Design(points=(FLANGE,), measured="position", covariates=("time",))
 
 
-def moving_angles(arm, time_s, seed):
+def moving_angles(arm: Arm, time_s: np.ndarray, seed: int) -> np.ndarray:
     """A smooth path of all joints within their limits: a few waves of incommensurable periods each.
 
     Parameters
@@ -37,7 +44,8 @@ def moving_angles(arm, time_s, seed):
     """
     draws = stream(seed, "moving path")
     shape = (_WAVES, arm.joints)
-    frequency = 2.0 * np.pi / np.exp(draws.uniform(*np.log(_PERIODS_S), shape))
+    shortest, longest = np.log(_PERIODS_S)
+    frequency = 2.0 * np.pi / np.exp(draws.uniform(shortest, longest, shape))
     phase, weight = draws.uniform(0.0, 2.0 * np.pi, shape), draws.uniform(0.5, 1.0, shape)
     low, high = arm.limits.T
     # Slower waves are the larger ones, so that no joint hurries.
@@ -50,7 +58,7 @@ def moving_angles(arm, time_s, seed):
     return angle
 
 
-def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
+def dynamic_table(robot: PhysicalRobot, measurements: int, seed: int, rate_hz: float = 1000.0) -> dict[str, np.ndarray]:
     """Columns of the file of measurements of one uninterrupted path.
 
     Deflections between knots are interpolated by cubic splines [1]_.
@@ -65,7 +73,7 @@ def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
 
     Returns
     -------
-    dict of str to ndarray
+    dict of str to ndarray (measurements,)
         As `campaigns.measured_table` has them: pose, load, repeat, target, angles, wrench (nothing), position, time.
 
     References
@@ -98,11 +106,11 @@ def dynamic_table(robot, measurements, seed, rate_hz=1000.0):
     return table | dict(zip("xyz", position.T, strict=True)) | {"time_s": time}
 
 
-def _parts(count):
+def _parts(count: int) -> list[slice]:
     return [slice(start, min(start + _AT_ONCE, count)) for start in range(0, count, _AT_ONCE)]
 
 
-def _unloaded(angle, time_s, seed):
+def _unloaded(angle: np.ndarray, time_s: np.ndarray, seed: int) -> Schedule:
     """A schedule of one long move."""
     nothing = np.zeros(len(angle), int)
     speed = np.gradient(angle, axis=0)

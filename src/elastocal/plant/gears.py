@@ -1,7 +1,7 @@
 """Laws of the gears: how far the arm behind a drive turns under the torque that it transmits.
 
-Each law adds its share to the deflection of the linear springs, theta = c tau. The shapes are those of machines rather than of
-regressions: a dead band with edges, a stiffness that steps, a hysteresis with a history.
+Each law adds its share to the deflection of the linear springs, theta = c tau, ndarray (S, n) of `GearStates`, rad. The shapes
+are those of machines rather than of regressions: a dead band with edges, a stiffness that steps, a hysteresis with a history.
 """
 
 from dataclasses import dataclass
@@ -44,7 +44,7 @@ class LinearSprings:
 
     compliance: np.ndarray
 
-    def __call__(self, states):
+    def __call__(self, states: GearStates) -> np.ndarray:
         return self.compliance * states.torque
 
 
@@ -54,10 +54,13 @@ class _AtJoint:
 
     joint: int
 
-    def __call__(self, states):
+    def __call__(self, states: GearStates) -> np.ndarray:
         found = np.zeros_like(states.torque)
         found[:, self.joint] = self.turn(states, states.torque[:, self.joint])
         return found
+
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
+        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class DeadBand(_AtJoint):
     half_play_rad: float
     closing_torque_Nm: float
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         return self.half_play_rad * np.clip(torque / self.closing_torque_Nm, -1.0, 1.0)
 
 
@@ -91,9 +94,9 @@ class StepwiseStiffening(_AtJoint):
         (tau_k in N m, d_k in rad/(N m)).
     """
 
-    steps: tuple
+    steps: tuple[tuple[float, float], ...]
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         return -np.sign(torque) * sum(drop * np.maximum(np.abs(torque) - start, 0.0) for start, drop in self.steps)
 
 
@@ -120,7 +123,7 @@ class AngleDependentStiffness(_AtJoint):
     of: int
     order: float = 1.0
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         stiffness = 1.0 + self.share * np.cos(self.order * states.angle[:, self.of] - self.phase_rad)
         return self.compliance * (1.0 / stiffness - 1.0) * torque
 
@@ -148,7 +151,7 @@ class CompensatorStiffness(_AtJoint):
     free_length_m: float
     zero_rad: float
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         u, product = states.angle[:, self.joint] - self.zero_rad, self.anchor_m * self.crank_m
         s = np.sqrt(self.anchor_m**2 + self.crank_m**2 - 2.0 * product * np.cos(u))
         ratio = self.free_length_m / s
@@ -166,10 +169,10 @@ class Coupling:
     compliance : float
     """
 
-    pair: tuple
+    pair: tuple[int, int]
     compliance: float
 
-    def __call__(self, states):
+    def __call__(self, states: GearStates) -> np.ndarray:
         found = np.zeros_like(states.torque)
         one, other = self.pair
         found[:, one] = self.compliance * states.torque[:, other]
@@ -208,7 +211,7 @@ class BoucWen(_AtJoint):
     sharpness: float = 2.0
     beta: float = 0.5
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         wound = states.approach[:, self.joint].astype(float)
         start = states.unloaded[:, self.joint]
         z = np.empty_like(wound)
@@ -220,15 +223,15 @@ class BoucWen(_AtJoint):
             z[state] = self.moved(z[before : before + 1], torque[state : state + 1] - torque[before])[0]
         return -self.half_width_rad * z
 
-    def moved(self, z, change):
-        """z after the torque has changed steadily by `change` (S,), by the explicit midpoint method."""
+    def moved(self, z: np.ndarray, change: np.ndarray) -> np.ndarray:
+        """z (S,) after the torque has changed steadily by `change` (S,), by the explicit midpoint method."""
         step = change / (self.torque_Nm * _HISTORY_STEPS)
         for _ in range(_HISTORY_STEPS):
             middle = z + 0.5 * step * self._slope(z, step)
             z = np.clip(z + step * self._slope(middle, step), -1.0, 1.0)
         return z
 
-    def _slope(self, z, step):
+    def _slope(self, z: np.ndarray, step: np.ndarray) -> np.ndarray:
         return 1.0 - np.abs(z) ** self.sharpness * (self.beta * np.sign(z * step) + 1.0 - self.beta)
 
 
@@ -238,7 +241,7 @@ class Asymmetric(_AtJoint):
 
     curvature: float
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         return self.curvature * torque**2
 
 
@@ -257,5 +260,5 @@ class WarmSoftening(_AtJoint):
     compliance: float
     per_K: float
 
-    def turn(self, states, torque):
+    def turn(self, states: GearStates, torque: np.ndarray) -> np.ndarray:
         return self.compliance * self.per_K * (states.temperature_c - _REFERENCE_C) * torque

@@ -38,21 +38,21 @@ class LoadCell:
     """
 
     scale: float = 0.0
-    turn_rad: tuple = (0.0, 0.0, 0.0)
-    bias_N: tuple = (0.0, 0.0, 0.0)
-    shift_m: tuple = (0.0, 0.0, 0.0)
+    turn_rad: tuple[float, ...] = (0.0, 0.0, 0.0)
+    bias_N: tuple[float, ...] = (0.0, 0.0, 0.0)
+    shift_m: tuple[float, ...] = (0.0, 0.0, 0.0)
     crosstalk_per_N: float = 0.0
-    in_flange: tuple = ()
+    in_flange: tuple[str, ...] = ()
     mount: str = "pull"
 
-    def shown(self, felt, flange_rotation):
+    def shown(self, felt: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
         """Force on the display for the force that is felt, both (S, 3), N, base axes."""
         turn, bias, _ = self._errors(flange_rotation)
         askew = np.einsum("sji,sj->si", turned(turn), felt)
         crossed = self.crosstalk_per_N * np.roll(felt, -1, axis=1) * np.roll(felt, -2, axis=1)
         return (1.0 + self.scale) * askew + bias + crossed
 
-    def felt(self, force, lever, flange_rotation):
+    def felt(self, force: np.ndarray, lever: np.ndarray, flange_rotation: np.ndarray) -> np.ndarray:
         """Wrench on the flange.
 
         By fixed-point iteration: what the display lacks is pulled more.
@@ -76,11 +76,11 @@ class LoadCell:
             found += missing
             if np.abs(missing).max() < _SETTLED_N:
                 break
-        felt = np.where(force.any(axis=1)[:, None], found, 0.0)
+        felt = np.where(force.any(axis=1, keepdims=True), found, 0.0)
         moment = np.cross(lever, felt if self.mount == "pull" else force)
         return np.concatenate([felt, moment + np.cross(self._errors(flange_rotation)[2], felt)], axis=1)
 
-    def _errors(self, flange_rotation):
+    def _errors(self, flange_rotation: np.ndarray) -> list[np.ndarray]:
         """Turn, bias and shift in base axes, (S, 3) each."""
         named = {"turn": self.turn_rad, "bias": self.bias_N, "shift": self.shift_m}
         turns = [flange_rotation if name in self.in_flange else np.eye(3) for name in named]

@@ -13,15 +13,23 @@ References
    Philosophical Magazine 41, 1921.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement, tostring
 
 import mujoco
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.plant.arm import turned
+from elastocal.plant.arm import Arm, Stretch, turned
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.plant.structure import Compensator, Structure, TaperedTube
 
 # MuJoCo wants mass in each moving body; this weighs nothing beside a load of newtons.
 _NO_MASS, _NO_INERTIA = "1e-12", "1e-12 1e-12 1e-12"
@@ -58,54 +66,57 @@ class Machine:
     model: mujoco.MjModel
     drive: np.ndarray
     gear: np.ndarray
-    springs: dict
+    springs: dict[str, int]
     compliance: np.ndarray
-    sites: dict
+    sites: dict[str, int]
     links: np.ndarray
     beyond: np.ndarray
     slides: np.ndarray
     body_stretch: np.ndarray
     site_stretch: np.ndarray
     flange: str
-    compensator: object
+    compensator: Compensator | None
     xml: str
 
 
 class _Tree:
     """Bodies so far; the frame in which the next one is placed."""
 
-    def __init__(self, world):
-        self.body, self.position, self.rotation, self.compliance = world, np.zeros(3), np.eye(3), {}
+    inertial: Element
 
-    def descend(self, name):
+    def __init__(self, world: Element) -> None:
+        self.body, self.position, self.rotation = world, np.zeros(3), np.eye(3)
+        self.compliance: dict[str, float] = {}
+
+    def descend(self, name: str) -> None:
         """New body at the current frame."""
         self.body = SubElement(self.body, "body", name=name, pos=_text(self.position), quat=_quaternion(self.rotation))
         # In front of all else in the body, as MuJoCo's schema has it.
-        SubElement(self.body, "inertial", pos="0 0 0", mass=_NO_MASS, diaginertia=_NO_INERTIA)
+        self.inertial = SubElement(self.body, "inertial", pos="0 0 0", mass=_NO_MASS, diaginertia=_NO_INERTIA)
         self.position, self.rotation = np.zeros(3), np.eye(3)
 
-    def joint(self, name, kind, axis, compliance=None):
+    def joint(self, name: str, kind: str, axis: np.ndarray, compliance: float | None = None) -> None:
         """Joint of the current body; `compliance` None for one that is commanded."""
-        stiffness = {"stiffness": _text([1.0 / compliance])} if compliance else {}
-        SubElement(self.body, "joint", name=name, type=kind, axis=_text(axis), armature="1", **stiffness)
+        added = SubElement(self.body, "joint", name=name, type=kind, axis=_text(axis), armature="1")
+        if compliance:
+            added.set("stiffness", _text([1.0 / compliance]))
         if compliance is not None:
             self.compliance[name] = compliance
 
-    def six_springs(self, name, compliances):
+    def six_springs(self, name: str, compliances: Iterable[float] | None) -> None:
         """Along and about x, y and z of the current body; none where `compliances` is None."""
         names = [f"{name}_{kind}{axis}" for kind in ("", "r") for axis in "xyz"]
         for number, compliance in enumerate(compliances or ()):
             self.joint(names[number], "slide" if number < 3 else "hinge", np.eye(3)[number % 3], compliance)
 
-    def weigh(self, mass, position):
+    def weigh(self, mass: float, position: np.ndarray) -> None:
         """Put a mass on the current body; masses add up at their common centre."""
-        inertial = self.body.find("inertial")
-        old, where = float(inertial.get("mass")), np.array(inertial.get("pos").split(), float)
-        inertial.set("pos", _text((old * where + mass * np.asarray(position)) / (old + mass)))
-        inertial.set("mass", _text([old + mass]))
+        old, where = float(self.inertial.attrib["mass"]), np.array(self.inertial.attrib["pos"].split(), float)
+        self.inertial.set("pos", _text((old * where + mass * np.asarray(position)) / (old + mass)))
+        self.inertial.set("mass", _text([old + mass]))
 
 
-def machine_of(arm, structure, gear_compliance=None):
+def machine_of(arm: Arm, structure: Structure, gear_compliance: np.ndarray | None = None) -> Machine:
     """Build the model of an arm.
 
     Parameters
@@ -146,12 +157,12 @@ def machine_of(arm, structure, gear_compliance=None):
         load = structure.payload
         tree.weigh(load.mass_kg, tree.position + tree.rotation @ np.array(load.aside_m))
     if structure.compensator is not None:
-        _add_compensator(root, arm, structure)
+        _add_compensator(root, arm, structure.compensator)
     xml = tostring(root, encoding="unicode")
     return _indexed(arm, structure, tree, xml)
 
 
-def _indexed(arm, structure, tree, xml):
+def _indexed(arm: Arm, structure: Structure, tree: _Tree, xml: str) -> Machine:
     model = _compiled(xml)
     place = {model.joint(j).name: int(model.jnt_qposadr[j]) for j in range(model.njnt)}
     compliance = np.zeros(model.nq)
@@ -176,7 +187,7 @@ def _indexed(arm, structure, tree, xml):
     )
 
 
-def _stretches_of(model):
+def _stretches_of(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Stretches of all bodies and of all sites: a body behind a drive is placed by the stretch before it."""
     arms, bodies = 0, []
     for number in range(model.nbody):
@@ -188,12 +199,12 @@ def _stretches_of(model):
 
 
 @lru_cache(maxsize=4)
-def _compiled(xml):
+def _compiled(xml: str) -> mujoco.MjModel:
     """A case asks for the same few models again and again."""
     return mujoco.MjModel.from_xml_string(xml)
 
 
-def _add_stretch(tree, number, stretch, structure, elsewhere):
+def _add_stretch(tree: _Tree, number: int, stretch: Stretch, structure: Structure, elsewhere: str | None) -> None:
     """Walk from the near to the far end of a stretch and leave the tree there; one measuring point may be put elsewhere."""
     vector = stretch.vector_m + np.array(structure.wrong_vectors_m.get(number, (0.0, 0.0, 0.0)))
     turn = turned(np.array(structure.wrong_turns.get(number, (0.0, 0.0, 0.0))))
@@ -219,13 +230,20 @@ def _add_stretch(tree, number, stretch, structure, elsewhere):
     tree.rotation = rotation
 
 
-def _add_segments(tree, number, vector, tube, count, weights):
+def _add_segments(
+    tree: _Tree,
+    number: int,
+    vector: np.ndarray,
+    tube: TaperedTube,
+    count: int,
+    weights: Sequence[tuple[float, float, np.ndarray]],
+) -> None:
     """Rigid pieces with springs at the middle of each: the midpoint rule for the integral of M / EI along the link."""
     along = vector / np.linalg.norm(vector)
     first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
     first /= np.linalg.norm(first)
     across = (first, np.cross(along, first))
-    piece, step = np.linalg.norm(vector) / count, vector / count
+    piece, step = float(np.linalg.norm(vector)) / count, vector / count
     tree.position = tree.position + tree.rotation @ (0.5 * step)
     for segment in range(count):
         tree.descend(f"link{number}_{segment}")
@@ -246,30 +264,29 @@ def _add_segments(tree, number, vector, tube, count, weights):
         tree.position = step if segment < count - 1 else 0.5 * step
 
 
-def _add_site(tree, name, position, rotation):
+def _add_site(tree: _Tree, name: str, position: np.ndarray, rotation: np.ndarray) -> None:
     """A measuring point, in the frame of the current body."""
     SubElement(tree.body, "site", name=name, pos=_text(position), quat=_quaternion(rotation))
 
 
-def _add_compensator(root, arm, structure):
+def _add_compensator(root: Element, arm: Arm, spring: Compensator) -> None:
     """Two sites and the tendon between them: from the body before the shoulder's drive to the body behind it."""
-    shoulder = {name: root.find(f".//body[@name='{name}']") for name in ("arm1", "arm2")}
-    spring, before = structure.compensator, arm.stretches[1]
+    bodies, before = {body.get("name"): body for body in root.iter("body")}, arm.stretches[1]
     anchor = before.vector_m + before.rotation @ np.array(spring.anchor_m)
     for body, name, place in (("arm1", "anchor", anchor), ("arm2", "crank", np.array(spring.crank_m))):
-        SubElement(shoulder[body], "site", name=name, pos=_text(place))
+        SubElement(bodies[body], "site", name=name, pos=_text(place))
     tendon = SubElement(root, "tendon")
-    size = {"stiffness": _text([spring.stiffness_N_per_m]), "springlength": _text([spring.free_length_m])}
-    path = SubElement(tendon, "spatial", name="compensator", **size)
+    stiffness, length = _text([spring.stiffness_N_per_m]), _text([spring.free_length_m])
+    path = SubElement(tendon, "spatial", name="compensator", stiffness=stiffness, springlength=length)
     for name in ("anchor", "crank"):
         SubElement(path, "site", site=name)
 
 
-def _text(numbers):
+def _text(numbers: Iterable[float]) -> str:
     return " ".join(repr(float(number)) for number in numbers)
 
 
-def _quaternion(rotation):
+def _quaternion(rotation: np.ndarray) -> str:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(rotation).ravel())
     return _text(quaternion)

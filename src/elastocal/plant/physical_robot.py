@@ -1,6 +1,9 @@
 """A physical robot with its tracker and load cell: all that is true of it, and what a tracker without noise would read."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -8,12 +11,20 @@ from elastocal.plant.arm import Arm
 from elastocal.plant.drives import Visits
 from elastocal.plant.gears import GearStates, LinearSprings
 from elastocal.plant.load_cell import LoadCell
-from elastocal.plant.multibody import machine_of
+from elastocal.plant.multibody import Machine, machine_of
 from elastocal.plant.random_numbers import stream
-from elastocal.plant.statics import Loading, equilibrium, places
+from elastocal.plant.statics import Equilibrium, Loading, equilibrium, places
 from elastocal.plant.structure import Structure
 from elastocal.plant.tracker import EccentricNest, Tracker
 from elastocal.plant.weights import declared_masses, off_the_line, on_stretches, true_masses
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from elastocal.plant.statics import StructureLaw
+
+    DriveLaw = Callable[[Visits], np.ndarray]
+    GearLaw = Callable[[GearStates], np.ndarray]
 
 _REFERENCE_C = 20.0
 
@@ -33,12 +44,12 @@ class Warmth:
     motor_s: float = 3000.0
     lag_s: float = 1200.0
 
-    def shown(self, time_s):
-        """Temperature that is logged, °C."""
+    def shown(self, time_s: np.ndarray) -> np.ndarray:
+        """Temperature (S,) that is logged at times (S,), °C."""
         return _REFERENCE_C - self.rise_K * np.expm1(-time_s / self.motor_s)
 
-    def of_castings(self, time_s):
-        """Temperature of the links, °C: the logged one behind a first-order lag."""
+    def of_castings(self, time_s: np.ndarray) -> np.ndarray:
+        """Temperature (S,) of the links at times (S,), °C: the logged one behind a first-order lag."""
         fast, slow = self.lag_s, self.motor_s
         rest = (slow * np.exp(-time_s / slow) - fast * np.exp(-time_s / fast)) / (slow - fast)
         return _REFERENCE_C + self.rise_K * (1.0 - rest)
@@ -75,19 +86,19 @@ class PhysicalRobot:
     arm: Arm
     compliance: np.ndarray
     structure: Structure = field(default_factory=Structure)
-    gears: tuple = ()
-    drives: tuple = ()
-    structure_laws: tuple = ()
-    offsets: tuple = ()
+    gears: tuple[GearLaw, ...] = ()
+    drives: tuple[DriveLaw, ...] = ()
+    structure_laws: tuple[StructureLaw, ...] = ()
+    offsets: tuple[tuple[str, DriveLaw], ...] = ()
     expansion_per_K: float = 0.0
-    gradient_per_K: tuple = (0.0, 0.0)
+    gradient_per_K: tuple[float, float] = (0.0, 0.0)
     warmth: Warmth = field(default_factory=Warmth)
     cell: LoadCell = field(default_factory=LoadCell)
     tracker: Tracker = field(default_factory=Tracker)
     nest: EccentricNest | None = None
 
 
-def specimen(arm, seed, spread=0.15, weighs=True, off_line_m=0.0):
+def specimen(arm: Arm, seed: int, spread: float = 0.15, weighs: bool = True, off_line_m: float = 0.0) -> PhysicalRobot:
     """One robot of a series: other gears than the robot file says, and other weights.
 
     Parameters
@@ -151,12 +162,12 @@ class Schedule:
     seed: int
 
     @property
-    def shown_wrench(self):
+    def shown_wrench(self) -> np.ndarray:
         """What the campaign says of the load, (S, 6), N, N m."""
         return np.concatenate([self.force, np.cross(self.lever, self.force)], axis=1)
 
 
-def seen_poses(robot, schedule, start=None):
+def seen_poses(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Poses of all targets as a tracker without noise reads them.
 
     Parameters
@@ -175,7 +186,7 @@ def seen_poses(robot, schedule, start=None):
     return seen_at_rest(robot, schedule, at_rest(robot, schedule, start)[1])
 
 
-def at_rest(robot, schedule, start=None):
+def at_rest(robot: PhysicalRobot, schedule: Schedule, start: Equilibrium | None = None) -> tuple[Machine, Equilibrium]:
     """The arm in equilibrium.
 
     Parameters
@@ -196,17 +207,19 @@ def at_rest(robot, schedule, start=None):
         coordinates[:, machine.drive] = drive
         facing = places(machine, coordinates, growth).rotation[:, -1]
     loading = Loading(drive, robot.cell.felt(schedule.force, schedule.lever, facing), growth, offsets)
-    laws = (LinearSprings(robot.compliance), *robot.gears)
+    laws: tuple[GearLaw, ...] = (LinearSprings(robot.compliance), *robot.gears)
 
-    def gear_deflection(torque, unloaded):
+    def gear_deflection(torque: np.ndarray, unloaded: np.ndarray) -> np.ndarray:
         states = GearStates(torque, unloaded, schedule.angle, schedule.sense, warm, schedule.previous)
-        return sum(law(states) for law in laws)
+        return sum((law(states) for law in laws), np.zeros_like(torque))
 
     begin = None if start is None else start.coordinates[:, start.gear]
     return machine, equilibrium(machine, loading, gear_deflection, robot.structure_laws, begin)
 
 
-def driven(robot, schedule, machine):
+def driven(
+    robot: PhysicalRobot, schedule: Schedule, machine: Machine
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[int, np.ndarray]]:
     """Where the drives really stand, and how warm everything is.
 
     Parameters
@@ -231,14 +244,14 @@ def driven(robot, schedule, machine):
     warm = robot.warmth.of_castings(schedule.time_s)
     per_kelvin = robot.expansion_per_K + np.linspace(*robot.gradient_per_K, robot.arm.joints + 1)
     growth = (warm - _REFERENCE_C)[:, None] * per_kelvin
-    offsets = {}
+    offsets: dict[int, np.ndarray] = {}
     for name, law in robot.offsets:
         index = machine.springs[name]
         offsets[index] = offsets.get(index, 0.0) + law(visits)
     return drive, growth, warm, offsets
 
 
-def seen_at_rest(robot, schedule, rest):
+def seen_at_rest(robot: PhysicalRobot, schedule: Schedule, rest: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """What a tracker without noise reads of an arm in equilibrium; as `seen_poses`."""
     position, rotation = rest.position.copy(), rest.rotation
     if robot.nest is not None:

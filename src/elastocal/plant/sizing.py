@@ -16,13 +16,23 @@ References
    1961.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.plant.physical_robot import at_rest, seen_at_rest, seen_poses
+from elastocal.plant.physical_robot import PhysicalRobot, Schedule, at_rest, seen_at_rest, seen_poses
 from elastocal.plant.tracker import rotation_vector
 from elastocal.plant.weights import allowed_centre_std_m
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from elastocal.plant.arm import LinkMass
+    from elastocal.plant.multibody import Machine
+    from elastocal.plant.statics import Equilibrium
 
 _ROUNDS = 12
 # Below this share of the largest a direction is second order and rounding.
@@ -64,7 +74,15 @@ class Yardstick:
         Weights as the analysis is told them.
     """
 
-    def __init__(self, robot, schedule, targets=None, orientation=True, free_frame=False, declared=()):
+    def __init__(
+        self,
+        robot: PhysicalRobot,
+        schedule: Schedule,
+        targets: Iterable[int] | None = None,
+        orientation: bool = True,
+        free_frame: bool = False,
+        declared: Iterable[LinkMass] = (),
+    ) -> None:
         self.robot, self.schedule, self.orientation = robot, schedule, orientation
         self.targets = list(range(len(robot.arm.points)) if targets is None else targets)
         machine, self._rest = at_rest(robot, schedule)
@@ -82,11 +100,11 @@ class Yardstick:
         stacked[len(columns[0]) :, len(columns) :] = np.eye(len(weights))
         self._absorbed, self._priors = np.linalg.qr(stacked)[0], len(weights)
 
-    def change(self, robot):
+    def change(self, robot: PhysicalRobot) -> np.ndarray:
         """Change of the measurements against the faultless robot in standard deviations, ndarray (S, targets, 3 or 6)."""
         return self._whitened(*self._change(robot))
 
-    def signal(self, robot):
+    def signal(self, robot: PhysicalRobot) -> Signal:
         """How a robot differs from the faultless one.
 
         Parameters
@@ -103,14 +121,14 @@ class Yardstick:
         rms = [float(np.sqrt((part**2).sum(axis=-1).mean())) for part in (metres, radians)]
         return Signal(float(seen @ seen), float(left @ left), *rms)
 
-    def left(self, robot):
-        """What the declared model cannot absorb of a robot's change in the measurements that are not held out, ndarray.
+    def left(self, robot: PhysicalRobot) -> np.ndarray:
+        """What the declared model cannot absorb of a robot's change in the measurements that are not held out, ndarray (M,).
 
         Its last entries are the weights, in their standard deviations, that absorb the rest.
         """
         return self._left_of(self.change(robot)[self.schedule.training].ravel())
 
-    def angle_deg(self, robot, others):
+    def angle_deg(self, robot: PhysicalRobot, others: Iterable[PhysicalRobot]) -> float:
         """Principal angle [1]_ between what is left of a robot and all that others make together, in any proportion.
 
         Parameters
@@ -134,26 +152,26 @@ class Yardstick:
         if not len(theirs):
             return 90.0
         _, size, directions = np.linalg.svd(theirs / np.linalg.norm(theirs, axis=1, keepdims=True), full_matrices=False)
-        share = np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine)
+        share = float(np.linalg.norm(directions[size > _SAME * size[0]] @ mine) / np.linalg.norm(mine))
         return float(np.degrees(np.arccos(min(share, 1.0))))
 
-    def _left_of(self, seen):
+    def _left_of(self, seen: np.ndarray) -> np.ndarray:
         seen = np.append(seen, np.zeros(self._priors))
         return seen - self._absorbed @ (self._absorbed.T @ seen)
 
-    def _change(self, robot):
+    def _change(self, robot: PhysicalRobot) -> tuple[np.ndarray, np.ndarray]:
         position, rotation = seen_poses(robot, self.schedule, self._rest)
         position_0, rotation_0 = self.poses
         relative = rotation @ np.swapaxes(rotation_0, -1, -2)
         return (position - position_0)[:, self.targets], rotation_vector(relative)[:, self.targets]
 
-    def _whitened(self, metres, radians):
+    def _whitened(self, metres: np.ndarray, radians: np.ndarray) -> np.ndarray:
         parts = [metres / self.robot.tracker.sigma_at(self.poses[0])[:, self.targets, None]]
         if self.orientation:
             parts.append(radians / self.robot.tracker.sigma_rad)
         return np.concatenate(parts, axis=-1)
 
-    def _turned_by(self, joint, turn):
+    def _turned_by(self, joint: int | None, turn: np.ndarray) -> np.ndarray:
         """Change of the measurements, to first order, where one gear, or each of them, turns by so much (S,) or (S, n) more."""
         metres, radians = self._turns
         if joint is None:
@@ -164,7 +182,7 @@ class Yardstick:
             metres, radians = metres[:, :, joint] * turn, radians[:, :, joint] * turn
         return self._whitened(metres[:, self.targets], radians[:, self.targets])[self.schedule.training].ravel()
 
-    def _frame_columns(self):
+    def _frame_columns(self) -> list[np.ndarray]:
         position = self.poses[0][self.schedule.training][:, self.targets]
         sigma = self.robot.tracker.sigma_at(position)[..., None]
         columns = []
@@ -177,7 +195,7 @@ class Yardstick:
         return columns
 
 
-def _per_turn(machine, rest):
+def _per_turn(machine: Machine, rest: Equilibrium) -> tuple[np.ndarray, np.ndarray]:
     """Movement of all targets per turn of each gear, two ndarray (S, targets, n, 3): m/rad, and axes where it turns them."""
     where, gear = rest.where, machine.gear
     axis, arm = where.axis[:, None, gear], where.position[:, :, None] - where.anchor[:, None, gear]
@@ -186,7 +204,9 @@ def _per_turn(machine, rest):
     return moves * np.cross(axis, arm), moves * axis
 
 
-def _turns_of_weights(machine, rest, robot, declared):
+def _turns_of_weights(
+    machine: Machine, rest: Equilibrium, robot: PhysicalRobot, declared: Iterable[LinkMass]
+) -> list[np.ndarray]:
     """Turns of all gears per standard deviation of each mass and each component of its centre, list of ndarray (S, n)."""
     where, gear, pull = rest.where, machine.gear, np.array(robot.structure.gravity_m_s2)
     reach_m = robot.arm.reach_m
@@ -203,7 +223,14 @@ def _turns_of_weights(machine, rest, robot, declared):
     return found
 
 
-def size_for(yardstick, robot_of_size, start, target, quantity="retained", largest=np.inf):
+def size_for(
+    yardstick: Yardstick,
+    robot_of_size: Callable[[float], PhysicalRobot],
+    start: float,
+    target: float,
+    quantity: str = "retained",
+    largest: float = np.inf,
+) -> tuple[float, Signal]:
     """Size of a defect at which its non-centrality is as wanted.
 
     Parameters
@@ -234,10 +261,11 @@ def size_for(yardstick, robot_of_size, start, target, quantity="retained", large
     -----
     The non-centrality of a linear effect grows with the square of its size; the secant of the logarithms allows for others.
     """
-    size, exponent, last = float(start), 2.0, None
+    size, exponent = float(start), 2.0
+    last: tuple[float, float] | None = None
     for _ in range(_ROUNDS):
         signal = yardstick.signal(robot_of_size(size))
-        value = getattr(signal, quantity)
+        value: float = getattr(signal, quantity)
         # What is absorbed leaves rounding and second order, a millionth of the raw signal.
         if value <= 1e-6 * signal.raw or not np.isfinite(value):
             break

@@ -6,10 +6,21 @@ thousandth or so, so that fixed-point iteration gains about three digits a sweep
 method with their stiffness as tangent.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from elastocal.plant.multibody import Machine
+    from elastocal.plant.structure import Compensator
+
+    StructureLaw = tuple[str, Callable[[np.ndarray], np.ndarray]]
 
 _SWEEPS = 60
 # Of the largest deflection: a hundredth of a picometre of millimetres.
@@ -37,7 +48,7 @@ class Loading:
     drive: np.ndarray
     wrench: np.ndarray
     growth: np.ndarray
-    offsets: dict = field(default_factory=dict)
+    offsets: dict[int, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -92,17 +103,17 @@ class Equilibrium:
     sweeps: int
 
     @property
-    def position(self):
+    def position(self) -> np.ndarray:
         """Of the measuring points, ndarray (S, points, 3), base frame, m."""
         return self.where.position
 
     @property
-    def rotation(self):
+    def rotation(self) -> np.ndarray:
         """Of the measuring points, ndarray (S, points, 3, 3)."""
         return self.where.rotation
 
 
-def places(machine, coordinates, growth):
+def places(machine: Machine, coordinates: np.ndarray, growth: np.ndarray) -> Places:
     """MuJoCo's kinematics.
 
     Parameters
@@ -122,8 +133,8 @@ def places(machine, coordinates, growth):
     mass, body, turn = np.empty((count, links, 3)), np.empty((count, links, 3)), np.empty((count, links, 9))
     position, rotation = np.empty((count, points, 3)), np.empty((count, points, 9))
     # MuJoCo's own arrays, seen through views that follow each call.
-    seen = ((anchor, data.xanchor), (axis, data.xaxis), (mass, data.xipos), (body, data.xpos), (turn, data.xmat))
-    seen += ((position, data.site_xpos), (rotation, data.site_xmat))
+    seen = [(anchor, data.xanchor), (axis, data.xaxis), (mass, data.xipos), (body, data.xpos), (turn, data.xmat)]
+    seen += [(position, data.site_xpos), (rotation, data.site_xmat)]
     coordinate, bodies, sites = data.qpos, model.body_pos.copy(), model.site_pos.copy()
     grown = np.vstack([np.zeros_like(growth[:1]), growth])
     changed = (np.diff(grown, axis=0) != 0.0).any(axis=1)
@@ -144,7 +155,7 @@ def places(machine, coordinates, growth):
     return Places(anchor, axis, mass, body, turn, position[:, mine], rotation[:, mine], position[:, ends])
 
 
-def generalized_forces(machine, coordinates, loading):
+def generalized_forces(machine: Machine, coordinates: np.ndarray, loading: Loading) -> tuple[np.ndarray, Places]:
     """Forces on all coordinates by the principle of virtual work [1]_, and where everything is.
 
     Parameters
@@ -178,17 +189,17 @@ def generalized_forces(machine, coordinates, loading):
     along = np.where(machine.slides[:, None], push + weight, moment)
     force = (where.axis * along).sum(axis=2)
     if machine.compensator is not None:
-        force += _pull(machine, where)
+        force += _pull(machine, machine.compensator, where)
     return force, where
 
 
-def _pull(machine, where):
+def _pull(machine: Machine, spring: Compensator, where: Places) -> np.ndarray:
     """Of the spring between the links before and behind the shoulder's drive."""
-    model, spring = machine.model, machine.compensator
+    model = machine.model
     line = where.spring[:, 0] - where.spring[:, 1]
     length = np.linalg.norm(line, axis=1, keepdims=True)
     pull = spring.stiffness_N_per_m * (1.0 - spring.free_length_m / length) * line
-    force = 0.0
+    force = np.zeros(where.anchor.shape[:2])
     for name, end, sense in (("anchor", 0, -1.0), ("crank", 1, 1.0)):
         body = int(model.site_bodyid[model.site(name).id])
         moment = np.cross(where.spring[:, end, None] - where.anchor, sense * pull[:, None])
@@ -197,7 +208,13 @@ def _pull(machine, where):
     return force
 
 
-def equilibrium(machine, loading, gear_deflection, structure_laws=(), start=None):
+def equilibrium(
+    machine: Machine,
+    loading: Loading,
+    gear_deflection: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    structure_laws: Iterable[StructureLaw] = (),
+    start: np.ndarray | None = None,
+) -> Equilibrium:
     """Where the arm comes to rest, by fixed-point iteration.
 
     Parameters
@@ -247,5 +264,5 @@ def equilibrium(machine, loading, gear_deflection, structure_laws=(), start=None
     raise RuntimeError(f"no equilibrium after {_SWEEPS} sweeps: the last moved by {change.max():.3g}")
 
 
-def _preloaded(machine):
+def _preloaded(machine: Machine) -> bool:
     return machine.compensator is not None or machine.model.body_mass.sum() > _NOTHING_KG

@@ -45,7 +45,7 @@ class Mass:
     stretch: int
     mass_kg: float
     along: float = 0.5
-    aside_m: tuple = (0.0, 0.0, 0.0)
+    aside_m: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -62,8 +62,8 @@ class Compensator:
         Pull = stiffness (length - free length).
     """
 
-    anchor_m: tuple
-    crank_m: tuple
+    anchor_m: tuple[float, ...]
+    crank_m: tuple[float, ...]
     stiffness_N_per_m: float
     free_length_m: float
 
@@ -96,15 +96,15 @@ class Structure:
         In the axes of the base.
     """
 
-    base: tuple | None = None
-    flange: tuple | None = None
-    tilt: dict = field(default_factory=dict)
-    loose: tuple = ()
-    tubes: dict = field(default_factory=dict)
+    base: tuple[float, ...] | None = None
+    flange: tuple[float, ...] | None = None
+    tilt: dict[int, tuple[float, float]] = field(default_factory=dict)
+    loose: tuple[int, ...] = ()
+    tubes: dict[int, TaperedTube] = field(default_factory=dict)
     segments: int = 6
-    masses: tuple = ()
+    masses: tuple[Mass, ...] = ()
     payload: Mass | None = None
     compensator: Compensator | None = None
-    wrong_vectors_m: dict = field(default_factory=dict)
-    wrong_turns: dict = field(default_factory=dict)
-    gravity_m_s2: tuple = (0.0, 0.0, -standard_gravity)
+    wrong_vectors_m: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    wrong_turns: dict[int, tuple[float, ...]] = field(default_factory=dict)
+    gravity_m_s2: tuple[float, ...] = (0.0, 0.0, -standard_gravity)

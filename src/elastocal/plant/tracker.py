@@ -21,12 +21,12 @@ class Drift:
         T; inf for a steady drift.
     """
 
-    rate_m_per_h: tuple
-    rate_rad_per_h: tuple
+    rate_m_per_h: tuple[float, ...]
+    rate_rad_per_h: tuple[float, ...]
     settling_h: float = np.inf
 
-    def moved(self, time_s):
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements."""
+    def moved(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements at times (S,)."""
         hours = np.asarray(time_s) / _HOUR_S
         if np.isfinite(self.settling_h):
             hours = -self.settling_h * np.expm1(-hours / self.settling_h)
@@ -46,11 +46,11 @@ class Move:
     """
 
     after_s: float
-    shift_m: tuple
-    turn_rad: tuple
+    shift_m: tuple[float, ...]
+    turn_rad: tuple[float, ...]
 
-    def moved(self, time_s):
-        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements."""
+    def moved(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Shift (S, 3) in m and rotation (S, 3, 3) of the measurements at times (S,)."""
         later = (np.asarray(time_s) > self.after_s)[:, None]
         return later * np.array(self.shift_m), turned(later * np.array(self.turn_rad))
 
@@ -83,8 +83,8 @@ class Tracker:
     sigma_m: float = 60e-6
     sigma_m_per_m: float = 0.0
     sigma_rad: float = 60e-6
-    stand_m: tuple = (6.0, -2.0, 1.5)
-    frame_turn: tuple = (0.0, 0.0, 0.0)
+    stand_m: tuple[float, ...] = (6.0, -2.0, 1.5)
+    frame_turn: tuple[float, ...] = (0.0, 0.0, 0.0)
     drift: Drift | None = None
     move: Move | None = None
     refraction_per_m: float = 0.0
@@ -92,7 +92,7 @@ class Tracker:
     outliers: float = 0.0
     outlier_sigmas: float = 8.0
 
-    def seen(self, position, rotation, time_s):
+    def seen(self, position: np.ndarray, rotation: np.ndarray, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Poses as read without noise, base frame.
 
         Parameters
@@ -104,7 +104,7 @@ class Tracker:
 
         Returns
         -------
-        position, rotation : ndarray
+        position, rotation : ndarray (S, targets, 3), (S, targets, 3, 3)
         """
         sight = position - np.array(self.stand_m)
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
@@ -116,7 +116,9 @@ class Tracker:
                 rotation = turn[:, None] @ rotation
         return position, rotation
 
-    def read(self, position, rotation, draws):
+    def read(
+        self, position: np.ndarray, rotation: np.ndarray, draws: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Add noise, and outliers, to poses as seen.
 
         Parameters
@@ -126,8 +128,8 @@ class Tracker:
 
         Returns
         -------
-        position, rotation, outlier
-            The last one bool (S, targets).
+        position, rotation, outlier : ndarray (S, targets, 3), (S, targets, 3, 3), (S, targets)
+            The last one bool.
         """
         # A generator each, so that measurements that come later change none that are there.
         chance, metres, radians = draws.spawn(3)
@@ -138,12 +140,12 @@ class Tracker:
         turn = turned(large * self.sigma_rad * radians.standard_normal(position.shape))
         return position, turn @ rotation, outlier
 
-    def sigma_at(self, position):
-        """Standard deviation of a coordinate at positions (..., 3), m."""
+    def sigma_at(self, position: np.ndarray) -> np.ndarray:
+        """Standard deviation (...) of a coordinate at positions (..., 3), m."""
         return self.sigma_m + self.sigma_m_per_m * np.linalg.norm(position - np.array(self.stand_m), axis=-1)
 
-    def in_own_frame(self, position, rotation):
-        """Poses of the base frame in the tracker's."""
+    def in_own_frame(self, position: np.ndarray, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses of the base frame, positions (..., 3) in m and rotations (..., 3, 3), in the tracker's."""
         own = turned(np.array(self.frame_turn))
         return (position - np.array(self.stand_m)) @ own, own.T @ rotation
 
@@ -163,14 +165,14 @@ class EccentricNest:
     radius_m: float
     axis: int = 0
 
-    def moved(self, position, rotation, tool_angle):
+    def moved(self, position: np.ndarray, rotation: np.ndarray, tool_angle: np.ndarray) -> np.ndarray:
         """Positions (S, 3) of the target with rotations (S, 3, 3) at tool angles (S,)."""
         circle = [np.zeros_like(tool_angle), np.cos(2 * tool_angle), np.sin(2 * tool_angle)]
         wobble = np.roll(np.stack(circle, axis=-1), self.axis, axis=-1)
         return position + self.radius_m * np.einsum("sij,sj->si", rotation, wobble)
 
 
-def rotation_vector(rotation):
+def rotation_vector(rotation: np.ndarray) -> np.ndarray:
     """Rotation vectors of rotation matrices by way of quaternions, rad; angles up to and at a half turn.
 
     Quaternions by Shepperd's method [1]_.

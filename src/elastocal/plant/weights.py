@@ -1,11 +1,17 @@
 """What the links of an arm weigh: as declared, as guessed where nobody declared it, and as it is true of one specimen."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.plant.arm import LinkMass, link_frames
+from elastocal.plant.arm import Arm, LinkMass, Stretch, link_frames
 from elastocal.plant.structure import Mass
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
 
 # Mass of an arm by rated load (kg) times reach (m): m = 3.2 (P R)^0.92 goes through an arm of 30 kg for 14 kg at 0.82 m and one
 # of 1130 kg for 270 kg at 2.7 m, and is within a quarter of the data sheets of those between.
@@ -23,7 +29,7 @@ _FARTHEST = 3.0
 _POSES = 64
 
 
-def declared_masses(arm):
+def declared_masses(arm: Arm) -> tuple[LinkMass, ...]:
     """What the robot file says the links weigh, or a rule where it says nothing.
 
     Parameters
@@ -45,22 +51,22 @@ def declared_masses(arm):
     )
 
 
-def _guessed_centre(stretch, reach_m):
+def _guessed_centre(stretch: Stretch, reach_m: float) -> tuple[float, ...]:
     """Before the middle of the link, and a little to the side, where the motors sit; mm."""
     return tuple(np.round(_ALONG * stretch.vector_m + [0.0, _ASIDE * reach_m, 0.0], 3).tolist())
 
 
-def centre_std_m(mass):
+def centre_std_m(mass: LinkMass) -> float:
     """Standard deviation of each component of a declared centre of mass, m."""
     return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _SHORTEST_LEVER_M)
 
 
-def allowed_centre_std_m(mass, reach_m):
+def allowed_centre_std_m(mass: LinkMass, reach_m: float) -> float:
     """Standard deviation that an analyst must allow each component of a centre, who does not know how far aside it lies, m."""
     return mass.relative_std * max(float(np.linalg.norm(mass.centre_m)), _WIDTH_OF_REACH * reach_m)
 
 
-def true_masses(masses, draws):
+def true_masses(masses: Iterable[LinkMass], draws: np.random.Generator) -> tuple[LinkMass, ...]:
     """Masses and centres of one specimen, drawn about the declared ones as well as these are known.
 
     Parameters
@@ -80,7 +86,7 @@ def true_masses(masses, draws):
     return tuple(found)
 
 
-def off_the_line(masses, arm, largest_m, draws):
+def off_the_line(masses: Iterable[LinkMass], arm: Arm, largest_m: float, draws: np.random.Generator) -> tuple[LinkMass, ...]:
     """Centres moved off the lines of their links by up to a distance across each, as nobody declared.
 
     Parameters
@@ -106,7 +112,7 @@ def off_the_line(masses, arm, largest_m, draws):
     return tuple(found)
 
 
-def on_stretches(masses, arm):
+def on_stretches(masses: Iterable[LinkMass], arm: Arm) -> tuple[Mass, ...]:
     """The same weights as a structure has them: along the line of the stretch, and aside of it.
 
     Parameters
@@ -126,7 +132,7 @@ def on_stretches(masses, arm):
     return tuple(found)
 
 
-def gravity_torque(arm, masses, gravity_m_s2, angles):
+def gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: Sequence[float], angles: np.ndarray) -> np.ndarray:
     """Torque of the links' weight on each drive, by levers.
 
     Parameters
@@ -153,7 +159,7 @@ def gravity_torque(arm, masses, gravity_m_s2, angles):
     return torque
 
 
-def usual_gravity_torque(arm, masses, gravity_m_s2):
+def usual_gravity_torque(arm: Arm, masses: Iterable[Mass], gravity_m_s2: Sequence[float]) -> np.ndarray:
     """Root mean square of `gravity_torque` over the arm's range of angles, ndarray (n,), N m."""
     low, high = arm.limits.T
     # The same poses for all, of no campaign.
