@@ -1,11 +1,18 @@
 """Files that appear whole or not at all."""
 
+from __future__ import annotations
+
 import os
 from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
 
 
 @contextmanager
-def atomic_write(path):
+def atomic_write(path: str | Path) -> Iterator[str]:
     """Write beside a file, then rename.
 
     Parameters
@@ -27,7 +34,7 @@ def atomic_write(path):
             os.remove(partial)
 
 
-def write_text(path, text):
+def write_text(path: str | Path, text: str) -> None:
     """Write a text; the file appears whole or not at all.
 
     Parameters

@@ -1,12 +1,22 @@
 """Tables on disk as pandas data frames, and data frames as the tables that people read."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import pandas as pd
 
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.storage import read_provenance, read_table
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+    from pathlib import Path
 
-def read_frame(path, schema, columns=None):
+    from elastocal.io.storage import TableSchema
+
+
+def read_frame(path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None) -> pd.DataFrame:
     """A table as a data frame, checked as in `storage.read_blocks`.
 
     Parameters
@@ -22,7 +32,7 @@ def read_frame(path, schema, columns=None):
     return pd.DataFrame(read_table(path, schema, columns))
 
 
-def read_long(paths, schema):
+def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
     """Tables of many strategies in one frame, headed by what their provenance says: robot, noise_um, strategy (its name).
 
     Parameters
@@ -49,7 +59,7 @@ def read_long(paths, schema):
     return pd.concat(frames[1:] or frames, ignore_index=True)
 
 
-def write_csv(path, frame):
+def write_csv(path: str | Path, frame: pd.DataFrame) -> None:
     """Write a data frame; the file appears whole or not at all.
 
     Parameters
@@ -60,18 +70,18 @@ def write_csv(path, frame):
     write_text(path, frame.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
 
 
-def write_markdown(path, frame):
+def write_markdown(path: str | Path, frame: pd.DataFrame) -> None:
     """Write a frame of strings as a Markdown table."""
     write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n")
 
 
-def write_latex(path, frame):
+def write_latex(path: str | Path, frame: pd.DataFrame) -> None:
     """Write a frame of strings as a LaTeX tabular."""
     shown = frame.rename(columns=_latex).map(_latex)
     write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]))
 
 
-def _latex(text):
+def _latex(text: str) -> str:
     for plain, escaped in (("_", r"\_"), ("%", r"\%"), ("±", r"$\pm$"), ("µ", r"\textmu{}")):
         text = str(text).replace(plain, escaped)
     return text

@@ -1,15 +1,33 @@
 """YAML documents that users write: read, and checked against a JSON schema that knows every key."""
 
+from __future__ import annotations
+
 import difflib
 import math
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import jsonschema
 import yaml
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any, Protocol
+
+    class _Violation(Protocol):
+        """An error of jsonschema, of which a validator sets every part."""
+
+        absolute_path: Iterable[str | int]
+        validator: str
+        validator_value: Any
+        schema: dict[str, Any]
+        instance: Any
+        message: str
+
 
 # The safe loader, in C where libyaml is there: the study is read at every call of snakemake.
 _Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
@@ -26,7 +44,7 @@ _Validator = jsonschema.validators.extend(
 )
 
 
-def read_document(path):
+def read_document(path: str | Path) -> Any:
     """Contents of a YAML file.
 
     Parameters
@@ -56,13 +74,13 @@ def read_document(path):
 
 
 @cache
-def read_schema(name):
+def read_schema(name: str) -> dict[str, Any]:
     """One of the package's schemas: ``config``, ``robot`` or ``strategy``."""
     text = resources.files("elastocal").joinpath("schemas", f"{name}.yaml").read_text(encoding="utf-8")
     return yaml.load(text, Loader=_Loader)
 
 
-def check_document(document, schema, source):
+def check_document(document: Any, schema: str, source: str) -> None:
     """Check a document against a schema.
 
     Parameters
@@ -84,7 +102,7 @@ def check_document(document, schema, source):
         raise InputError(source, *_explained(errors[0]))
 
 
-def _explained(error):
+def _explained(error: _Violation) -> tuple[str, str, str]:
     """Key, what was found and what is allowed, of one violation."""
     key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path).lstrip(".")
     rule, value = error.validator, error.validator_value
@@ -110,12 +128,12 @@ def _explained(error):
     return key, repr(error.instance), f"{allowed} ({meaning})" if meaning else allowed
 
 
-def document_path(folder, kind, name):
+def document_path(folder: str | Path, kind: str, name: str) -> str:
     """Where a document stands that a configuration names: ``folder/kind/name.yaml``."""
     return (Path(folder) / kind / f"{name}.yaml").as_posix()
 
 
-def named_document(folder, kind, schema, name, source):
+def named_document(folder: str | Path, kind: str, schema: str, name: str, source: str) -> dict[str, Any]:
     """Read and check a document that a configuration names.
 
     Parameters

@@ -1,11 +1,18 @@
 """JSON files of the steps, read and written with nothing but the standard library behind it: jobs start quickly."""
 
+from __future__ import annotations
+
 import json
+from typing import TYPE_CHECKING
 
 from elastocal.io.atomic_writes import write_text
 
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
 
-def read_json(path):
+
+def read_json(path: str | Path) -> Any:
     """Contents of a JSON file.
 
     Parameters
@@ -20,7 +27,7 @@ def read_json(path):
         return json.load(file)
 
 
-def write_json(path, contents, **options):
+def write_json(path: str | Path, contents: Any, **options: Any) -> None:
     """Write a JSON file that people can read too; it appears whole or not at all.
 
     Parameters

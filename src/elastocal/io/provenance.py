@@ -1,12 +1,24 @@
 """Where a table comes from: package version, settings and a digest of them."""
 
+from __future__ import annotations
+
 import hashlib
 import json
+from typing import TYPE_CHECKING
 
 from elastocal import __version__
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from typing import Any, Protocol
 
-def provenance(settings, **more):
+    class Settings(Protocol):
+        """A mapping, or a parameter list of Snakemake."""
+
+        def items(self) -> Iterable[tuple[str, Any]]: ...
+
+
+def provenance(settings: Settings, **more: Any) -> dict[str, Any]:
     """Provenance of an output.
 
     Parameters

@@ -5,9 +5,12 @@ the schema, the provenance and, for each row group and column, a SHA-256 of the 
 that any number of them is worked off in the same memory.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyarrow as pa
@@ -15,6 +18,14 @@ import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import atomic_write
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from pathlib import Path
+    from typing import Any
+
+    # Of each column one value or an array.
+    Block = Mapping[str, np.ndarray | Sequence[str] | Sequence[float]]
 
 _TABLE, _PROVENANCE, _DIGESTS = "elastocal.table", "elastocal.provenance", "elastocal.sha256"
 _AS_WRITTEN = "the file as the pipeline wrote it (delete it and it is made again)"
@@ -50,14 +61,14 @@ class TableSchema:
     """Name and columns of a table."""
 
     name: str
-    columns: tuple
+    columns: tuple[Column, ...]
 
-    def column(self, name):
+    def column(self, name: str) -> Column:
         """The column called `name`."""
         return next(column for column in self.columns if column.name == name)
 
 
-def write_table(path, schema, blocks, provenance):
+def write_table(path: str | Path, schema: TableSchema, blocks: Iterable[Block], provenance: Mapping[str, Any]) -> None:
     """Write a table block by block, each a row group; the file appears whole or not at all.
 
     Parameters
@@ -99,7 +110,9 @@ def write_table(path, schema, blocks, provenance):
         writer.add_key_value_metadata({key: json.dumps(value, sort_keys=True) for key, value in metadata.items()})
 
 
-def read_blocks(path, schema, columns=None, **where):
+def read_blocks(
+    path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None, **where: str | float
+) -> Iterator[dict[str, np.ndarray]]:
     """Read a table block by block, checked against its schema and its digests.
 
     Parameters
@@ -145,12 +158,14 @@ def read_blocks(path, schema, columns=None, **where):
             block = {c.name: _to_numpy(c, table.column(c.name)) for c in wanted}
             for column in wanted:
                 if _digest(column, block[column.name]) != digests[group][column.name]:
-                    where = f"column {column.name}, row group {group}"
-                    raise InputError(path, where, "values that were edited", _AS_WRITTEN)
+                    place = f"column {column.name}, row group {group}"
+                    raise InputError(path, place, "values that were edited", _AS_WRITTEN)
             yield block
 
 
-def read_table(path, schema, columns=None, **where):
+def read_table(
+    path: str | Path, schema: TableSchema, columns: Sequence[str] | None = None, **where: str | float
+) -> dict[str, np.ndarray]:
     """Read a whole table; as `read_blocks`, with the blocks joined.
 
     Returns
@@ -166,7 +181,7 @@ def read_table(path, schema, columns=None, **where):
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
 
 
-def read_provenance(path):
+def read_provenance(path: str | Path) -> dict[str, Any]:
     """What `write_table` was told of where the table comes from.
 
     Parameters
@@ -181,41 +196,43 @@ def read_provenance(path):
         return _metadata(path, file, _PROVENANCE)
 
 
-def _opened(path):
+def _opened(path: str | Path) -> pq.ParquetFile:
     try:
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None
 
 
-def _metadata(path, file, key, allowed=_AS_WRITTEN):
+def _metadata(path: str | Path, file: pq.ParquetFile, key: str, allowed: str = _AS_WRITTEN) -> Any:
     text = (file.metadata.metadata or {}).get(key.encode())
     if text is None:
         raise InputError(path, f"metadata {key}", "nothing", allowed)
     return json.loads(text)
 
 
-def _constant(file, group, column):
+def _constant(file: pq.ParquetFile, group: int, column: int) -> str | float | None:
     statistics = file.metadata.row_group(group).column(column).statistics
     return statistics.min if statistics and statistics.min == statistics.max else None
 
 
-def _arrow_type(column):
+def _arrow_type(column: Column) -> pa.DataType:
     if column.type == "text":
         return pa.string()
     return pa.dictionary(pa.int32(), pa.string()) if column.type == "string" else pa.type_for_alias(column.type)
 
 
-def _checked(path, schema, block):
+def _checked(path: str | Path, schema: TableSchema, block: Block) -> dict[str, np.ndarray]:
     names = [c.name for c in schema.columns]
     if set(block) != set(names):
         raise InputError(path, "columns", ", ".join(sorted(set(block) ^ set(names))), f"those of {schema.name}")
-    values = {}
+    values: dict[str, np.ndarray | str] = {}
     for column in schema.columns:
         value = block[column.name]
         if column.type == "text":
             value = np.array(value, dtype=object)
-        elif column.type != "string":
+        elif column.type == "string":
+            value = value if isinstance(value, str) else np.asarray(value, dtype=object)
+        else:
             value = np.ascontiguousarray(value, dtype=column.type)
             if column.type.startswith("float") and not column.missing and not np.isfinite(value).all():
                 row = int(np.argmin(np.isfinite(value)))
@@ -231,16 +248,16 @@ def _checked(path, schema, block):
     return {n: np.full(rows, v, dtype=object) if isinstance(v, str) else v for n, v in values.items()}
 
 
-def _digest(column, array):
+def _digest(column: Column, array: np.ndarray) -> str:
     if column.type in ("string", "text"):
-        data = "\n".join(dict.fromkeys(array) if column.type == "string" else array).encode()
+        data: bytes | memoryview = "\n".join(dict.fromkeys(array) if column.type == "string" else array).encode()
     else:
-        data = np.ascontiguousarray(array)
+        data = np.ascontiguousarray(array).data
     return hashlib.sha256(data).hexdigest()[:32]
 
 
 # Arrays go to and from Arrow through their buffers: every other way makes pyarrow import pandas, which takes longer than a job.
-def _to_arrow(column, array, rows):
+def _to_arrow(column: Column, array: np.ndarray, rows: int) -> pa.Array:
     if column.type == "string":
         text = array[0].encode()
         name = pa.Array.from_buffers(pa.string(), 1, [None, _buffer(np.array([0, len(text)], np.int32)), pa.py_buffer(text)])
@@ -250,15 +267,15 @@ def _to_arrow(column, array, rows):
     return _plain(_arrow_type(column), np.packbits(array, bitorder="little") if column.type == "bool" else array, rows)
 
 
-def _plain(arrow_type, array, rows=None):
+def _plain(arrow_type: pa.DataType, array: np.ndarray, rows: int | None = None) -> pa.Array:
     return pa.Array.from_buffers(arrow_type, len(array) if rows is None else rows, [None, _buffer(array)])
 
 
-def _buffer(array):
+def _buffer(array: np.ndarray) -> pa.Buffer:
     return pa.py_buffer(np.ascontiguousarray(array))
 
 
-def _to_numpy(column, chunked):
+def _to_numpy(column: Column, chunked: pa.ChunkedArray) -> np.ndarray:
     array = chunked.combine_chunks() if chunked.num_chunks != 1 else chunked.chunk(0)
     if column.type == "string":
         names = np.array(array.dictionary.to_pylist(), dtype=object)
@@ -271,5 +288,5 @@ def _to_numpy(column, chunked):
     return _values(array, column.type)
 
 
-def _values(array, dtype):
+def _values(array: pa.Array, dtype: str | type[np.generic]) -> np.ndarray:
     return np.frombuffer(array.buffers()[1], dtype)[array.offset : array.offset + len(array)]
