@@ -6,14 +6,22 @@ the load hangs on the tool. Derived here: a force that is moved by dr has the fu
 joints by J^T w.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import base_and_flange
+
+if TYPE_CHECKING:
+    from elastocal.effects.protocol import Candidate
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "application_point", "load"
 WORDS = "wrong load application point"
 _PARAMETERS = tuple(Parameter(f"shift_{axis}", "m", 0.02) for axis in "xyz")
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the shift can be fixed."""
     return base_and_flange(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.shift(wrench))

@@ -9,7 +9,16 @@ References
 .. [1] F. E. Richart, J. R. Hall and R. D. Woods, Vibrations of Soils and Foundations, Prentice-Hall, 1970.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "base_compliance", "elastic"
 WORDS = "elasticity of the foundation"
@@ -20,15 +29,15 @@ _PARAMETERS = (
 )
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates at the foot: all ways to give, and rocking alone, which is what most foundations do."""
     tx, ty, tz, rx, ry, _ = sites.base
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         load = conditions.total
         return [{tx: load[:, tx], ty: load[:, ty]}, {tz: load[:, tz]}, {rx: load[:, rx], ry: load[:, ry]}]
 
-    def rocking(conditions):
+    def rocking(conditions: Conditions) -> Displacements:
         return displacement(conditions)[2:]
 
     load = frozenset({"load"})

@@ -9,9 +9,18 @@ References
 .. [1] ISO 230-7, Test code for machine tools, part 7: Geometric accuracy of axes of rotation, 2015.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "bearing_runout", "transmission"
 WORDS = "bearing runout"
@@ -23,7 +32,7 @@ _SAMPLES_PER_PERIOD = 4
 _RUNOUT_M, _WOBBLE_RAD = 5e-5, 5e-5
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Three candidates a joint: radial, axial, and wobble."""
     return [
         *per_joint(sites, lambda joint: _candidate(sites, joint, "radial")),
@@ -32,7 +41,7 @@ def candidates(sites):
     ]
 
 
-def _candidate(sites, joint, motion):
+def _candidate(sites: Sites, joint: int, motion: str) -> Candidate:
     own = sites.joint_axes[joint]
     axes = (own,) if motion == "axial" else ((own + 1) % 3, (own + 2) % 3)
     unit, size = ("rad", _WOBBLE_RAD) if motion == "wobble" else ("m", _RUNOUT_M)
@@ -43,7 +52,7 @@ def _candidate(sites, joint, motion):
         for name, _ in _WAVES
     )
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         angle = conditions.joint_angles[:, joint]
         fixed = [_seen_behind(sites, joint, axis, angle) for axis in axes]
         return [
@@ -59,7 +68,7 @@ def _candidate(sites, joint, motion):
     )
 
 
-def _seen_behind(sites, joint, axis, angle):
+def _seen_behind(sites: Sites, joint: int, axis: int, angle: np.ndarray) -> np.ndarray:
     """Unit vector along an axis of the frame before a joint, in the frame that turns with it, ndarray (3, S)."""
     own, turned = sites.joint_axes[joint], sites.joint_signs[joint] * angle
     seen = np.zeros((3, len(angle)))
@@ -73,7 +82,7 @@ def _seen_behind(sites, joint, axis, angle):
     return seen
 
 
-def _at(sites, joint, motion, vector):
+def _at(sites: Sites, joint: int, motion: str, vector: np.ndarray) -> dict[int, np.ndarray]:
     """A shift or turn (3, S) just behind a joint, in the frame there, on coordinates: a link shifts as its far end does."""
     if motion == "wobble":
         return dict(zip(sites.tilt[joint], vector, strict=True))

@@ -1,15 +1,24 @@
 """All effects that are there: each module of this package that has a NAME."""
 
+from __future__ import annotations
+
 import pkgutil
 from functools import cache
 from importlib import import_module
+from typing import TYPE_CHECKING, cast
 
 import elastocal.effects
 from elastocal.errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from elastocal.effects.protocol import Candidate, Effect
+    from elastocal.mechanics.sites import Sites
+
 
 @cache
-def effects():
+def effects() -> dict[str, Effect]:
     """Modules of the catalogue by the name of their effect.
 
     Returns
@@ -18,10 +27,10 @@ def effects():
     """
     names = sorted(module.name for module in pkgutil.iter_modules(elastocal.effects.__path__))
     modules = [import_module(f"elastocal.effects.{name}") for name in names]
-    return {module.NAME: module for module in modules if hasattr(module, "NAME")}
+    return {module.NAME: cast("Effect", module) for module in modules if hasattr(module, "NAME")}
 
 
-def candidates_on(sites):
+def candidates_on(sites: Sites) -> dict[str, Candidate]:
     """Every way in which an effect of the catalogue can act on a robot.
 
     Parameters
@@ -37,7 +46,7 @@ def candidates_on(sites):
     return {candidate.key: candidate for candidate in found}
 
 
-def declared_candidates(names, sites, source="declared"):
+def declared_candidates(names: Iterable[str], sites: Sites, source: str = "declared") -> list[Candidate]:
     """All candidates of the effects that a campaign declares.
 
     Parameters

@@ -13,21 +13,30 @@ References
    parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects import compensator_torque
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "compensator_stiffness", "elastic"
 WORDS = "stiffness of the gravity compensator"
 _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad/(N m)", 2e-7 / order) for order in (1, 2) for wave in ("cos", "sin"))
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, where the robot file has a compensator."""
     joint = compensator_torque.turned_joint(sites)
     if joint is None:
         return []
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         torque = conditions.total[:, joint]
         return [{joint: torque * wave} for wave in compensator_torque.waves(conditions.joint_angles[:, joint])]
 

@@ -12,25 +12,34 @@ References
    parameters of heavy industrial robots, IEEE International Conference on Robotics and Automation, 2013.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "compensator_torque", "gravity"
 WORDS = "torque of the gravity compensator"
 _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order in (1, 2) for wave in ("cos", "sin"))
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates where the robot file has a compensator: with the crank's part, and as for a crank that is very short."""
     joint = turned_joint(sites)
     if joint is None:
         return []
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [{joint: wave} for wave in waves(conditions.joint_angles[:, joint])]
 
-    def first_order(conditions):
+    def first_order(conditions: Conditions) -> Displacements:
         return displacement(conditions)[:2]
 
     return [
@@ -39,13 +48,13 @@ def candidates(sites):
     ]
 
 
-def turned_joint(sites):
+def turned_joint(sites: Sites) -> int | None:
     """Joint on which the compensator acts, from 0; None where the robot file has none."""
     if sites.compensator is None or sites.prismatic[sites.compensator.joint - 1]:
         return None
     return sites.compensator.joint - 1
 
 
-def waves(angle):
+def waves(angle: np.ndarray) -> list[np.ndarray]:
     """Cosine and sine of an angle (S,) and of twice the angle, in the order of the parameters; list of ndarray (S,)."""
     return [wave(order * angle) for order in (1, 2) for wave in (np.cos, np.sin)]

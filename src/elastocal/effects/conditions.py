@@ -7,14 +7,40 @@ References
 .. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.mechanics.elastostatics import generalized_forces
 from elastocal.mechanics.motion import Motion, motion
 from elastocal.mechanics.sites import Sites
+
+if TYPE_CHECKING:
+    from typing import Protocol
+
+    class States(Protocol):
+        """Poses, loads and senses of approach as they were measured, see `Conditions`; arrays of S."""
+
+        @property
+        def pose(self) -> np.ndarray: ...
+        @property
+        def joint_angles(self) -> np.ndarray: ...
+        @property
+        def wrench(self) -> np.ndarray: ...
+        @property
+        def approach(self) -> np.ndarray | None: ...
+        @property
+        def time_s(self) -> np.ndarray | None: ...
+        @property
+        def temperature_c(self) -> np.ndarray | None: ...
+        @property
+        def row(self) -> np.ndarray | None: ...
+        def __len__(self) -> int: ...
+
 
 # For each mass that the robot file declares: of the mass itself, and of its first moments along the axes of its frame.
 MASS_PARAMETERS = 4
@@ -66,7 +92,7 @@ class Conditions:
     progress: np.ndarray | None = None
 
     @cached_property
-    def load(self):
+    def load(self) -> np.ndarray:
         """Generalized force of the external wrench on every coordinate of the sites (equation 7), ndarray (S, C).
 
         N on translations, N m on rotations.
@@ -75,7 +101,7 @@ class Conditions:
         return self.motion.generalized_forces(self.sites.followed[0].after, force, moment).T
 
     @cached_property
-    def gravity(self):
+    def gravity(self) -> np.ndarray:
         """Generalized force of the declared masses on every coordinate of the sites, ndarray (S, C)."""
         sites, corrections = self.sites, self.mass_corrections.reshape(-1, MASS_PARAMETERS)
         masses = np.array([mass.mass_kg for mass in sites.masses]) + corrections[:, 0]
@@ -89,12 +115,12 @@ class Conditions:
         return self.motion.by_coordinate(on_each).T
 
     @cached_property
-    def total(self):
+    def total(self) -> np.ndarray:
         """External load and weight of the declared masses on every coordinate of the sites, ndarray (S, C)."""
         return self.load + self.gravity if self.sites.masses else self.load
 
     @cached_property
-    def mass_torques(self):
+    def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
         found = []
         for number, mass in enumerate(self.sites.masses):
@@ -104,16 +130,16 @@ class Conditions:
         return np.array(found)
 
     @cached_property
-    def weight(self):
+    def weight(self) -> np.ndarray:
         """Torque on each joint of one kilogram at the far end of each link, ndarray (n + 1, S, n)."""
         ends = enumerate(self.sites.followed[1 : self.sites.joints + 2], 1)
         return np.array([self._weighing(end.after, self.motion.position[number]) for number, end in ends])
 
-    def weight_moment(self, link, axis):
+    def weight_moment(self, link: int, axis: int) -> np.ndarray:
         """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
         return self._weighing(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
 
-    def _weighing(self, after, first_moment, mass=1.0):
+    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
         """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
         moved = self.motion
         joints = slice(np.searchsorted(moved.coordinate, self.sites.joints))
@@ -122,36 +148,36 @@ class Conditions:
         return moved.by_coordinate(on_each * (moved.place[joints] < after)[:, None]).T
 
     @cached_property
-    def end_rotation(self):
+    def end_rotation(self) -> np.ndarray:
         """Orientation of the last measuring point, ndarray (S, 3, 3)."""
         return np.moveaxis(self.motion.rotation[0], -1, 0)
 
     @cached_property
-    def end_jacobian(self):
+    def end_jacobian(self) -> np.ndarray:
         """Of the last measuring point, with respect to the joints, ndarray (S, 6, n)."""
         end = self.sites.followed[0].after
         return np.moveaxis(self.motion.jacobian(end, self.motion.position[0])[:, : self.sites.joints], -1, 0)
 
-    def joint_deflections(self, wrench):
+    def joint_deflections(self, wrench: np.ndarray) -> np.ndarray:
         """Turn of each joint under another wrench at the last measuring point: c J^T w, ndarray (S, n)."""
         return generalized_forces(self.end_jacobian, wrench) * self.compliance
 
     @property
-    def _body_position(self):
+    def _body_position(self) -> np.ndarray:
         return self.motion.position[self.sites.joints + 2 : len(self.sites.followed)]
 
     @property
-    def _body_rotation(self):
+    def _body_rotation(self) -> np.ndarray:
         return self.motion.rotation[self.sites.joints + 2 : len(self.sites.followed)]
 
     @cached_property
-    def _behind(self):
+    def _behind(self) -> np.ndarray:
         """Whether each mass is behind each moving transform, ndarray (K, m)."""
         bodies = self.sites.followed[self.sites.joints + 2 :]
         return (self.motion.place[:, None] < [body.after for body in bodies]).astype(float)
 
     @cached_property
-    def _falling(self):
+    def _falling(self) -> tuple[np.ndarray, list[np.ndarray]]:
         """Generalized force of gravity on each moving transform by a kilogram behind it at the base's origin, and per metre.
 
         ndarrays (K, S) and (3, K, S): g . (v + a x r) = g . v + r . (g x a).
@@ -162,7 +188,7 @@ class Conditions:
         return sum(gravity[i] * twist[i] for i in range(3)), turning
 
 
-def progress_of(states, row_span=None):
+def progress_of(states: States, row_span: tuple[int, int] | None = None) -> np.ndarray:
     """How far a campaign had come in each state.
 
     Parameters
@@ -183,7 +209,15 @@ def progress_of(states, row_span=None):
     return (place - first) / max(last - first, 1)
 
 
-def conditions_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=None, row_span=None, coordinates=None):
+def conditions_of(
+    sites: Sites,
+    compliance: np.ndarray,
+    states: States,
+    time_zero_s: float = 0.0,
+    mass_corrections: np.ndarray | None = None,
+    row_span: tuple[int, int] | None = None,
+    coordinates: np.ndarray | None = None,
+) -> Conditions:
     """What effects may depend on, in some states.
 
     Parameters
@@ -222,13 +256,13 @@ def conditions_of(sites, compliance, states, time_zero_s=0.0, mass_corrections=N
     )
 
 
-def at_coordinates(conditions, coordinates):
+def at_coordinates(conditions: Conditions, coordinates: np.ndarray) -> Conditions:
     """The same states where the robot has yielded to other coordinates, ndarray (S, C)."""
     sites = conditions.sites
     return replace(conditions, motion=motion(sites.chain, coordinates, sites.followed))
 
 
-def at_states(conditions, chosen):
+def at_states(conditions: Conditions, chosen: slice | np.ndarray) -> Conditions:
     """Some of the states.
 
     Parameters
@@ -244,14 +278,23 @@ def at_states(conditions, chosen):
     some = replace(
         moved, position=moved.position[..., chosen], rotation=moved.rotation[..., chosen], twist=moved.twist[..., chosen]
     )
-    by_state = ("joint_angles", "wrench", "approach", "time_s", "temperature_c", "progress")
-    values = {name: getattr(conditions, name) for name in by_state}
+
+    def part(values: np.ndarray | None) -> np.ndarray | None:
+        return None if values is None else values[chosen]
+
     return replace(
-        conditions, motion=some, **{name: None if value is None else value[chosen] for name, value in values.items()}
+        conditions,
+        motion=some,
+        joint_angles=conditions.joint_angles[chosen],
+        wrench=conditions.wrench[chosen],
+        approach=part(conditions.approach),
+        time_s=part(conditions.time_s),
+        temperature_c=part(conditions.temperature_c),
+        progress=part(conditions.progress),
     )
 
 
-def with_springs(conditions, compliance, mass_corrections):
+def with_springs(conditions: Conditions, compliance: np.ndarray, mass_corrections: np.ndarray) -> Conditions:
     """The same states with other joint compliances (n,) and other errors of the declared masses (4 m,)."""
     same = np.array_equal(mass_corrections, conditions.mass_corrections)
     if same and np.array_equal(compliance, conditions.compliance):
@@ -264,7 +307,7 @@ def with_springs(conditions, compliance, mass_corrections):
     return changed
 
 
-def offered(sites, states):
+def offered(sites: Sites, states: States) -> frozenset[str]:
     """What is there that effects may need.
 
     Parameters

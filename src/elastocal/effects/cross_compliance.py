@@ -9,20 +9,28 @@ References
 .. [1] S. P. Timoshenko and J. N. Goodier, Theory of Elasticity, 3rd edition, McGraw-Hill, 1970.
 """
 
+from __future__ import annotations
+
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "cross_compliance", "elastic"
 WORDS = "elastic coupling"
 _PARAMETERS = (Parameter("compliance", "rad/(N m)", 2e-7),)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a pair of joints that turn."""
 
-    def of(one, other):
-        def displacement(conditions):
+    def of(one: int, other: int) -> Candidate:
+        def displacement(conditions: Conditions) -> Displacements:
             return [{one: conditions.total[:, other], other: conditions.total[:, one]}]
 
         return Candidate(NAME, FAMILY, (one + 1, other + 1), "", _PARAMETERS, displacement, frozenset({"load"}))

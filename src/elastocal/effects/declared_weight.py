@@ -5,9 +5,19 @@ mass and of its first moments m c, which are what statics can tell (Atkeson, An 
 centre with it, so that both errors are independent before the data speak.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.robot import Mass
+    from elastocal.mechanics.sites import Sites
 
 EFFECT = "declared_weight"
 # A centre of mass is uncertain by its share of the width of a link, too, which is about a tenth of the arm's length (KUKA
@@ -15,10 +25,10 @@ EFFECT = "declared_weight"
 _WIDTH_OF_LENGTH = 0.1
 
 
-def candidate(sites):
+def candidate(sites: Sites) -> Candidate:
     """Errors of all declared masses and first moments as one candidate, each with the prior of the robot file."""
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         torques = conditions.mass_torques * conditions.compliance
         return [{joint: of_joint for joint, of_joint in enumerate(columns.T) if of_joint.any()} for columns in torques]
 
@@ -27,7 +37,7 @@ def candidate(sites):
     return Candidate(EFFECT, "declared", (), "", parameters, displacement)
 
 
-def _parameters(mass, width):
+def _parameters(mass: Mass, width: float) -> tuple[Parameter, ...]:
     mass_std = mass.relative_std * mass.mass_kg
     moment_std = mass_std * max(float(np.linalg.norm(mass.centre_m)), width)
     return (

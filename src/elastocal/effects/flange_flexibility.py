@@ -10,7 +10,16 @@ References
    on Informatics in Control, Automation and Robotics, 2014.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "flange_flexibility", "elastic"
 WORDS = "flexibility of the flange"
@@ -19,14 +28,14 @@ _SHIFTS = tuple(Parameter(f"shift_{axis}", "m/N", 2e-8, sign=1) for axis in "xyz
 _TURNS = tuple(Parameter(f"turn_{axis}", "rad/(N m)", 2e-7, sign=1) for axis in "xyz")
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates at the last measuring point: all six directions, and turns alone, which is most of what a flange does."""
     coordinates = sites.link_end[-1]
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [{coordinate: conditions.load[:, coordinate]} for coordinate in coordinates]
 
-    def turning(conditions):
+    def turning(conditions: Conditions) -> Displacements:
         return displacement(conditions)[3:]
 
     load = frozenset({"load"})

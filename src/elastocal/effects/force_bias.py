@@ -6,14 +6,22 @@ recorded one (N), which is minus what the sensor shows at zero. It is fixed in b
 turns with the tool. Derived here: a wrench w loads the joints by J^T w, so that its error dw turns them by diag(c) J^T dw.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import at_flange_and_in_pull
+
+if TYPE_CHECKING:
+    from elastocal.effects.protocol import Candidate
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_bias", "load"
 WORDS = "zero error of the force sensor"
 _PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the sensor can sit."""
     return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.push(wrench))

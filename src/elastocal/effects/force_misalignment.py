@@ -9,14 +9,22 @@ wrong, too; elsewhere the moments are as recorded. Derived here: a small turn ad
 by J^T dw.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Parameter
 from elastocal.effects.wrench_errors import at_flange_and_in_pull
+
+if TYPE_CHECKING:
+    from elastocal.effects.protocol import Candidate
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_misalignment", "load"
 WORDS = "misalignment of the force sensor"
 _PARAMETERS = tuple(Parameter(f"about_{axis}", "rad", 0.02) for axis in "xyz")
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each frame in which the sensor can sit, at the flange and in the pull."""
     return at_flange_and_in_pull(NAME, FAMILY, _PARAMETERS, lambda axis, wrench: axis.turn(wrench))

@@ -6,17 +6,26 @@ of the wrench loads the joints by J^T (s w). Where all compliances are identifie
 exactly an alias of them, so that only a reference weight can find it.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_scale", "load"
 WORDS = "scale error of the force sensor"
 _PARAMETERS = (Parameter("scale", "1", 0.02),)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate."""
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]

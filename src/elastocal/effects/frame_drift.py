@@ -4,7 +4,16 @@ u = t (d, r) at the foot in base axes, with t the time since the first measureme
 moves by t (d + r x p). Derived here: to first order in time a slow rigid motion is its velocity times t.
 """
 
-from elastocal.effects.protocol import Candidate, Parameter
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.effects.protocol import Candidate, Parameter, needed
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "frame_drift", "drift"
 WORDS = "drift of the tracker or of the robot's foot"
@@ -15,11 +24,11 @@ _PARAMETERS = (
 _HOUR_S = 3600.0
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, at the foot."""
 
-    def displacement(conditions):
-        hours = conditions.time_s / _HOUR_S
+    def displacement(conditions: Conditions) -> Displacements:
+        hours = needed(conditions.time_s) / _HOUR_S
         return [{coordinate: hours} for coordinate in sites.base]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"time"}), of_setup=True)]

@@ -4,13 +4,20 @@ tau = F l + tau_w (N m), with F the weight of the rated payload, or 1 kN (N), l 
 that of a tool (m), and tau_w the torque of the declared masses (N m). Derived here: each force acts at its longest lever.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from elastocal.mechanics.sites import Sites
 
 # A pull at the end of the arm, at the least lever of a tool.
 _PULL_N, _LEAST_LEVER_M = 1e3, 0.5
 
 
-def lever_m(sites, joint):
+def lever_m(sites: Sites, joint: int) -> float:
     """Length of the arm beyond a joint, outstretched; at least that of a tool.
 
     Parameters
@@ -26,7 +33,7 @@ def lever_m(sites, joint):
     return max(float(np.linalg.norm(sites.link_vectors_m[joint + 1 :], axis=1).sum()), _LEAST_LEVER_M)
 
 
-def full_torque_Nm(sites, joint):  # noqa: N802 - units in names keep their case
+def full_torque_Nm(sites: Sites, joint: int) -> float:  # noqa: N802 - units in names keep their case
     """Torque of the rated payload, or of a kilonewton, at the end of the outstretched arm and of the weight of its links.
 
     By it laws of gears are scaled.

@@ -9,7 +9,16 @@ References
 .. [1] B. Armstrong-Hélouvry, Control of Machines with Friction, Kluwer, 1991.
 """
 
-from elastocal.effects.protocol import Candidate, Parameter, per_joint
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.effects.protocol import Candidate, Parameter, needed, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "hysteresis", "gearbox"
 WORDS = "hysteresis"
@@ -17,12 +26,12 @@ WORDS = "hysteresis"
 _TURN, _SHIFT = Parameter("half_width", "rad", 1e-4), Parameter("half_width", "m", 2e-5)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
-    def at(joint):
-        def displacement(conditions):
-            return [{joint: conditions.approach[:, joint]}]
+    def at(joint: int) -> Candidate:
+        def displacement(conditions: Conditions) -> Displacements:
+            return [{joint: needed(conditions.approach)[:, joint]}]
 
         parameter = _SHIFT if sites.prismatic[joint] else _TURN
         return Candidate(NAME, FAMILY, (joint + 1,), "", (parameter,), displacement, frozenset({"approach"}))

@@ -3,13 +3,22 @@
 No NAME, for it is no missing effect: the declared model has it where the compliances are to be identified.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
 
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
-def candidate(sites):
+
+def candidate(sites: Sites) -> Candidate:
     """Compliances of all joints as one candidate."""
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [{joint: conditions.total[:, joint]} for joint in range(sites.joints)]
 
     sizes = [("m/N", 1e-6) if prismatic else ("rad/(N m)", 1e-5) for prismatic in sites.prismatic]

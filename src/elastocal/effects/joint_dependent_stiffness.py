@@ -5,20 +5,29 @@ masses (N m), u and v in rad/(N m). Derived here: c_i(q_i) is periodic, and u an
 the mean, which is the compliance of the model.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_dependent_stiffness", "elastic"
 WORDS = "angle-dependent stiffness"
 _PARAMETERS = (Parameter("cos_q", "rad/(N m)", 2e-7), Parameter("sin_q", "rad/(N m)", 2e-7))
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
-    def at(joint):
-        def displacement(conditions):
+    def at(joint: int) -> Candidate:
+        def displacement(conditions: Conditions) -> Displacements:
             angle, torque = conditions.joint_angles[:, joint], conditions.total[:, joint]
             return [{joint: torque * np.cos(angle)}, {joint: torque * np.sin(angle)}]
 

@@ -8,20 +8,29 @@ References
 .. [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_offset", "geometry"
 WORDS = "zero offset"
 _TURN, _SHIFT = Parameter("offset", "rad", 1e-3), Parameter("offset", "m", 1e-3)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
-    def at(joint):
-        def displacement(conditions):
+    def at(joint: int) -> Candidate:
+        def displacement(conditions: Conditions) -> Displacements:
             return [{joint: np.ones(len(conditions.joint_angles))}]
 
         parameter = _SHIFT if sites.prismatic[joint] else _TURN

@@ -10,22 +10,31 @@ References
    deviation for industrial robots in milling applications, IEEE/ASME Conference on Advanced Intelligent Mechatronics, 2011.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_tilt", "elastic"
 WORDS = "bearing tilt"
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint, with one compliance for each axis across its own."""
 
-    def at(joint):
+    def at(joint: int) -> Candidate:
         # A carriage rolls about its own axis too, which is no joint's.
         across = [axis for axis in range(3) if sites.prismatic[joint] or axis != sites.joint_axes[joint]]
         parameters = tuple(Parameter(f"tilt_about_{'xyz'[axis]}", "rad/(N m)", 2e-7, sign=1) for axis in across)
         coordinates = [sites.tilt[joint][axis] for axis in across]
 
-        def displacement(conditions):
+        def displacement(conditions: Conditions) -> Displacements:
             return [{c: conditions.total[:, c]} for c in coordinates]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", parameters, displacement, frozenset({"load"}))

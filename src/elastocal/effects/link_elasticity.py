@@ -12,9 +12,18 @@ References
 .. [1] S. P. Timoshenko and J. M. Gere, Mechanics of Materials, Van Nostrand Reinhold, 1972.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, Shape
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_elasticity", "elastic"
 WORDS = "elastic bending and torsion"
@@ -28,7 +37,7 @@ _TAPER = Shape("taper", "1", 0.3, 0.0, 0.6, tried=1)
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a link with a length, named by the joint before it; the column; and all links with one section.
 
     One section is what a robot of like tubes has: two parameters for the whole arm, where a candidate a link has two each.
@@ -38,9 +47,10 @@ def candidates(sites):
     return [*each, _candidate(sites, tuple(long), "one section")] if len(long) > 1 else each
 
 
-def _candidate(sites, links, detail):
-    def displacement(conditions, taper):
-        bent, twisted = {}, {}
+def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
+    def displacement(conditions: Conditions, taper: float) -> Displacements:
+        bent: dict[int, np.ndarray] = {}
+        twisted: dict[int, np.ndarray] = {}
         for link in links:
             bending, torsion = _deflection(sites, link, conditions.total, taper)
             bent |= bending
@@ -53,7 +63,7 @@ def _candidate(sites, links, detail):
     )
 
 
-def _deflection(sites, link, load, taper):
+def _deflection(sites: Sites, link: int, load: np.ndarray, taper: float) -> tuple[dict[int, np.ndarray], dict[int, np.ndarray]]:
     """Displacement of the far end of a link for a unit of 1/EI and of 1/GJ."""
     shift_by_force, by_either, turn_by_moment = _flexibilities(taper)
     coordinates = sites.link_end[link]
@@ -70,7 +80,7 @@ def _deflection(sites, link, load, taper):
     )
 
 
-def _flexibilities(taper):
+def _flexibilities(taper: float) -> list[float]:
     """a, b and c of a link whose diameter falls by a share."""
     places = 0.5 * (1.0 + _NODES)
     softer = 0.5 * _WEIGHTS / (1.0 - taper * places) ** 3

@@ -9,9 +9,18 @@ References
 .. [1] W. Khalil and E. Dombre, Modeling, Identification and Control of Robots, Hermes Penton, 2002.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_geometry", "geometry"
 WORDS = "geometric error"
@@ -21,11 +30,11 @@ _PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(
 )
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a link behind a joint, named by that joint; the column before joint 1 belongs to the base."""
 
-    def at(joint):
-        def displacement(conditions):
+    def at(joint: int) -> Candidate:
+        def displacement(conditions: Conditions) -> Displacements:
             ones = np.ones(len(conditions.joint_angles))
             return [{coordinate: ones} for coordinate in sites.link_end[joint + 1]]
 

@@ -12,7 +12,20 @@ References
    International Journal of Robotics Research 5, 1986.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    import numpy as np
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_weight", "gravity"
 WORDS = "gravity sag"
@@ -26,7 +39,7 @@ _LINK_OVER_RATED, _LINK_KG, _OFF_M = 1.5, 200.0, 0.2
 _OF_THE_ARM = "arm"
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Three candidates for the arm and two a joint that weight can turn: of the next two links behind it that have a length.
 
     Masses at their far ends; and the same with the first moments across the links, where these can turn the joint. Of the arm
@@ -38,7 +51,7 @@ def candidates(sites):
     return [*_of_the_arm(sites, joints), *_of_joints(sites, joints)]
 
 
-def _of_the_arm(sites, joints):
+def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
     """Of the links behind the first joint that weight can turn, by which they turn all others too."""
     if not joints:
         return
@@ -47,11 +60,11 @@ def _of_the_arm(sites, joints):
     across = _across(sites, some, range(sites.joints))
     mass = _LINK_KG if sites.payload_kg is None else _LINK_OVER_RATED * sites.payload_kg
 
-    def candidate(detail, links, axes):
+    def candidate(detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
         parameters = [Parameter(f"mass_at_end_of_link_{k}", "kg", mass) for k in links]
         parameters += [Parameter(f"moment_{'xyz'[axis]}_of_link_{k}", "kg m", _OFF_M * mass) for k, axis in axes]
 
-        def displacement(conditions):
+        def displacement(conditions: Conditions) -> Displacements:
             torques = _torques(conditions, links, axes)
             return [dict(enumerate((torque * conditions.compliance).T)) for torque in torques]
 
@@ -67,13 +80,13 @@ def _of_the_arm(sites, joints):
         yield candidate(_ALL_LINKS, carried, _across(sites, carried, range(sites.joints)))
 
 
-def _of_joints(sites, joints):
-    def candidate(joint, detail, links, axes):
+def _of_joints(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
+    def candidate(joint: int, detail: str, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> Candidate:
         parameters = [Parameter(f"compliance_times_mass_at_end_of_link_{k}", "rad kg/(N m)", _PRODUCT) for k in links]
         names = (f"compliance_times_moment_{'xyz'[axis]}_of_link_{k}" for k, axis in axes)
         parameters += [Parameter(name, "rad kg m/(N m)", _MOMENT) for name in names]
 
-        def displacement(conditions):
+        def displacement(conditions: Conditions) -> Displacements:
             return [{joint: torque[:, joint]} for torque in _torques(conditions, links, axes)]
 
         return Candidate(NAME, FAMILY, (joint + 1,), detail, tuple(parameters), displacement)
@@ -84,11 +97,11 @@ def _of_joints(sites, joints):
     yield from (candidate(joint, _OFF_THE_LINE, carried[joint], axes) for joint, axes in across.items() if axes)
 
 
-def _across(sites, links, turned):
+def _across(sites: Sites, links: Sequence[int], turned: Sequence[int]) -> list[tuple[int, int]]:
     """Links, and their axes across them along which a first moment can turn some joints."""
     axes = [(k, axis) for k in links for axis in sites.transverse_axes(k)]
     return [pair for pair in axes if any(sites.moment_turns(*pair, joint) for joint in turned)]
 
 
-def _torques(conditions, links, axes):
+def _torques(conditions: Conditions, links: Sequence[int], axes: Sequence[tuple[int, int]]) -> list[np.ndarray]:
     return [*(conditions.weight[k] for k in links), *(conditions.weight_moment(k, axis) for k, axis in axes)]

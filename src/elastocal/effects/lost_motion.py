@@ -9,10 +9,19 @@ References
 .. [1] Nabtesco, Precision Reduction Gear RV, catalogue, glossary: lost motion, the torsion angle at 3 % of the rated torque.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.full_load import full_torque_Nm
 from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "lost_motion", "gearbox"
 WORDS = "lost motion (backlash)"
@@ -21,14 +30,14 @@ _PARAMETERS = (Parameter("half_play", "rad", 1e-4, sign=1),)
 _START, _LOWEST, _HIGHEST = 0.03, 0.003, 0.1
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint."""
 
-    def at(joint):
+    def at(joint: int) -> Candidate:
         full = full_torque_Nm(sites, joint)
         taken_up = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
-        def displacement(conditions, torque):
+        def displacement(conditions: Conditions, torque: float) -> Displacements:
             return [{joint: np.tanh(conditions.total[:, joint] / torque)}]
 
         return Candidate(NAME, FAMILY, (joint + 1,), "", _PARAMETERS, displacement, frozenset({"load"}), (taken_up,))

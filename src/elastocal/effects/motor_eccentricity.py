@@ -10,9 +10,18 @@ References
    Artificial Intelligence Laboratory, 1992.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "motor_eccentricity", "transmission"
 WORDS = "motor eccentricity"
@@ -23,19 +32,19 @@ _AMPLITUDE_RAD = 5e-5
 _DISTINCT_ANGLES = 12
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate for each joint whose gear ratio is known."""
     ratios = sites.gear_ratio or (None,) * sites.joints
-    turning = [joint for joint in range(sites.joints) if ratios[joint] is not None and not sites.prismatic[joint]]
-    return [_candidate(joint, ratios[joint]) for joint in turning]
+    geared = zip(ratios, sites.prismatic, strict=True)
+    return [_candidate(joint, ratio) for joint, (ratio, prismatic) in enumerate(geared) if ratio is not None and not prismatic]
 
 
-def _candidate(joint, ratio):
+def _candidate(joint: int, ratio: float) -> Candidate:
     parameters = tuple(
         Parameter(f"{wave}_{order}_motor", "rad", _AMPLITUDE_RAD) for order in _ORDERS for wave in ("cos", "sin")
     )
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         angle = ratio * conditions.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in _ORDERS for wave in (np.cos, np.sin)]
 

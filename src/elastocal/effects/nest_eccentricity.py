@@ -12,9 +12,18 @@ References
    Engineering 44, 2016.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "nest_eccentricity", "geometry"
 WORDS = "eccentric nest of the reflector"
@@ -22,7 +31,7 @@ _SIZE_M = 5e-5
 _ORDER, _SAMPLES_PER_PERIOD = 2, 4
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, where the last joint turns."""
     last = sites.joints - 1
     if sites.prismatic[last]:
@@ -32,7 +41,7 @@ def candidates(sites):
         Parameter(f"{wave}_{'xyz'[axis]}_{_ORDER}q", "m", _SIZE_M, _SIZE_M) for axis in across for wave in ("cos", "sin")
     )
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         angle = _ORDER * conditions.joint_angles[:, last]
         turned = sites.link_rotations[last + 1].T
         return [

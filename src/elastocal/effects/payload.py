@@ -10,9 +10,18 @@ References
    International Journal of Robotics Research 5, 1986.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "payload", "gravity"
 WORDS = "weight of an undeclared payload"
@@ -21,7 +30,7 @@ WORDS = "weight of an undeclared payload"
 _SHARE_OF_RATED, _RATED_OVER_MASS, _LEVER_M, _USUAL_KG = 0.15, 1 / 6, 0.2, 10.0
 
 
-def displacement(conditions):
+def displacement(conditions: Conditions) -> Displacements:
     """Joint deflections per kilogram at the end-effector, and per kilogram metre along its axes."""
     gravity = np.array(conditions.sites.gravity_m_s2)
     levers = [np.zeros_like(conditions.wrench[:, :3]), *np.moveaxis(conditions.end_rotation, -1, 0)]
@@ -33,10 +42,10 @@ def displacement(conditions):
     return columns
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates at the flange: a tool, and a mass alone, which is most of what a tool does."""
 
-    def mass(conditions):
+    def mass(conditions: Conditions) -> Displacements:
         return displacement(conditions)[:1]
 
     plausible = _plausible_kg(sites)
@@ -50,7 +59,7 @@ def candidates(sites):
     ]
 
 
-def _plausible_kg(sites):
+def _plausible_kg(sites: Sites) -> float:
     if sites.payload_kg is not None:
         return _SHARE_OF_RATED * sites.payload_kg
     total = sum(mass.mass_kg for mass in sites.masses)

@@ -11,10 +11,24 @@ An effect is a module of this package with
 Nothing else knows the effects by name: a new module is a new effect.
 """
 
-from collections.abc import Callable
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from typing import Concatenate
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.mechanics.sites import Sites
+
+    # For each parameter, by coordinate of the sites, the displacement per unit of the parameter, ndarray (S,).
+    Displacements = list[dict[int, np.ndarray]]
+    # From the conditions and a value of each of the shapes.
+    Law = Callable[Concatenate[Conditions, ...], Displacements]
 
 
 @dataclass(frozen=True)
@@ -75,7 +89,7 @@ class Shape:
     highest: float
     tried: int = 0
 
-    def values(self, few):
+    def values(self, few: int) -> np.ndarray:
         """Values for a search to start from, ndarray: those that must be tried, or a few in geometric series in the range."""
         if self.tried == 1:
             return np.array([self.start])
@@ -83,11 +97,11 @@ class Shape:
             return np.linspace(self.lowest, self.highest, self.tried)
         return np.geomspace(self.lowest, self.highest, few + 2)[1:-1]
 
-    def between(self, below, above, count):
+    def between(self, below: float, above: float, count: int) -> np.ndarray:
         """Values inside of an interval, evenly spaced as those that a search tries, ndarray (count,)."""
         return (np.linspace if self.tried else np.geomspace)(below, above, count + 2)[1:-1]
 
-    def shares(self, values):
+    def shares(self, values: Sequence[float] | np.ndarray) -> np.ndarray:
         """How much of the range each of some values stands for: the part nearest to it (Voronoi cell), ndarray of sum one."""
         scale = (lambda value: value) if self.tried else np.log
         places = scale(np.asarray(values, float))
@@ -133,35 +147,63 @@ class Candidate:
 
     effect: str
     family: str
-    joints: tuple
+    joints: tuple[int, ...]
     detail: str
-    parameters: tuple
-    displacement: Callable
-    needs: frozenset = frozenset()
-    shapes: tuple = ()
+    parameters: tuple[Parameter, ...]
+    displacement: Law
+    needs: frozenset[str] = frozenset()
+    shapes: tuple[Shape, ...] = ()
     distinct_angles: int = 0
     location_name: str = ""
     of_setup: bool = False
-    turning: tuple = ()
+    turning: tuple[int, ...] = ()
 
     @property
-    def location(self):
+    def location(self) -> tuple[int | str, ...]:
         """Where the effect acts: its joints, with the name of the location where they do not tell it."""
         return (*self.joints, self.location_name) if self.location_name else self.joints
 
     @property
-    def key(self):
+    def key(self) -> str:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
         where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
         return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
 
 
-def effect_of(key):
+class Effect(Protocol):
+    """A module of this package that is an effect, with what each of them has."""
+
+    NAME: str
+    FAMILY: str
+    WORDS: str
+
+    def candidates(self, sites: Sites) -> list[Candidate]:
+        """Where on this robot the effect can act."""
+        ...
+
+
+def needed(values: np.ndarray | None) -> np.ndarray:
+    """What states need not have, for a law whose candidate names it among its needs.
+
+    Parameters
+    ----------
+    values : ndarray (S,) or (S, n)
+
+    Returns
+    -------
+    ndarray (S,) or (S, n)
+        The same.
+    """
+    assert values is not None
+    return values
+
+
+def effect_of(key: str) -> str:
     """Name of the effect in the key of a candidate."""
     return key.split("@")[0].split("[")[0]
 
 
-def per_joint(sites, make, prismatic=False):
+def per_joint(sites: Sites, make: Callable[[int], Candidate], prismatic: bool = False) -> list[Candidate]:
     """Candidates of an effect that acts on one joint at a time: ``make(joint index from 0)`` for each.
 
     Parameters

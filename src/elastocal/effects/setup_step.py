@@ -6,7 +6,16 @@ stand in the order in which they were read, and where the rows are not known the
 a small rigid motion times a unit step.
 """
 
-from elastocal.effects.protocol import Candidate, Parameter, Shape
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.effects.protocol import Candidate, Parameter, Shape, needed
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "setup_step", "drift"
 WORDS = "shift of the set-up between rows"
@@ -19,11 +28,11 @@ _PARAMETERS = (
 _WHEN = Shape("when", "1", 0.5, 1 / 12, 11 / 12, tried=11)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate, at the foot."""
 
-    def displacement(conditions, when):
-        after = (conditions.progress >= when).astype(float)
+    def displacement(conditions: Conditions, when: float) -> Displacements:
+        after = (needed(conditions.progress) >= when).astype(float)
         return [{coordinate: after} for coordinate in sites.base]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, shapes=(_WHEN,), of_setup=True)]

@@ -13,10 +13,21 @@ References
    Artificial Intelligence Laboratory, 1992.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.full_load import full_torque_Nm, lever_m
 from elastocal.effects.protocol import Candidate, Parameter, Shape, per_joint
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "stiffening", "gearbox"
 WORDS = "gear stiffening"
@@ -24,25 +35,27 @@ WORDS = "gear stiffening"
 _MOVED_M = 5e-3
 # Of the full torque. Slopes that meet at less are those of play; where both laws reach, either may be meant.
 _START, _LOWEST, _HIGHEST = 0.3, 0.05, 0.8
-_LAWS = {
+_LAWS: dict[str, Callable[[np.ndarray, float], np.ndarray]] = {
     "": lambda load, torque: torque * np.tanh(load / torque),
     "two slopes": lambda load, torque: np.clip(load, -torque, torque),
 }
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Two candidates a joint: smooth, and with two slopes. Small gears carry less torque and may bend more by it."""
-    return [
-        each for detail in _LAWS for each in per_joint(sites, lambda joint, detail=detail: _candidate(sites, joint, detail))
-    ]
+
+    def by_law(detail: str) -> list[Candidate]:
+        return per_joint(sites, lambda joint: _candidate(sites, joint, detail))
+
+    return [each for detail in _LAWS for each in by_law(detail)]
 
 
-def _candidate(sites, joint, detail):
+def _candidate(sites: Sites, joint: int, detail: str) -> Candidate:
     full, as_at_rest = full_torque_Nm(sites, joint), _LAWS[detail]
     beyond = Parameter("beyond", "rad/(N m)", _MOVED_M / lever_m(sites, joint) / full, sign=-1)
     meeting = Shape("torque", "N m", _START * full, _LOWEST * full, _HIGHEST * full)
 
-    def displacement(conditions, torque):
+    def displacement(conditions: Conditions, torque: float) -> Displacements:
         load = conditions.total[:, joint]
         return [{joint: load - as_at_rest(load, torque)}]
 

@@ -11,10 +11,19 @@ References
 .. [1] B. A. Boley and J. H. Weiner, Theory of Thermal Stresses, Wiley, 1960.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.effects.warmth import by_warmth
+
+if TYPE_CHECKING:
+    from elastocal.effects.protocol import Displacements, Shape
+    from elastocal.effects.warmth import Rise
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "temperature_gradient", "drift"
 WORDS = "temperature gradient"
@@ -33,7 +42,7 @@ _PLAUSIBLE = {"temperature": ("1/(K m)", 2e-5), "time": ("1/m", 1.5e-4)}
 _SHORTEST_M = 0.05
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """Across each link with a length, named by the joint before it, and the column; and along the arm; by each cause."""
     lengths = np.linalg.norm(sites.link_vectors_m, axis=1)
     across = [k for k in range(sites.joints + 1) if lengths[k] > _SHORTEST_M]
@@ -41,20 +50,20 @@ def candidates(sites):
     return [*bending, *_along(sites, lengths)]
 
 
-def _across(sites, link):
+def _across(sites: Sites, link: int) -> list[Candidate]:
     coordinates, vector = sites.link_end[link], sites.link_vectors_m[link]
     length = np.linalg.norm(vector)
     # About the two axes least along the link, made square to it.
     about = [np.eye(3)[axis] - vector[axis] * vector / length**2 for axis in sites.transverse_axes(link)]
     names = [f"curvature_about_{'xyz'[axis]}" for axis in sites.transverse_axes(link)]
 
-    def bent(warmer):
+    def bent(warmer: np.ndarray) -> Displacements:
         # A turn about e by s / l carries the end of a beam along x by e cross x over half its length.
         shifts = [np.cross(e, vector) * length / 2 for e in about]
         ends = [np.concatenate([shift, length * e]) for shift, e in zip(shifts, about, strict=True)]
         return [{c: warmer * part for c, part in zip(coordinates, end, strict=True) if part} for end in ends]
 
-    def candidate_of(cause, rise, needs, shapes):
+    def candidate_of(cause: str, rise: Rise, needs: frozenset[str], shapes: tuple[Shape, ...]) -> Candidate:
         unit, plausible = _PLAUSIBLE[cause]
         parameters = tuple(Parameter(name, unit, plausible) for name in names)
         where = cause if link else f"column {cause}"
@@ -67,11 +76,11 @@ def _across(sites, link):
     return by_warmth(candidate_of)
 
 
-def _along(sites, lengths):
+def _along(sites: Sites, lengths: np.ndarray) -> list[Candidate]:
     middle = np.cumsum(lengths) - lengths / 2
     further = middle - middle @ lengths / lengths.sum()
 
-    def grown(warmer):
+    def grown(warmer: np.ndarray) -> dict[int, np.ndarray]:
         return {
             coordinate: warmer * along * distance
             for ends, vector, distance in zip(sites.link_end, sites.link_vectors_m, further, strict=True)
@@ -79,7 +88,7 @@ def _along(sites, lengths):
             if along
         }
 
-    def candidate_of(cause, rise, needs, shapes):
+    def candidate_of(cause: str, rise: Rise, needs: frozenset[str], shapes: tuple[Shape, ...]) -> Candidate:
         unit, plausible = _PLAUSIBLE[cause]
         law = lambda conditions, *values: [grown(rise(conditions, *values))]  # noqa: E731
         growth = (Parameter("growth_along", unit, plausible),)

@@ -10,8 +10,20 @@ References
 .. [2] F. P. Incropera and D. P. DeWitt, Fundamentals of Heat and Mass Transfer, Wiley, 2002.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.effects.warmth import by_warmth
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements, Shape
+    from elastocal.effects.warmth import Rise
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "thermal_growth", "drift"
 WORDS = "thermal growth of the links"
@@ -21,11 +33,11 @@ _PARAMETERS = {
 }
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate by temperature and one by time."""
 
-    def candidate_of(cause, rise, needs, shapes):
-        def displacement(conditions, *values):
+    def candidate_of(cause: str, rise: Rise, needs: frozenset[str], shapes: tuple[Shape, ...]) -> Candidate:
+        def displacement(conditions: Conditions, *values: float) -> Displacements:
             return [longer(sites, rise(conditions, *values))]
 
         return Candidate(NAME, FAMILY, (), cause, (_PARAMETERS[cause],), displacement, needs, shapes)
@@ -33,7 +45,7 @@ def candidates(sites):
     return by_warmth(candidate_of)
 
 
-def longer(sites, share):
+def longer(sites: Sites, share: np.ndarray) -> dict[int, np.ndarray]:
     """Displacement by which the column and every link are longer by a share (S,), as a dict by coordinate."""
     return {
         coordinate: share * along

@@ -10,10 +10,19 @@ References
    Engineering 44, 2016.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
 from elastocal.effects.thermal_growth import longer
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "tracker_scale", "geometry"
 WORDS = "scale error of the tracker"
@@ -21,10 +30,10 @@ WORDS = "scale error of the tracker"
 _PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate."""
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [longer(sites, np.ones(len(conditions.joint_angles)))]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]

@@ -9,9 +9,18 @@ References
 .. [1] J. D. Smith, Gear Noise and Vibration, 2nd edition, Marcel Dekker, 2003.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_harmonic", "transmission"
 WORDS = "gear transmission error"
@@ -22,12 +31,12 @@ _SAMPLES_PER_PERIOD = 4
 _AMPLITUDE_RAD = 2e-4
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint and band of orders."""
     return [_candidate(joint, low, high) for joint in range(sites.joints) if not sites.prismatic[joint] for low, high in _BANDS]
 
 
-def _candidate(joint, low, high):
+def _candidate(joint: int, low: int, high: int) -> Candidate:
     orders = range(low, high + 1)
     parameters = tuple(
         Parameter(f"{wave}_{order}q", "rad", _AMPLITUDE_RAD, _AMPLITUDE_RAD, order=order)
@@ -35,7 +44,7 @@ def _candidate(joint, low, high):
         for wave in ("cos", "sin")
     )
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         angle = conditions.joint_angles[:, joint]
         return [{joint: wave(order * angle)} for order in orders for wave in (np.cos, np.sin)]
 

@@ -10,9 +10,18 @@ References
 .. [1] H. W. Müller, Epicyclic Drive Trains, Wayne State University Press, 1982.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.effects.protocol import Candidate, Parameter, Shape
+
+if TYPE_CHECKING:
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_order", "transmission"
 WORDS = "non-integer gear transmission error"
@@ -23,17 +32,17 @@ _SAMPLES_PER_PERIOD = 4
 _AMPLITUDE_RAD = 2e-4
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint and interval between two integers."""
     revolute = [joint for joint in range(sites.joints) if not sites.prismatic[joint]]
     return [_candidate(joint, above) for joint in revolute for above in range(1, _HIGHEST)]
 
 
-def _candidate(joint, above):
+def _candidate(joint: int, above: int) -> Candidate:
     order = Shape("order", "1", above + 0.5, above + _MARGIN, above + 1 - _MARGIN, tried=1)
     parameters = tuple(Parameter(f"{wave}_kq", "rad", _AMPLITUDE_RAD, order=above + 1) for wave in ("cos", "sin"))
 
-    def displacement(conditions, order):
+    def displacement(conditions: Conditions, order: float) -> Displacements:
         angle = order * conditions.joint_angles[:, joint]
         return [{joint: np.cos(angle)}, {joint: np.sin(angle)}]
 

@@ -6,14 +6,25 @@ the angle and not periodic. Derived here: a motor turns by N_i q_i + N_ih q_h, s
 follow the first wrist joint: as an alternative theta_i = e_ih q_h alone, with h that joint.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.effects.protocol import Candidate, Parameter
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements
+    from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_ratio", "transmission"
 WORDS = "gear ratio or coupling error"
 _WRIST = 3
 
 
-def candidates(sites):
+def candidates(sites: Sites) -> list[Candidate]:
     """One candidate a joint, and each of the last two joints as driven through the first of the wrist alone."""
     n, first = sites.joints, sites.joints - _WRIST
     own = [_candidate(sites, joint, [joint, joint - 1][: joint + 1], "") for joint in range(n)]
@@ -21,13 +32,13 @@ def candidates(sites):
     return [*own, *(_candidate(sites, joint, [first], f"from {first + 1}") for joint in through)]
 
 
-def _candidate(sites, joint, sources, detail):
+def _candidate(sites: Sites, joint: int, sources: Sequence[int], detail: str) -> Candidate:
     # A spindle has a pitch of its own, but is not coupled to what turns.
     alike = [source for source in sources if sites.prismatic[source] == sites.prismatic[joint]]
     unit = "m/m" if sites.prismatic[joint] else "rad/rad"
     parameters = tuple(Parameter(f"per_q{source + 1}", unit, 1e-3) for source in alike)
 
-    def displacement(conditions):
+    def displacement(conditions: Conditions) -> Displacements:
         return [{joint: conditions.joint_angles[:, source]} for source in alike]
 
     return Candidate(NAME, FAMILY, (joint + 1,), detail, parameters, displacement)

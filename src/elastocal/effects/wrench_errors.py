@@ -8,11 +8,20 @@ References
 .. [1] B. Siciliano, L. Sciavicco, L. Villani and G. Oriolo, Robotics: Modelling, Planning and Control, Springer, 2009.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.effects.protocol import Candidate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Displacements, Parameter
 
 
 @dataclass(frozen=True)
@@ -21,15 +30,15 @@ class Axis:
 
     direction: np.ndarray
 
-    def turn(self, wrench):
+    def turn(self, wrench: np.ndarray) -> np.ndarray:
         """Change of a wrench (S, 6) when its force is turned by one radian about the axis."""
         return _wrench(np.cross(self.direction, wrench[:, :3]), 0.0)
 
-    def push(self, wrench):
+    def push(self, wrench: np.ndarray) -> np.ndarray:
         """A force of 1 N along the axis wherever there is a load."""
-        return _wrench(self.direction * wrench.any(axis=1)[:, None], 0.0)
+        return _wrench(self.direction * wrench.any(axis=1, keepdims=True), 0.0)
 
-    def shift(self, wrench):
+    def shift(self, wrench: np.ndarray) -> np.ndarray:
         """Change of a wrench when its force acts one metre further along the axis."""
         return _wrench(0.0, np.cross(self.direction, wrench[:, :3]))
 
@@ -38,7 +47,9 @@ class Axis:
 _OF_ONE_PLACE = 0.01
 
 
-def at_flange_and_in_pull(name, family, parameters, change):
+def at_flange_and_in_pull(
+    name: str, family: str, parameters: tuple[Parameter, ...], change: Callable[[Axis, np.ndarray], np.ndarray]
+) -> list[Candidate]:
     """Candidates for an error of the force, with the moments right, or with those that the wrong force makes at its lever.
 
     Between flange and tool a sensor measures forces and moments; in the line of a pull, the force alone.
@@ -53,7 +64,7 @@ def at_flange_and_in_pull(name, family, parameters, change):
     list of Candidate
     """
 
-    def in_pull(conditions, axes):
+    def in_pull(conditions: Conditions, axes: Sequence[Axis]) -> list[np.ndarray]:
         wrench = conditions.wrench
         lever = lever_of_pull(wrench, conditions.end_rotation)
         forces = [change(axis, wrench)[:, :3] for axis in axes]
@@ -65,7 +76,7 @@ def at_flange_and_in_pull(name, family, parameters, change):
     ]
 
 
-def lever_of_pull(wrench, rotation):
+def lever_of_pull(wrench: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     """Where a pull acts: the one place, in the flange or in base axes, about which forces make the moments (least squares).
 
     Parameters
@@ -90,7 +101,9 @@ def lever_of_pull(wrench, rotation):
     return np.zeros((len(wrench), 3))
 
 
-def base_and_flange(name, family, parameters, change):
+def base_and_flange(
+    name: str, family: str, parameters: tuple[Parameter, ...], change: Callable[[Axis, np.ndarray], np.ndarray]
+) -> list[Candidate]:
     """Candidates for an error of the load that is fixed in base axes or turns with the flange.
 
     Parameters
@@ -106,23 +119,29 @@ def base_and_flange(name, family, parameters, change):
     list of Candidate
     """
 
-    def changes(conditions, axes):
+    def changes(conditions: Conditions, axes: Sequence[Axis]) -> list[np.ndarray]:
         return [change(axis, conditions.wrench) for axis in axes]
 
     return _in_both_frames(name, family, parameters, changes, "")
 
 
-def _in_both_frames(name, family, parameters, changes, how):
+def _in_both_frames(
+    name: str,
+    family: str,
+    parameters: tuple[Parameter, ...],
+    changes: Callable[[Conditions, Sequence[Axis]], list[np.ndarray]],
+    how: str,
+) -> list[Candidate]:
     """Candidates whose wrench changes by each of ``changes(conditions, axes)``; `how` follows the axes in their names."""
 
-    def in_base(conditions):
+    def in_base(conditions: Conditions) -> Displacements:
         axes = [np.broadcast_to(axis, conditions.wrench[:, :3].shape) for axis in np.eye(3)]
         return _deflections(conditions, axes)
 
-    def in_flange(conditions):
+    def in_flange(conditions: Conditions) -> Displacements:
         return _deflections(conditions, np.moveaxis(conditions.end_rotation, -1, 0))
 
-    def _deflections(conditions, axes):
+    def _deflections(conditions: Conditions, axes: Iterable[np.ndarray]) -> Displacements:
         changed = changes(conditions, [Axis(axis) for axis in axes])
         turned = [conditions.joint_deflections(wrench) for wrench in changed]
         return [dict(enumerate(angles.T)) for angles in turned]
@@ -133,6 +152,6 @@ def _in_both_frames(name, family, parameters, changes, how):
     ]
 
 
-def _wrench(force, moment):
+def _wrench(force: np.ndarray | float, moment: np.ndarray | float) -> np.ndarray:
     shape = np.shape(force) or np.shape(moment)
     return np.concatenate([np.broadcast_to(force, shape), np.broadcast_to(moment, shape)], axis=1)
