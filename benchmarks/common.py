@@ -1,12 +1,15 @@
 """What the benchmarks share: a row of the report, interleaved timing, and the robots and strategies of the repository."""
 
 import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from elastocal.io.documents import read_document
+from elastocal.mechanics.robot import Robot
 from elastocal.mechanics.robot_file import robot_from_document
-from elastocal.study.strategies import strategy_from_document
+from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -38,7 +41,7 @@ class Row:
     how: str
 
 
-def interleaved(functions, repetitions):
+def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) -> list[list[float]]:
     """Seconds of several functions, called in turn so that a busy spell of the machine hits all of them.
 
     Parameters
@@ -52,7 +55,7 @@ def interleaved(functions, repetitions):
     list of list of float
         For each function its seconds, one for each repetition.
     """
-    seconds = [[] for _ in functions]
+    seconds: list[list[float]] = [[] for _ in functions]
     for repetition in range(1, repetitions + 1):
         for taken, function in zip(seconds, functions.values(), strict=True):
             start = time.perf_counter()
@@ -63,12 +66,12 @@ def interleaved(functions, repetitions):
     return seconds
 
 
-def load_robot(name):
+def load_robot(name: str) -> Robot:
     """Robot of config/robots."""
     path = ROOT / "config" / "robots" / f"{name}.yaml"
     return robot_from_document(read_document(path), path.name)
 
 
-def load_strategy(name):
+def load_strategy(name: str) -> Strategy:
     """Strategy of config/strategies."""
     return strategy_from_document(read_document(ROOT / "config" / "strategies" / f"{name}.yaml"))

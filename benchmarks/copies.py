@@ -6,13 +6,14 @@ import shutil
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 from common import ROOT
 
 SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src")
 
 
-def copy_study(folder):
+def copy_study(folder: Path) -> Path:
     """Copy the sources of the study, without anything that it has made.
 
     Parameters
@@ -34,7 +35,7 @@ def copy_study(folder):
     return folder
 
 
-def reduce_to_touching(folder):
+def reduce_to_touching(folder: Path) -> None:
     """Rewrite the scripts of a copy: they import what they import and touch their outputs.
 
     Parameters
@@ -51,7 +52,7 @@ def reduce_to_touching(folder):
         script.write_text("\n".join([*imports, touch]), encoding="utf-8")
 
 
-def snakemake(folder, *arguments):
+def snakemake(folder: Path, *arguments: str) -> tuple[float, str]:
     """Run Snakemake in a copy, with the package of the copy.
 
     Parameters

@@ -5,12 +5,13 @@ Prints the table of docs/held_out_intervals.md.
 
 import sys
 import warnings
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from common import ROOT
 from scipy.stats import bootstrap
 
-from elastocal.validation.held_out import intervals
+from elastocal.validation.held_out import Errors, intervals
 
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 from made_errors import KINDS, campaigns_of, true_figures
@@ -20,7 +21,7 @@ FIGURES = ("mean_m", "rms_m", "p95_m", "reduction", "reduction of none")
 METHODS = ("percentile", "BCa", "ours")
 
 
-def main():
+def main() -> None:
     """Print one line for each kind of errors and number of poses."""
     print("| errors | poses |" + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES) + "| p95 open above |")
     print("|---" * (3 + len(FIGURES)) + "|")
@@ -32,7 +33,7 @@ def main():
             print(f"| {kind} | {poses} | " + " | ".join(cells) + f" | {100 * open_above:.0f} % |", flush=True)
 
 
-def covered(kind, poses, truth):
+def covered(kind: str, poses: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:
     """Shares of campaigns whose intervals hold the truth, and whose 95th percentile has no upper limit."""
     rng, hits, open_above = np.random.default_rng(7), {}, 0
     for before, after, false in campaigns_of(kind, CAMPAIGNS, poses, (8, poses)):
@@ -48,7 +49,7 @@ def covered(kind, poses, truth):
     return {key: count / CAMPAIGNS for key, count in hits.items()}, open_above / CAMPAIGNS
 
 
-def by_scipy(before, after, false, method, rng):
+def by_scipy(before: Errors, after: Errors, false: Errors, method: str, rng: np.random.Generator) -> dict[str, np.ndarray]:
     """The same intervals by `scipy.stats.bootstrap` over poses."""
     cluster = after.cluster
     counts = np.bincount(cluster)
@@ -58,16 +59,16 @@ def by_scipy(before, after, false, method, rng):
     longest = max(counts)
     padded = np.array([np.pad(part, (0, longest - len(part)), constant_values=np.inf) for part in parts])
 
-    def quantile(index, axis=-1):
+    def quantile(index: np.ndarray, axis: int = -1) -> np.ndarray:
         rising = np.sort(padded[index.astype(int)].reshape(*index.shape[:-1], -1), axis=-1)
         place = 0.95 * (np.isfinite(rising).sum(axis=-1, keepdims=True) - 1)
         low, high = (np.take_along_axis(rising, rank(place).astype(int), axis=-1) for rank in (np.floor, np.ceil))
         return (low + (place % 1.0) * (high - low))[..., 0]
 
-    def ratio(top, bottom, axis=-1):
+    def ratio(top: np.ndarray, bottom: np.ndarray, axis: int = -1) -> np.ndarray:
         return top.sum(axis=axis) / bottom.sum(axis=axis)
 
-    def interval(samples, statistic):
+    def interval(samples: tuple[np.ndarray, ...], statistic: Callable[..., np.ndarray]) -> np.ndarray:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             found = bootstrap(samples, statistic, paired=True, vectorized=True, n_resamples=REPLICATES, method=method, rng=rng)

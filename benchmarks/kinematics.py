@@ -1,11 +1,13 @@
 """Jacobians of 100,000 configurations against a Python loop over pinocchio, one thread each."""
 
+from pathlib import Path
 from statistics import median
 
 import numpy as np
 import pinocchio as pin
 from common import Row, interleaved, load_robot
 
+from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
 ROBOTS = ("kuka", "fanuc")
@@ -15,12 +17,12 @@ TARGET = 5
 TOLERANCE = 1e-12
 
 
-def rows(work):
+def rows(work: Path) -> list[Row]:
     """Rows of the report, one for each robot; `work` is not used."""
     return [_row(name) for name in ROBOTS]
 
 
-def pinocchio_model(chain):
+def pinocchio_model(chain: Chain) -> tuple[pin.Model, int]:
     """Model of a chain whose joints turn in the positive sense, and the index of its end-effector frame.
 
     Parameters
@@ -45,13 +47,13 @@ def pinocchio_model(chain):
     return model, model.addFrame(pin.Frame("end-effector", parent, placement, pin.FrameType.OP_FRAME))
 
 
-def _row(name):
+def _row(name: str) -> Row:
     chain = load_robot(name).chain
     angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (CONFIGURATIONS, chain.coordinates))
     model, frame = pinocchio_model(chain)
     data, aligned = model.createData(), pin.LOCAL_WORLD_ALIGNED
 
-    def loop():
+    def loop() -> None:
         for q in angles:
             pin.computeFrameJacobian(model, data, q, frame, aligned)
 

@@ -8,7 +8,10 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from statistics import median
+from typing import Any
 
 import yaml
 from common import ROOT, Row
@@ -66,7 +69,7 @@ print(json.dumps({"seconds": seconds, "peak_gb": peak, "candidates": len(kept), 
 """
 
 
-def rows(work):
+def rows(work: Path) -> Iterator[Row]:
     """Rows of the report.
 
     Parameters
@@ -86,7 +89,7 @@ def rows(work):
     yield from _growth(work)
 
 
-def _proof(work):
+def _proof(work: Path) -> Iterator[Row]:
     every = cases_of(SIZES["full"], SEED)
     # Development cases: those of the proof stay unseen.
     some = cases_of(SIZES["development"], SEED)[:CASES]
@@ -103,7 +106,7 @@ def _proof(work):
     yield Row("large proof", 60 * minutes, 60 * PROOF_MIN, minutes / PROOF_MIN, "<= 1", minutes <= PROOF_MIN, how)
 
 
-def _old_engine(work):
+def _old_engine(work: Path) -> Iterator[Row]:
     """Both engines on the same cases, of arms that weigh nothing, for the old one knows no weight; none without the history."""
     archive = subprocess.run(["git", "-C", ROOT, "archive", OLD_ENGINE, "src", "config"], capture_output=True, check=False)
     if archive.returncode:
@@ -127,7 +130,7 @@ def _old_engine(work):
     yield Row("large old engine", ours, theirs, ours / theirs, "", None, how)
 
 
-def _limits(name, folder, allowed_s, allowed_gb, how):
+def _limits(name: str, folder: Path, allowed_s: float, allowed_gb: float, how: str) -> Iterator[Row]:
     run = _run([folder], threads=CORES)
     (seconds,), peak = run["seconds"], run["peak_gb"]
     yield Row(f"{name} time", seconds, allowed_s, seconds / allowed_s, "<= 1", seconds <= allowed_s, how)
@@ -135,7 +138,7 @@ def _limits(name, folder, allowed_s, allowed_gb, how):
     yield Row(f"{name} memory", None, None, peak / allowed_gb, "<= 1", peak <= allowed_gb, memory)
 
 
-def _growth(work):
+def _growth(work: Path) -> Iterator[Row]:
     few, many = (_dynamic(work, measurements) for measurements in GROWTH)
     small, large, half = _run([few]), _run([many]), _run([many], share=2)
     for name, less, part in (("measurements", small, "measurements"), ("candidates", half, "candidates")):
@@ -146,18 +149,18 @@ def _growth(work):
         yield Row(f"large {name} memory", None, None, ratio, "", None, f"peak of {large['peak_gb']:.2f} GB: {how}")
 
 
-def _dynamic(work, measurements):
+def _dynamic(work: Path, measurements: int) -> Path:
     arm, folder = arm_from_file(ROBOTS / "fanuc.yaml"), work / f"dynamic{measurements}"
     robot = with_defects(specimen(arm, 4), [Defect("transmission_harmonic", (2,), 1e-4, 1)])
     write_dynamic_campaign(folder, "dynamic", ROBOTS / "fanuc.yaml", robot, measurements, 4, declared_masses(arm))
     return folder
 
 
-def _run(folders, threads=1, share=1):
+def _run(folders: Sequence[Path], threads: int = 1, share: int = 1) -> dict[str, Any]:
     return _called([SCRIPT, ROBOTS, str(share), *folders], threads)
 
 
-def _called(script, threads, **environment):
+def _called(script: Sequence[str | Path], threads: int, **environment: str) -> dict[str, Any]:
     """What a process of its own prints last."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     environment = os.environ | dict.fromkeys(names, str(threads)) | environment

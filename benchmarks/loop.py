@@ -4,7 +4,9 @@ import cProfile
 import os
 import pstats
 import shutil
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
@@ -30,7 +32,7 @@ REPETITIONS = 3
 ALGEBRA = ("linalg", "whitening.py", "evidence.py", "statistics.py", "fitting.py", "decomp", "_basic.py", "_solve_toeplitz")
 
 
-def rows(work):
+def rows(work: Path) -> Iterator[Row]:
     """Rows of the report.
 
     Parameters
@@ -49,11 +51,11 @@ def rows(work):
     yield from _growth(work)
 
 
-def _limit(name, seconds, allowed, how):
+def _limit(name: str, seconds: float, allowed: float, how: str) -> Row:
     return Row(name, seconds, allowed, seconds / allowed, "<= 1", seconds <= allowed, how)
 
 
-def _growth(work):
+def _growth(work: Path) -> Iterator[Row]:
     whole, half = (_case(work / f"growth{poses}", poses) for poses in (4 * POSES, 2 * POSES))
     fewer = replace(whole, candidates=dict(list(whole.candidates.items())[::2]))
     functions = {
@@ -76,7 +78,7 @@ def _growth(work):
     yield Row("loop algebra", spent, total, spent / total, "", None, how)
 
 
-def _campaign(folder, poses):
+def _campaign(folder: Path, poses: int) -> Path:
     robot = load_robot("kuka_extended")
     plan = Plan(POINTS, poses, 1000.0, LADDER, (0.0, 0.5, 0.0), 4, 10, 6e-5, 6e-5)
     document = {
@@ -93,7 +95,7 @@ def _campaign(folder, poses):
     return folder
 
 
-def _case(folder, poses):
+def _case(folder: Path, poses: int) -> Case:
     campaign = read_campaign(_campaign(folder, poses), ROOT / "config" / "robots")
     campaign = replace(campaign, measurements=split(campaign)[0])
     sites = sites_of(campaign.robot)

@@ -1,5 +1,6 @@
 """A rerun of the finished study, with nothing to do, against `snakemake --version`."""
 
+from pathlib import Path
 from statistics import median
 
 from common import Row, interleaved
@@ -10,7 +11,7 @@ REPETITIONS = 7
 TARGET = 3
 
 
-def rows(work):
+def rows(work: Path) -> list[Row]:
     """Row of the report.
 
     Parameters
@@ -22,7 +23,7 @@ def rows(work):
     if not folder.is_dir():
         finished_study(work)
 
-    def again():
+    def again() -> None:
         if "Nothing to be done" not in snakemake(folder, *JOBS)[1]:
             raise AssertionError("the rerun of the finished study had something to do")
 

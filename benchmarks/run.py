@@ -6,14 +6,20 @@ import importlib
 import os
 import sys
 import tempfile
+from collections.abc import Collection, Iterable
 from dataclasses import fields
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    # With it comes numpy, whose threads are to be set first.
+    from common import Row
 
 NAMES = ("kinematics", "identification", "study", "rerun", "scale", "loop", "large")
 REPORT = Path(__file__).resolve().parents[1] / "reports" / "benchmarks.csv"
 
 
-def main():
+def main() -> None:
     """Run the benchmarks; the exit status says whether every target holds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, metavar="NAME", help=", ".join(NAMES))
@@ -33,7 +39,7 @@ def main():
     sys.exit(any(line["holds"] == "no" for line in table.values()))
 
 
-def _line(row):
+def _line(row: "Row") -> dict[str, str]:
     """Row as text: four digits, empty for none, yes or no."""
     line = {}
     for field in fields(row):
@@ -44,7 +50,7 @@ def _line(row):
     return line
 
 
-def _kept(names):
+def _kept(names: Collection[str]) -> list[dict[str, str]]:
     """Lines of an earlier report, of the benchmarks that do not run now."""
     if not REPORT.is_file():
         return []
@@ -52,7 +58,7 @@ def _kept(names):
         return [line for line in csv.DictReader(file) if line["benchmark"].split()[0] not in names]
 
 
-def _write(lines):
+def _write(lines: Iterable[dict[str, str]]) -> None:
     ordered = sorted(lines, key=lambda line: NAMES.index(line["benchmark"].split()[0]))
     REPORT.parent.mkdir(exist_ok=True)
     with open(REPORT, "w", encoding="utf-8", newline="") as file:

@@ -1,6 +1,8 @@
 """10,000 data sets against 1,000: seconds and peak memory of each step for one robot, strategy and noise level."""
 
 import csv
+from collections.abc import Sequence
+from pathlib import Path
 
 from common import Row
 from copies import copy_study, snakemake
@@ -32,7 +34,7 @@ def note_peak():
 """
 
 
-def rows(work):
+def rows(work: Path) -> list[Row]:
     """Rows of the report, for time and for memory.
 
     Parameters
@@ -41,7 +43,7 @@ def rows(work):
         Temporary folder.
     """
     folders = {size: _copy_that_notes_peaks(work / f"scale-{size}") for size in SIZES}
-    runs = {size: [] for size in SIZES}
+    runs: dict[int, list[dict[str, tuple[float, float]]]] = {size: [] for size in SIZES}
     for repetition in range(1, REPETITIONS + 1):
         for size, folder in folders.items():
             snakemake(folder, "-j1", *(made for made, _ in STEPS.values()), "--config", f"data_sets={size}", "--forceall")
@@ -66,20 +68,20 @@ def rows(work):
     ]
 
 
-def _copy_that_notes_peaks(folder):
+def _copy_that_notes_peaks(folder: Path) -> Path:
     copy_study(folder)
     with open(folder / "workflow" / "scripts" / "job.py", "a", encoding="utf-8") as job:
         job.write(NOTE_PEAK)
     return folder
 
 
-def _seconds_and_peak(folder, step):
+def _seconds_and_peak(folder: Path, step: str) -> tuple[float, float]:
     made, timing = STEPS[step]
     with open(folder / "results" / "timings" / step / f"{timing}.tsv", encoding="utf-8") as file:
         seconds = float(next(csv.DictReader(file, delimiter="\t"))["s"])
     return seconds, int((folder / f"{made}.peak_kB").read_text(encoding="utf-8")) * 1024 / 1e9
 
 
-def _smallest(runs):
+def _smallest(runs: Sequence[dict[str, tuple[float, float]]]) -> tuple[dict[str, float], ...]:
     """Seconds and GB of each step, the smallest of its runs."""
     return tuple({step: min(run[step][part] for run in runs) for step in STEPS} for part in (0, 1))

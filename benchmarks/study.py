@@ -1,5 +1,7 @@
 """The clean study against the same jobs that only import what they import and touch their outputs."""
 
+from pathlib import Path
+
 from common import Row
 from copies import copy_study, reduce_to_touching, snakemake
 
@@ -7,7 +9,7 @@ JOBS = ("-j2", "study")
 TARGET = 2
 
 
-def rows(work):
+def rows(work: Path) -> list[Row]:
     """Row of the report.
 
     Parameters
@@ -26,7 +28,7 @@ def rows(work):
     return [Row("study", ours, theirs, ours / theirs, f"<= {TARGET}", ours / theirs <= TARGET, how)]
 
 
-def finished_study(work):
+def finished_study(work: Path) -> tuple[Path, float]:
     """Make the whole study, clean, in the folder ``study`` of `work`.
 
     Returns
@@ -40,7 +42,7 @@ def finished_study(work):
     return folder, seconds
 
 
-def _made(folder):
+def _made(folder: Path) -> set[str]:
     """Files that jobs made, without the logs and timings beside them."""
     files = (path.relative_to(folder) for part in ("data", "results", "reports") for path in (folder / part).rglob("*.*"))
     return {path.as_posix() for path in files if path.parts[1] not in ("logs", "timings") and (folder / path).is_file()}

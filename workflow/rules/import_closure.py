@@ -3,13 +3,14 @@
 import ast
 from functools import cache
 from itertools import accumulate
+from pathlib import Path
 
 import grimp
 
 PACKAGE = "elastocal"
 
 
-def closure(script, source):
+def closure(script: Path, source: Path) -> list[Path]:
     """Source files that a script imports, directly or not.
 
     Parameters
@@ -35,7 +36,7 @@ def closure(script, source):
 
 
 @cache
-def _graph():
+def _graph() -> grimp.ImportGraph:
     # What is imported for annotations alone changes no result.
     graph = grimp.build_graph(PACKAGE, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
     # A catalogue looks up the modules beside it by itself.
@@ -47,7 +48,7 @@ def _graph():
 
 
 @cache
-def _imports(file):
+def _imports(file: Path) -> frozenset[str]:
     """Names that a file imports: of modules, or of what is in them."""
     names = set()
     for node in ast.walk(ast.parse(file.read_bytes())):
@@ -58,6 +59,6 @@ def _imports(file):
     return frozenset(names)
 
 
-def _file(module, source):
+def _file(module: str, source: Path) -> Path:
     path = source.joinpath(*module.split("."))
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")

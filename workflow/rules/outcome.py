@@ -2,13 +2,14 @@
 
 import json
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 _CAMPAIGN = re.compile(r"reports/loop/([^/]+)/report\.pdf")
 _REPORTS = {"reports/study.pdf": "the study", "reports/blind/blind.pdf": "the blind proof"}
 
 
-def outcome(made):
+def outcome(made: Iterable[str]) -> list[str]:
     """Lines about the reports among the files that a run has made.
 
     Parameters

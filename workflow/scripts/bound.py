@@ -8,10 +8,10 @@ from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.evaluate import judge_from
 from elastocal.study.table_schemas import BOUNDS, DEFLECTIONS, experiments
 
-from job import run
+from job import Job, run
 
 
-def bound(job):
+def bound(job: Job) -> None:
     settings = job.params
     robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
     schema, end_effector = experiments(robot.joints), robot.chain.end_effector.name

@@ -8,10 +8,10 @@ from elastocal.blind.carrying_out import carry_out
 from elastocal.blind.cases import SIZES, cases_of
 from elastocal.mechanics.components import WRENCH_NAMES
 
-from job import run
+from job import Job, run
 
 
-def carry_out_follow_ups(job):
+def carry_out_follow_ups(job: Job) -> None:
     Path(job.output.campaigns).mkdir(parents=True, exist_ok=True)
     cases = {case.name: case for case in cases_of(SIZES[job.params.size], job.params.seed)}
     for name, states in pd.read_csv(job.input.proposals).groupby("case"):

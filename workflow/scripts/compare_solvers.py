@@ -10,10 +10,10 @@ from elastocal.study.steps.solvers import solver_table
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, experiments, solvers
 
-from job import run
+from job import Job, run
 
 
-def compare_solvers(job):
+def compare_solvers(job: Job) -> None:
     settings = job.params
     chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
     strategies = [strategy_from_document(document) for document in settings.strategies]

@@ -6,10 +6,10 @@ from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.table_schemas import REPLICATES, metrics
 
-from job import run
+from job import Job, run
 
 
-def compare_with_paper(job):
+def compare_with_paper(job: Job) -> None:
     settings = job.params
     ours = OurResults(
         tables={name: pd.read_csv(job.input[name]) for name in ("table1", "table2", "table3", "table4", "extended")},

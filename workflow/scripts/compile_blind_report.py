@@ -7,12 +7,12 @@ import pandas as pd
 from elastocal.report.blind_facts import blind_facts
 from elastocal.report.blind_pages import write_blind_report
 
-from job import run
+from job import Job, run
 
 TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up", "sweep")
 
 
-def compile_blind_report(job):
+def compile_blind_report(job: Job) -> None:
     settings = job.params
     tables = {name: pd.read_csv(job.input[name]) for name in TABLES}
     manifest = Path(job.input.manifest).read_text(encoding="utf-8")

@@ -9,10 +9,10 @@ from elastocal.loop.schemas import residuals
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
 
-from job import run
+from job import Job, run
 
 
-def compile_loop_report(job):
+def compile_loop_report(job: Job) -> None:
     verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
     joints = len(descriptions["robot"]["compliance_urad_per_Nm"])
     rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]

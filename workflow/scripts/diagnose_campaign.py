@@ -16,10 +16,10 @@ from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import CORRELATIONS
 from elastocal.random_streams import stream
 
-from job import run
+from job import Job, run
 
 
-def diagnose_campaign(job):
+def diagnose_campaign(job: Job) -> None:
     case = opened_case(job.input.descriptions, job.input.training)
     campaign = job.wildcards.campaign
     found = diagnose(case, Settings(), job.params.seed, lambda line: print(f"{campaign}: {line}", file=sys.stderr, flush=True))

@@ -7,10 +7,10 @@ from pathlib import Path
 from elastocal.io.atomic_writes import write_text
 from elastocal.loop.whole import diagnosed
 
-from job import run
+from job import Job, run
 
 
-def diagnose_cases(job):
+def diagnose_cases(job: Job) -> None:
     folders = sorted(folder for folder in Path(job.input.blind).iterdir() if folder.is_dir())
     verdicts = []
     for number, folder in enumerate(folders, 1):

@@ -2,16 +2,17 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 from elastocal.blind.follow_up import diagnosed_anew
 from elastocal.io.json_files import write_json
 from elastocal.loop.whole import diagnosed
 
-from job import run
+from job import Job, run
 
 
-def diagnose_follow_ups(job):
-    def verdict_on(folder):
+def diagnose_follow_ups(job: Job) -> None:
+    def verdict_on(folder: str) -> dict[str, Any]:
         print(f"{job.wildcards.block}: {Path(folder).parent.name}", file=sys.stderr, flush=True)
         return diagnosed(folder, "config/robots", job.params.seed)
 

@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.strategies import accuracy_of_one_data_set
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_accuracy(job):
+def draw_accuracy(job: Job) -> None:
     settings = job.params
     per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
     figure = accuracy_of_one_data_set(per_dataset, settings.titles, settings.order, settings.length)

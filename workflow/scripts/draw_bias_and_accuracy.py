@@ -7,10 +7,10 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
 
-from job import run
+from job import Job, run
 
 
-def draw_bias_and_accuracy(job):
+def draw_bias_and_accuracy(job: Job) -> None:
     settings = job.params
     per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
     figure = bias_and_accuracy(read_long(job.input.metrics, metrics), per_dataset, settings.titles, settings.order)

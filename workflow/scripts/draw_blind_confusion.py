@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_power import confusion_map
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_confusion(job):
+def draw_blind_confusion(job: Job) -> None:
     save(confusion_map(pd.read_csv(job.input.confusion)), job.output.pdf, job.output.png)
 
 

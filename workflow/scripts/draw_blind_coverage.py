@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_rates import coverage_by_effect
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_coverage(job):
+def draw_blind_coverage(job: Job) -> None:
     save(coverage_by_effect(pd.read_csv(job.input.coverage)), job.output.pdf, job.output.png)
 
 

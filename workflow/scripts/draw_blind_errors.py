@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_errors import errors_against_oracle
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_errors(job):
+def draw_blind_errors(job: Job) -> None:
     save(errors_against_oracle(pd.read_csv(job.input.cases)), job.output.pdf, job.output.png)
 
 

@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_power import power_map
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_power(job):
+def draw_blind_power(job: Job) -> None:
     save(power_map(pd.read_csv(job.input.power)), job.output.pdf, job.output.png)
 
 

@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_reliability import reliability_diagram
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_reliability(job):
+def draw_blind_reliability(job: Job) -> None:
     save(reliability_diagram(pd.read_csv(job.input.reliability)), job.output.pdf, job.output.png)
 
 

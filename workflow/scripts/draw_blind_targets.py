@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.blind_rates import rates_and_targets
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_blind_targets(job):
+def draw_blind_targets(job: Job) -> None:
     save(rates_and_targets(pd.read_csv(job.input.summary)), job.output.pdf, job.output.png)
 
 

@@ -6,10 +6,10 @@ from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import CANDIDATES
 
-from job import run
+from job import Job, run
 
 
-def draw_candidates(job):
+def draw_candidates(job: Job) -> None:
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
     save(probabilities(stated, read_table(job.input.candidates, CANDIDATES)), job.output.pdf, job.output.png)
 

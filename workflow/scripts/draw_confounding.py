@@ -5,10 +5,10 @@ from elastocal.figures.style import save
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import CANDIDATES, CONFOUNDING
 
-from job import run
+from job import Job, run
 
 
-def draw_confounding(job):
+def draw_confounding(job: Job) -> None:
     figure = confounding(read_table(job.input.candidates, CANDIDATES), read_table(job.input.confounding, CONFOUNDING))
     save(figure, job.output.pdf, job.output.png)
 

@@ -8,10 +8,10 @@ from elastocal.study.simulation import Loading
 from elastocal.study.steps.simulate import experiment_blocks
 from elastocal.study.table_schemas import experiments
 
-from job import run
+from job import Job, run
 
 
-def draw_experiments(job):
+def draw_experiments(job: Job) -> None:
     settings, robot = job.params, job.wildcards.robot
     chain = parse_chain(settings.chain, settings.lengths_m, robot)
     limits = joint_limits(settings.joint_limits_deg, chain, robot)

@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.figures.against_paper import scores
 from elastocal.figures.style import save
 
-from job import run
+from job import Job, run
 
 
-def draw_scores(job):
+def draw_scores(job: Job) -> None:
     save(scores(pd.read_csv(job.input.comparison, dtype={"table": str})), job.output.pdf, job.output.png)
 
 

@@ -5,10 +5,10 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
 
-from job import run
+from job import Job, run
 
 
-def draw_stiffness_errors(job):
+def draw_stiffness_errors(job: Job) -> None:
     settings = job.params
     frame = read_long(job.input.metrics, metrics)
     save(

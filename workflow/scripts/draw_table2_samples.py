@@ -7,10 +7,10 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame
 from elastocal.study.table_schemas import INITIAL
 
-from job import run
+from job import Job, run
 
 
-def draw_table2_samples(job):
+def draw_table2_samples(job: Job) -> None:
     titles = job.params.titles
     initial = {robot: read_frame(path, INITIAL) for robot, path in zip(titles, job.input.initial, strict=True)}
     reference = pd.read_csv(job.input.reference, dtype={"table": str}, keep_default_na=False)

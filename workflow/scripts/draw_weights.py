@@ -5,10 +5,10 @@ from elastocal.io.storage import write_table
 from elastocal.study.steps.weights import weight_blocks
 from elastocal.study.table_schemas import WEIGHTS
 
-from job import run
+from job import Job, run
 
 
-def draw_weights(job):
+def draw_weights(job: Job) -> None:
     settings = job.params
     drawn = weight_blocks(job.wildcards.robot, settings.seed, settings.data_sets, settings.tests, settings.replicates)
     write_table(job.output.weights, WEIGHTS, drawn, provenance(settings, **dict(job.wildcards)))

@@ -9,10 +9,10 @@ from elastocal.study.steps.weights import DATA_SETS, TESTS
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
 
-from job import run
+from job import Job, run
 
 
-def evaluate(job):
+def evaluate(job: Job) -> None:
     settings = job.params
     robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
     n, end_effector = robot.joints, robot.chain.end_effector.name

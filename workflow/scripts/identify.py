@@ -9,10 +9,10 @@ from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.strategies import strategy_from_document, without_forgotten_stages
 from elastocal.study.table_schemas import DEFLECTIONS, design, experiments, identified
 
-from job import run
+from job import Job, run
 
 
-def identify(job):
+def identify(job: Job) -> None:
     settings = job.params
     chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
     strategy = strategy_from_document(settings.strategy)

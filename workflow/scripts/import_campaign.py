@@ -6,7 +6,7 @@ from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static, 
 from elastocal.campaigns.public_data import fetch
 from elastocal.campaigns.reading import folds_of
 
-from job import run
+from job import Job, run
 
 IMPORTERS = {
     "fanuc_static": fanuc_static,
@@ -17,7 +17,7 @@ IMPORTERS = {
 }
 
 
-def import_campaign(job):
+def import_campaign(job: Job) -> None:
     settings = job.params.source
     paths = [fetch(name, job.params.kept) for name in settings["files"]]
     folder, name = Path(job.output.document).parent, job.wildcards.campaign

@@ -11,10 +11,10 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import residuals
 
-from job import run
+from job import Job, run
 
 
-def judge_campaign(job):
+def judge_campaign(job: Job) -> None:
     case = opened_case(job.input.descriptions, job.input.training)
     held_out = opened_case(job.input.descriptions, job.input.held_out, "held_out")
     found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, tables.STEPS))

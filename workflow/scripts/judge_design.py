@@ -8,10 +8,10 @@ from elastocal.study.steps.design import design_blocks
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import design, experiments
 
-from job import run
+from job import Job, run
 
 
-def judge_design(job):
+def judge_design(job: Job) -> None:
     settings = job.params
     chain = with_target_offset(parse_chain(settings.chain, settings.lengths_m, job.wildcards.robot), settings.tool_offset_m)
     strategy = strategy_from_document(settings.strategy)

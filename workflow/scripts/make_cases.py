@@ -4,10 +4,10 @@ from pathlib import Path
 
 from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
 
-from job import run
+from job import Job, run
 
 
-def make_cases(job):
+def make_cases(job: Job) -> None:
     settings = job.params
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)

@@ -5,10 +5,10 @@ from elastocal.io.storage import read_blocks, write_table
 from elastocal.study.steps.measure import measured_blocks
 from elastocal.study.table_schemas import DEFLECTIONS
 
-from job import run
+from job import Job, run
 
 
-def measure(job):
+def measure(job: Job) -> None:
     noise = 1e-6 * float(job.wildcards.noise)
     ideal = read_blocks(job.input.ideal, DEFLECTIONS)
     blocks = measured_blocks(ideal, job.wildcards.robot, job.params.seed, noise)

@@ -7,10 +7,10 @@ from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.proposed import proposed
 
-from job import run
+from job import Job, run
 
 
-def propose_follow_ups(job):
+def propose_follow_ups(job: Job) -> None:
     frames = [pd.DataFrame({"case": []})]
     for verdict in followed_up(read_json(job.input.verdicts), MOST[job.params.size]):
         folder = f"{job.input.blind}/{verdict['campaign']}"

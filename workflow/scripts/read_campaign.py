@@ -7,10 +7,10 @@ from elastocal.io.storage import write_table
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import measurements
 
-from job import run
+from job import Job, run
 
 
-def read_campaign(job):
+def read_campaign(job: Job) -> None:
     descriptions, training, held_out = load_campaign(job.params.folder, job.params.robots)
     for path, part in ((job.output.training, training), (job.output.held_out, held_out)):
         schema = measurements(part.joint_angles.shape[1])

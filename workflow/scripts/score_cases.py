@@ -14,10 +14,10 @@ from elastocal.blind.truths import opened_truths
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
-from job import run
+from job import Job, run
 
 
-def score_cases(job):
+def score_cases(job: Job) -> None:
     truths = opened_truths([file for folder in job.input.sealed for file in Path(folder).glob("*.json")], job.input.manifest)
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
     oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}

@@ -17,10 +17,10 @@ from elastocal.blind.truths import opened_truths
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
-from job import run
+from job import Job, run
 
 
-def score_follow_ups(job):
+def score_follow_ups(job: Job) -> None:
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
     truths = opened_truths(files, job.input.manifest)
     first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}

@@ -9,10 +9,10 @@ from elastocal.figures.sweep import sweep
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
-from job import run
+from job import Job, run
 
 
-def score_sweep(job):
+def score_sweep(job: Job) -> None:
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
     cases = swept(opened_truths(files, job.input.manifest), verdicts)

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from elastocal.blind.cases import write_manifest
 
-from job import run
+from job import Job, run
 
 
-def seal_cases(job):
+def seal_cases(job: Job) -> None:
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
     write_manifest(job.output.manifest, {file.stem: hashlib.sha256(file.read_bytes()).hexdigest() for file in files})
 

@@ -7,10 +7,10 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.steps.simulate import ideal_blocks
 from elastocal.study.table_schemas import DEFLECTIONS, experiments
 
-from job import run
+from job import Job, run
 
 
-def simulate(job):
+def simulate(job: Job) -> None:
     settings = job.params
     robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
     blocks = read_blocks(job.input.experiments, experiments(robot.joints))

@@ -6,10 +6,10 @@ from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot_file import robot_from_document
 
-from job import run
+from job import Job, run
 
 
-def simulate_campaign(job):
+def simulate_campaign(job: Job) -> None:
     settings, name = job.params.source, job.wildcards.campaign
     robot = robot_from_document(settings["robot_document"], settings["robot"])
     plan = Plan(**{key: tuple(v) if isinstance(v, list) else v for key, v in settings.items() if key in Plan.__annotations__})

@@ -9,10 +9,10 @@ from elastocal.io.data_frames import read_long
 from elastocal.report.answers import answers
 from elastocal.study.table_schemas import REPLICATES, metrics
 
-from job import run
+from job import Job, run
 
 
-def state_answers(job):
+def state_answers(job: Job) -> None:
     settings = job.params
     facts = answers(
         comparison=pd.read_csv(job.input.comparison, dtype={"table": str}),

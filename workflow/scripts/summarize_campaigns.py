@@ -5,10 +5,10 @@ from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.loop.summary import campaign_rows
 
-from job import run
+from job import Job, run
 
 
-def summarize_campaigns(job):
+def summarize_campaigns(job: Job) -> None:
     settings = job.params
     verdicts = {name: read_json(path) for name, path in zip(settings.campaigns, job.input.verdicts, strict=True)}
     held_out = {

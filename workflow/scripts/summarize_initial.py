@@ -5,10 +5,10 @@ from elastocal.io.storage import read_blocks, write_table
 from elastocal.study.steps.initial import initial_blocks
 from elastocal.study.table_schemas import DEFLECTIONS, INITIAL
 
-from job import run
+from job import Job, run
 
 
-def summarize_initial(job):
+def summarize_initial(job: Job) -> None:
     ideal = read_blocks(job.input.ideal, DEFLECTIONS, point=job.params.end_effector)
     write_table(job.output.initial, INITIAL, initial_blocks(ideal), provenance(job.params))
 

@@ -4,10 +4,10 @@ from elastocal.io.data_frames import read_frame, read_long, write_csv
 from elastocal.study.table_schemas import BOUNDS, accuracy
 from elastocal.study.tables import per_dataset_table
 
-from job import run
+from job import Job, run
 
 
-def tabulate_accuracy(job):
+def tabulate_accuracy(job: Job) -> None:
     settings = job.params
     bounds = {robot: read_frame(path, BOUNDS) for robot, path in zip(settings.robots, job.input.bounds, strict=True)}
     write_csv(job.output.table, per_dataset_table(read_long(job.input.accuracy, accuracy), bounds, settings.points))

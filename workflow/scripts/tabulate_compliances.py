@@ -4,10 +4,10 @@ from elastocal.io.data_frames import write_csv
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.tables import table1
 
-from job import run
+from job import Job, run
 
 
-def tabulate_compliances(job):
+def tabulate_compliances(job: Job) -> None:
     write_csv(job.output.table, table1({name: robot_from_document(d, name) for name, d in job.params.robots.items()}))
 
 

@@ -4,10 +4,10 @@ from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
 from elastocal.study.tables import extended_table
 
-from job import run
+from job import Job, run
 
 
-def tabulate_extended(job):
+def tabulate_extended(job: Job) -> None:
     settings = job.params
     table = extended_table(
         read_long(job.input.metrics, metrics),

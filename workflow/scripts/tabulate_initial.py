@@ -5,10 +5,10 @@ from elastocal.study.bootstrap import bootstrap_weights
 from elastocal.study.table_schemas import INITIAL
 from elastocal.study.tables import table2
 
-from job import run
+from job import Job, run
 
 
-def tabulate_initial(job):
+def tabulate_initial(job: Job) -> None:
     settings = job.params
     initial = {robot: read_frame(path, INITIAL) for robot, path in zip(settings.robots, job.input.initial, strict=True)}
     weights = {

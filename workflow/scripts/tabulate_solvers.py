@@ -4,10 +4,10 @@ from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.table_schemas import solvers
 from elastocal.study.tables import solver_summary
 
-from job import run
+from job import Job, run
 
 
-def tabulate_solvers(job):
+def tabulate_solvers(job: Job) -> None:
     settings = zip(job.params.robots, job.params.joints, job.input.solvers, strict=True)
     write_csv(job.output.table, solver_summary({robot: read_frame(path, solvers(n)) for robot, n, path in settings}))
 

@@ -4,10 +4,10 @@ from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
 from elastocal.study.tables import table4
 
-from job import run
+from job import Job, run
 
 
-def tabulate_strategies(job):
+def tabulate_strategies(job: Job) -> None:
     settings = job.params
     table = table4(
         read_long(job.input.metrics, metrics),

@@ -5,10 +5,10 @@ import pandas as pd
 from elastocal.io.data_frames import write_latex, write_markdown
 from elastocal.study.tables import with_errors_merged
 
-from job import run
+from job import Job, run
 
 
-def typeset_table(job):
+def typeset_table(job: Job) -> None:
     shown = with_errors_merged(pd.read_csv(job.input.table, keep_default_na=False, na_values=[""]))
     write_markdown(job.output.markdown, shown)
     write_latex(job.output.latex, shown)

@@ -1,6 +1,9 @@
 """A diagnosis as files, and back: the only writer and the only reader of its tables."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,6 +15,13 @@ from elastocal.fitting.least_squares import fit
 from elastocal.io.storage import Column, TableSchema
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
 from elastocal.loop.schemas import PARAMETER_COLUMNS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+    from typing import Any
+
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.case import Case
 
 STEPS = TableSchema(
     "steps",
@@ -63,19 +73,19 @@ CONFOUNDING = TableSchema(
 )
 
 
-def step_blocks(diagnosis):
+def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
     """Blocks of the steps table."""
     for number, step in enumerate(diagnosis.steps):
         columns = parameter_columns(step.fitted)
-        yield {"step": np.full(len(columns["value"]), number)} | columns
+        yield {"step": np.full(len(columns["value"]), number), **columns}
 
 
-def final_correlations(diagnosis):
+def final_correlations(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     """Columns of the correlations table, of the final model."""
     return correlation_columns(diagnosis.final)
 
 
-def diagnosis_facts(diagnosis):
+def diagnosis_facts(diagnosis: Diagnosis) -> dict[str, Any]:
     """What diagnosis.json holds."""
     steps = [
         {
@@ -89,26 +99,26 @@ def diagnosis_facts(diagnosis):
     return {"document": diagnosis.document, "steps": steps}
 
 
-def final_parameters(facts, columns):
+def final_parameters(facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Parameters of the final model.
 
     Parameters
     ----------
     facts : dict
         Of diagnosis.json.
-    columns : dict of str to ndarray
+    columns : dict of str to ndarray (N,)
         Of the steps table.
 
     Returns
     -------
-    dict of str to ndarray
+    dict of str to ndarray (N,)
         Columns of the steps table, of the last step.
     """
     last = len(facts["steps"]) - 1
     return {name: values[columns["step"] == last] for name, values in columns.items()}
 
 
-def diagnosis_from(case, facts, columns):
+def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Diagnosis:
     """A diagnosis from diagnosis.json and its steps table; without the evidence, which only training poses have.
 
     Parameters
@@ -117,7 +127,7 @@ def diagnosis_from(case, facts, columns):
         Of the training poses.
     facts : dict
         Of `diagnosis_facts`.
-    columns : dict of str to ndarray
+    columns : dict of str to ndarray (N,)
         Of the steps table.
 
     Returns
@@ -137,7 +147,7 @@ def diagnosis_from(case, facts, columns):
     return Diagnosis(case, tuple(steps), None, facts["document"])
 
 
-def model_columns(diagnosis):
+def model_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     """Columns of the models table."""
     if not diagnosis.evidence:
         return {column.name: np.zeros(0) for column in MODELS.columns}
@@ -153,10 +163,10 @@ def model_columns(diagnosis):
     }
 
 
-def candidate_columns(diagnosis):
+def candidate_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     """Columns of the candidates table: those tested by falling Bayes factor, then the others with the reason."""
     evidence, candidates = diagnosis.evidence, diagnosis.case.candidates
-    rows = []
+    rows: list[tuple[Candidate, float, float, float, float, float, bool, str]] = []
     if evidence:
         problem = evidence.linearized.problem
         factors = initial_screening(problem)[1]
@@ -194,7 +204,7 @@ def candidate_columns(diagnosis):
     }
 
 
-def confounding_columns(diagnosis):
+def confounding_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:
     """Columns of the confounding table: every pair of tested candidates once."""
     if not diagnosis.evidence:
         return {"one": [], "other": [], "angle_deg": np.zeros(0)}
@@ -206,7 +216,7 @@ def confounding_columns(diagnosis):
     return {"one": [names[r] for r in rows], "other": [names[c] for c in columns], "angle_deg": angles[rows, columns]}
 
 
-def _with_priors(effect, columns):
+def _with_priors(effect: Candidate, columns: Mapping[str, np.ndarray]) -> Candidate:
     """An effect with the priors under which it was fitted."""
     mine = columns["owner"] == effect.key
     prior = dict(zip(columns["parameter"][mine], columns["prior_std"][mine], strict=True))

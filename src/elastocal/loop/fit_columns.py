@@ -1,13 +1,23 @@
 """Fits to columns of tables and back."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from elastocal.fitting.model import Estimate
 from elastocal.fitting.parameters import parameters
 
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
 
-def parameter_columns(fitted):
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Model
+
+
+def parameter_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     """Columns of the parameters table of a fit."""
     named = parameters(fitted.model, fitted.estimate)
     return {
@@ -21,7 +31,7 @@ def parameter_columns(fitted):
     }
 
 
-def correlation_columns(fitted):
+def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     """Columns of the correlations table of a fit: every pair of parameters that are not held."""
     named = [f"{owner} {parameter.name}" for owner, parameter in parameters(fitted.model, fitted.estimate)]
     free = np.flatnonzero(~fitted.held)
@@ -35,12 +45,12 @@ def correlation_columns(fitted):
     }
 
 
-def estimate_from(columns, model, sessions):
+def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
     """The estimate of a model from the columns of its parameters.
 
     Parameters
     ----------
-    columns : dict of str to ndarray
+    columns : dict of str to ndarray (N,)
     model : Model
     sessions : sequence of int
 
@@ -50,7 +60,7 @@ def estimate_from(columns, model, sessions):
     """
     values = {(o, p): v for o, p, v in zip(columns["owner"], columns["parameter"], columns["value"], strict=True)}
 
-    def placed(owner, default):
+    def placed(owner: str, default: Sequence[float]) -> tuple[list[float], np.ndarray]:
         shift = [values.get((owner, name), missing) for name, missing in zip(("dx", "dy", "dz"), default, strict=True)]
         return shift, Rotation.from_rotvec([values.get((owner, name), 0.0) for name in ("rx", "ry", "rz")]).as_matrix()
 
@@ -67,7 +77,7 @@ def estimate_from(columns, model, sessions):
     )
 
 
-def _absolute_values(model, estimate):
+def _absolute_values(model: Model, estimate: Estimate) -> np.ndarray:
     parts = []
     if model.fitted_frames:
         for shift, turn in zip(estimate.frame_position, estimate.frame_rotation, strict=True):

@@ -1,13 +1,23 @@
 """Step 1: a campaign's folder to descriptions and measurements, those to fit apart from those to test."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.reading import held_out_campaign, read_campaign, read_descriptions
 from elastocal.effects.catalogue import effects
 from elastocal.io.documents import read_document
 
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
 
-def load_campaign(folder, robots_folder):
+    from elastocal.campaigns.campaign import Measurements
+
+
+def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
     """Read a campaign and part its measurements.
 
     Parameters
@@ -35,7 +45,7 @@ def load_campaign(folder, robots_folder):
     return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.measurements
 
 
-def _descriptions(folder, robots_folder):
+def _descriptions(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     document, robot_path = read_descriptions(folder, robots_folder)
     # What a campaign may leave out is said here, so that no later step has to know what its absence means.
     said = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document

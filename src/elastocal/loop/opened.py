@@ -1,12 +1,19 @@
 """Cases from the files that earlier steps wrote."""
 
-from elastocal.fitting.case import case_from
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import measurements
 
+if TYPE_CHECKING:
+    from pathlib import Path
 
-def opened_case(descriptions_path, measurements_path, part=None):
+
+def opened_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
     """A campaign from the files of step 1.
 
     Parameters

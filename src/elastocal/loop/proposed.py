@@ -1,5 +1,9 @@
 """The next experiment for a campaign that was diagnosed in one call, from its folder."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.proposal import table_of
@@ -7,8 +11,13 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in
 from elastocal.random_streams import stream
 
+if TYPE_CHECKING:
+    from pathlib import Path
 
-def proposed(folder, robots_folder, poses, ladder, seed):
+    import pandas as pd
+
+
+def proposed(folder: str | Path, robots_folder: str | Path, poses: int, ladder: tuple[float, ...], seed: int) -> pd.DataFrame:
     """Poses that best tell what was found in a campaign from its alternatives.
 
     Parameters

@@ -13,14 +13,14 @@ _IDENTITY = (
 )
 
 
-def _angles_and_wrench(joints):
+def _angles_and_wrench(joints: int) -> tuple[Column, ...]:
     return (
         *(Column(f"q{j}", "float64", "rad", f"angle of joint {j} of the chain") for j in range(1, joints + 1)),
         *(Column(name, "float64", unit, f"{meaning}, at the last measuring point") for name, unit, meaning in WRENCH),
     )
 
 
-def measurements(joints):
+def measurements(joints: int) -> TableSchema:
     """Measurements of a campaign, as the library takes them; what was not recorded is not a number."""
     return TableSchema(
         "measurements",
@@ -59,7 +59,7 @@ CORRELATIONS = TableSchema(
 )
 
 
-def residuals(joints):
+def residuals(joints: int) -> TableSchema:
     """Every measurement, before and after."""
     return TableSchema(
         "residuals",

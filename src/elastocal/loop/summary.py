@@ -1,16 +1,29 @@
 """All campaigns on one page: verdicts, and held-out errors before and after; folds of one campaign are pooled."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 import pandas as pd
 
 from elastocal.random_streams import stream
 from elastocal.validation.held_out import Errors, intervals, summary
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
 _REPLICATES = 1000
 _STAGES = ("before", "after")
 
 
-def campaign_rows(verdicts, residuals, folds, seed):
+def campaign_rows(
+    verdicts: Mapping[str, Mapping[str, Any]],
+    residuals: Mapping[str, pd.DataFrame],
+    folds: dict[str, list[str]],
+    seed: int,
+) -> pd.DataFrame:
     """One row for each campaign and session, and one for all folds of a campaign together.
 
     Parameters
@@ -36,12 +49,13 @@ def campaign_rows(verdicts, residuals, folds, seed):
         said = pd.Series([verdicts[member]["verdict"] for member in members]).value_counts()
         named = pd.Series([_effects(verdicts[member]) for member in members]).value_counts()
         head = {"campaign": name, "verdict": _counted(said, len(members)), "effects": _counted(named, len(members))}
+        session: Any
         for session, part in held_out.groupby("session"):
             rows.append(head | {"session": session} | _errors(part, stream(seed, name, "summary", session)))
     return pd.DataFrame(rows)
 
 
-def _effects(verdict):
+def _effects(verdict: Mapping[str, Any]) -> str:
     names = []
     for effect in verdict["effects"]:
         joints = ", ".join(map(str, effect["joints"]))
@@ -49,13 +63,13 @@ def _effects(verdict):
     return " + ".join(names) or "none"
 
 
-def _counted(counts, total):
+def _counted(counts: pd.Series, total: int) -> str:
     if total == 1:
         return counts.index[0]
     return "; ".join(f"{count} of {total}: {value}" for value, count in counts.items())
 
 
-def _errors(part, draws):
+def _errors(part: pd.DataFrame, draws: np.random.Generator) -> dict[str, float]:
     """Errors of averaged measurements: repeats of a state count once."""
     state = ["pose", "load", "target"]
     columns = [f"{stage}_{axis}" for stage in _STAGES for axis in ("dx", "dy", "dz")]
@@ -63,7 +77,7 @@ def _errors(part, draws):
     cluster = np.unique(mean.index.get_level_values("pose"), return_inverse=True)[1]
     errors = [Errors(np.linalg.norm(mean[columns[3 * k : 3 * k + 3]], axis=1), cluster) for k in range(len(_STAGES))]
     limits, reductions = intervals(errors, _REPLICATES, draws)
-    row = {"poses": errors[0].poses}
+    row: dict[str, float] = {"poses": errors[0].poses}
     for stage, error, limit in zip(_STAGES, errors, limits, strict=True):
         for name, value in summary(error.distance).items():
             row[f"{stage}_{name.removesuffix('_m')}_mm"] = 1e3 * value

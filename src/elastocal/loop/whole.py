@@ -1,15 +1,23 @@
 """A campaign's folder to its verdict in one call: what the blind proof, benchmarks and notebooks use. The pipeline makes the
 same two calls, with tables between them."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
-from elastocal.fitting.case import case_from
+from elastocal.fitting.case import Case, case_from
 from elastocal.loop.loading import load_campaign
 
+if TYPE_CHECKING:
+    from pathlib import Path
+    from typing import Any
 
-def cases_in(folder, robots_folder):
+
+def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
     """Training and held-out cases of a campaign's folder.
 
     Parameters
@@ -28,7 +36,7 @@ def cases_in(folder, robots_folder):
     )
 
 
-def diagnosed(folder, robots_folder, seed, settings=None):
+def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings: Settings | None = None) -> dict[str, Any]:
     """Diagnose a campaign and judge it on its held-out poses.
 
     Parameters

@@ -1,9 +1,19 @@
 """Every number that the text of the report states, from the tables, already worded with its standard error."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.study.comparison import ACCEPTED_Z
 from elastocal.study.tables import deviation_ratio, with_errors_merged, worded
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    import pandas as pd
 
 # The repeatability that the paper names for both robots, in µm.
 REPEATABILITY_UM = 60.0
@@ -25,7 +35,18 @@ EXPLANATIONS = {
 }
 
 
-def answers(comparison, table2, per_dataset, extended, solvers, metrics, replicates, noisiest, titles, cells):
+def answers(
+    comparison: pd.DataFrame,
+    table2: pd.DataFrame,
+    per_dataset: pd.DataFrame,
+    extended: pd.DataFrame,
+    solvers: pd.DataFrame,
+    metrics: pd.DataFrame,
+    replicates: pd.DataFrame,
+    noisiest: pd.DataFrame,
+    titles: Mapping[str, str],
+    cells: Mapping[str, Any],
+) -> dict[str, Any]:
     """Facts for the report.
 
     Parameters
@@ -85,12 +106,12 @@ def answers(comparison, table2, per_dataset, extended, solvers, metrics, replica
     }
 
 
-def _count(judged, table):
+def _count(judged: pd.DataFrame, table: str) -> dict[str, str]:
     z = judged[judged.table == table].z
     return {"table": table, "cells": str(len(z)), "within": str(int((z.abs() <= ACCEPTED_Z).sum()))}
 
 
-def _outside_row(row):
+def _outside_row(row: Any) -> dict[str, str]:
     return {
         "figure": f"Table {row.table}: {row.quantity}",
         "robot": row.robot,
@@ -102,12 +123,12 @@ def _outside_row(row):
     }
 
 
-def _explanation(row):
+def _explanation(row: Any) -> str:
     """Letter of what could explain a cell outside."""
     return {"2": "a", "3": "b"}.get(row.table, "c" if "k_sigma" in row.quantity else "d")
 
 
-def _text_row(row):
+def _text_row(row: Any) -> dict[str, str]:
     shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
     interpretation = row.interpretation if isinstance(row.interpretation, str) else ""
     return {
@@ -118,10 +139,11 @@ def _text_row(row):
     }
 
 
-def _one_set_rows(comparison, table2):
+def _one_set_rows(comparison: pd.DataFrame, table2: pd.DataFrame) -> list[dict[str, str]]:
     """The paper's Table 2 against the statistics of single data sets."""
     rows = []
     columns = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
+    figure: Any
     for figure in comparison[comparison.table == "2"].itertuples():
         found = table2[table2.robot == figure.robot]
         if len(found):
@@ -142,12 +164,21 @@ def _one_set_rows(comparison, table2):
     return rows
 
 
-def _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest):
+def _robot_facts(
+    robot: str,
+    title: str,
+    at: pd.DataFrame,
+    single: pd.DataFrame,
+    metrics: pd.DataFrame,
+    replicates: pd.DataFrame,
+    cells: Mapping[str, Any],
+    noisiest: pd.DataFrame,
+) -> dict[str, str]:
     noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
     averaged = at[at.robot == robot].set_index("strategy")
     # Strategies that are the same estimator differ by rounding; the first one listed speaks for them.
-    best = averaged.deviation.round(12).idxmin()
-    worst = averaged.deviation.idxmax()
+    best = str(averaged.deviation.round(12).idxmin())
+    worst = str(averaged.deviation.idxmax())
     ratio = deviation_ratio(metrics, replicates, robot, classical, best, noise_um, length)
     own = single[single.robot == robot]
     here = own[own.ds == length].set_index("strategy")
@@ -169,7 +200,7 @@ def _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest)
         "hidden": f"{here.mean_um[classical] / (1e6 * averaged.deviation[classical]):.1f}",
         "efficiency_best": worded(100 * here.efficiency[best], 100 * here.efficiency_std_error[best]),
         "efficiency_worst": worded(100 * here.efficiency.min(), 100 * here.efficiency_std_error[here.efficiency.idxmin()]),
-        "lowest_efficiency": here.efficiency.idxmin(),
+        "lowest_efficiency": str(here.efficiency.idxmin()),
         "repeatable_classical": _length_for(own, classical),
         "repeatable_best": _length_for(own, best),
         "noisiest_um": f"{noisiest.noise_um.max():g}",
@@ -178,7 +209,7 @@ def _robot_facts(robot, title, at, single, metrics, replicates, cells, noisiest)
     }
 
 
-def _length_for(own, strategy):
+def _length_for(own: pd.DataFrame, strategy: str) -> str:
     """Fewest configurations, of the lengths evaluated, whose RMS error is within the repeatability."""
     cell = own[(own.strategy == strategy) & (own.rms_um <= REPEATABILITY_UM)]
     return str(int(cell.ds.min())) if len(cell) else "more than all"

@@ -1,6 +1,9 @@
 """Everything that the report of the blind proof states, worded, from the tables of reports/blind/."""
 
+from __future__ import annotations
+
 import hashlib
+from typing import TYPE_CHECKING, Protocol
 
 import pandas as pd
 
@@ -11,6 +14,10 @@ from elastocal.blind.robots import PROOF, TUNED, leading
 from elastocal.blind.scores import NONE
 from elastocal.diagnosis.words import at_joints, listed
 from elastocal.report.wording import counted, grouped, plain, words
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable, Iterator, Mapping
+    from typing import Any
 
 _OUTSIDE = "outside:"
 _GROUPS = {
@@ -30,7 +37,22 @@ _SAID_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
 
 
-def blind_facts(tables, manifest, size, seed):
+class _Design(Protocol):
+    """What is told of the design of a campaign."""
+
+    @property
+    def poses(self) -> int: ...
+    @property
+    def held_out(self) -> int: ...
+    @property
+    def ladder(self) -> tuple[float, ...]: ...
+    @property
+    def repeats(self) -> int: ...
+    @property
+    def repeated_poses(self) -> int: ...
+
+
+def blind_facts(tables: Mapping[str, pd.DataFrame], manifest: str, size: str, seed: int) -> dict[str, Any]:
     """Facts for the report of the blind proof.
 
     Parameters
@@ -57,7 +79,7 @@ def blind_facts(tables, manifest, size, seed):
         "robots": {key: _robots(cases, key) for key in (PROOF, TUNED)},
         "proof": robots == PROOF,
         "verdict": _verdict(aimed, robots),
-        "missed": [_missed(row) for row in aimed.itertuples() if str(row.holds) == "False"],
+        "missed": [_missed(row) for row in _rows_of(aimed) if str(row.holds) == "False"],
         "protocol": {
             "cases": grouped(len(cases)),
             "size": size,
@@ -83,7 +105,12 @@ def blind_facts(tables, manifest, size, seed):
     }
 
 
-def _design(design):
+def _rows_of(table: pd.DataFrame) -> Iterator[Any]:
+    """Rows of a table; their attributes are its columns."""
+    return table.itertuples()
+
+
+def _design(design: _Design) -> dict[str, str]:
     return {
         "poses": f"{design.poses}",
         "held_out": f"{design.held_out}",
@@ -94,29 +121,29 @@ def _design(design):
     }
 
 
-def _robots(cases, key):
+def _robots(cases: pd.DataFrame, key: str) -> str:
     names = sorted(set(cases[cases.robots == key].robot))
     return listed(names) if names else ""
 
 
-def _verdict(aimed, robots):
+def _verdict(aimed: pd.DataFrame, robots: str) -> str:
     judged = aimed[aimed.holds.notna()]
     held = int((judged.holds.astype(str) == "True").sum())
     where = "the robots of the proof" if robots == PROOF else "robots on which the method was developed, which proves nothing"
     return f"{held} of {counted(len(judged), 'figure')} with a target reach it on {where}."
 
 
-def _missed(row):
+def _missed(row: Any) -> str:
     return f"{row.quantity}: {_value(row)} ({_interval(row)}), target {row.target}"
 
 
-def _value(row):
+def _value(row: Any) -> str:
     if pd.isna(row.rate):
         return _ABSENT
     return plain(row.rate, 4) if _is_ratio(row) else f"{100 * row.rate:.1f} %"
 
 
-def _interval(row):
+def _interval(row: Any) -> str:
     if pd.isna(row.low):
         return _ABSENT
     if _is_ratio(row):
@@ -124,38 +151,36 @@ def _interval(row):
     return f"{100 * row.low:.1f}–{100 * row.high:.1f} %"
 
 
-def _is_ratio(row):
+def _is_ratio(row: Any) -> bool:
     return row.quantity.startswith("held-out RMS after, over")
 
 
-def _hits(row):
+def _hits(row: Any) -> str:
     return grouped(int(row.cases)) if pd.isna(row.hits) else f"{grouped(int(row.hits))} of {grouped(int(row.cases))}"
 
 
-def _targets(summary, robots):
+def _targets(summary: pd.DataFrame, robots: str) -> list[list[str]]:
     mine = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
     said = {"True": "reached", "False": "missed"}
     return [
         [row.quantity, _hits(row), _value(row), _interval(row), row.target, said.get(str(row.holds), "no case")]
-        for row in mine.itertuples()
+        for row in _rows_of(mine)
     ]
 
 
-def _further(summary, robots):
+def _further(summary: pd.DataFrame, robots: str) -> list[list[str]]:
     mine = summary[(summary.robots == robots) & summary.target.fillna("").eq("")]
-    return [[row.quantity, _hits(row), _value(row), _interval(row)] for row in mine.itertuples()]
+    return [[row.quantity, _hits(row), _value(row), _interval(row)] for row in _rows_of(mine)]
 
 
-def _counts(cases):
+def _counts(cases: pd.DataFrame) -> dict[str, Any]:
     table = pd.crosstab(cases.group, cases.robot)
     heads = ["cases", *table.columns]
-    rows = [
-        [title, *(grouped(int(number)) for number in table.loc[key])] for key, title in _GROUPS.items() if key in table.index
-    ]
+    rows = [[title, *(grouped(int(number)) for number in table.T[key])] for key, title in _GROUPS.items() if key in table.index]
     return {"heads": heads, "rows": [*rows, ["all", *(grouped(int(number)) for number in table.sum())]]}
 
 
-def _effects(power, robots):
+def _effects(power: pd.DataFrame, robots: str) -> list[list[str]]:
     """Per effect at the largest level and the one before: what the heat map shows, with intervals and sizes."""
     mine = power[(power.robots == robots) & (power.group == "single") & (power.effect != "all")]
     rows = []
@@ -163,7 +188,7 @@ def _effects(power, robots):
         for row in part.sort_values("level").tail(2).to_dict("records"):
             rows.append(
                 [
-                    words(effect),
+                    words(str(effect)),
                     f"{row['level']:g}" + (" raw" if row["level_of"] == "raw" else ""),
                     f"{row['cases']}",
                     _share(row, "detected"),
@@ -177,17 +202,17 @@ def _effects(power, robots):
     return rows
 
 
-def _share(row, name):
+def _share(row: Mapping[Hashable, Any], name: str) -> str:
     rate, low, high = (row[f"{name}{end}"] for end in ("", "_low", "_high"))
     return _ABSENT if pd.isna(rate) else f"{100 * rate:.0f} ({100 * low:.0f}–{100 * high:.0f})"
 
 
-def _outside(confusion, robots):
+def _outside(confusion: pd.DataFrame, robots: str) -> list[list[str]]:
     """What is said of effects outside of the catalogue, in % of their cases at the largest size."""
     mine = confusion[(confusion.robots == robots) & confusion.truth.str.startswith(_OUTSIDE)]
     rows = []
     for truth, part in mine.groupby("truth"):
-        counts = part.loc[part.level.idxmax()].drop(["robots", "settings", "truth"])
+        counts = part.iloc[part.level.argmax()].drop(["robots", "settings", "truth"])
         level, counts = counts["level"], counts.drop("level").astype(float)
         said = {
             "class": counts[CLASS_WITH] + counts[CLASS_WITHOUT],
@@ -197,11 +222,11 @@ def _outside(confusion, robots):
         }
         said["wrong name"] = counts.sum() - sum(said.values())
         shares = [f"{100 * said[word] / counts.sum():.0f}" for word in _SAID_OUTSIDE]
-        rows.append([words(truth.removeprefix(_OUTSIDE)), f"{level:g}", f"{counts.sum():.0f}", *shares])
+        rows.append([words(str(truth).removeprefix(_OUTSIDE)), f"{level:g}", f"{counts.sum():.0f}", *shares])
     return rows
 
 
-def _settings(settings, robots):
+def _settings(settings: pd.DataFrame, robots: str) -> list[list[str]]:
     mine = settings[settings.robots == robots]
     return [
         [
@@ -212,13 +237,13 @@ def _settings(settings, robots):
             _ABSENT if row.kind == "no effect" else f"{100 * row.held / row.cases:.0f}",
             f"{100 * row.wrong / row.cases:.0f}",
         ]
-        for row in mine.itertuples()
+        for row in _rows_of(mine)
     ]
 
 
-def _undetectable(undetectable, robots):
+def _undetectable(undetectable: pd.DataFrame, robots: str) -> list[list[str]]:
     rows = []
-    for row in undetectable[undetectable.robots == robots].itertuples():
+    for row in _rows_of(undetectable[undetectable.robots == robots]):
         rows.append(
             [
                 words(row.effect),
@@ -233,14 +258,14 @@ def _undetectable(undetectable, robots):
     return rows
 
 
-def _sweep(sweep):
+def _sweep(sweep: pd.DataFrame) -> list[list[str]]:
     return [
         [f"{row['angle_up_to_deg']:g}°", f"{row['cases']}", *(_share(row, name) for name in _SAID_OF_RELATIVES)]
         for row in sweep[sweep.pair == "all"].to_dict("records")
     ]
 
 
-def _follow_up(follow_up):
+def _follow_up(follow_up: pd.DataFrame) -> list[list[str]]:
     return [
         [
             {PROOF: "proof", TUNED: "tuned on"}[row.robots],
@@ -250,5 +275,5 @@ def _follow_up(follow_up):
             f"{100 * row.right_name:.0f} %",
             f"{100 * row.low:.0f}–{100 * row.high:.0f} %",
         ]
-        for row in follow_up.itertuples()
+        for row in _rows_of(follow_up)
     ]

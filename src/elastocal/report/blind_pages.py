@@ -1,9 +1,18 @@
 """Pages of the blind proof."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.report.typesetting import compile_document
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from pathlib import Path
+    from typing import Any
 
-def write_blind_report(path, facts, figures):
+
+def write_blind_report(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
     """Compile the report of the blind proof; the file appears whole or not at all.
 
     Parameters

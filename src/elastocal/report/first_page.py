@@ -1,5 +1,9 @@
 """The first page of a campaign's report: the verdict, its probabilities, what it is worth and what to do now, in words."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.diagnosis.words import (
@@ -24,6 +28,10 @@ from elastocal.report.wording import (
     words,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
 TITLES = {
     "adequate": "the declared model is adequate",
     "named": "one mechanism is missing in the declared model",
@@ -41,7 +49,7 @@ _SURE = 0.95
 MOST_NAMES = 8
 
 
-def sentences(verdict):
+def sentences(verdict: Mapping[str, Any]) -> list[str]:
     """The verdict in plain words.
 
     Parameters
@@ -94,7 +102,7 @@ def sentences(verdict):
     return [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect), alarm]
 
 
-def probability_sentence(probabilities):
+def probability_sentence(probabilities: Mapping[str, Any]) -> str:
     """The most probable hypotheses in words, with their probabilities: 94 % gravity sag of joint 2, 6 % something else.
 
     Parameters
@@ -115,7 +123,7 @@ def probability_sentence(probabilities):
     return ", ".join(parts)
 
 
-def what_to_do(verdict, experiment):
+def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any]]) -> list[str]:
     """What follows from the verdict for whoever runs the robot, list of str."""
     said, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
     if any(effect["family"] == OF_DATA for effect in found):
@@ -171,7 +179,7 @@ def what_to_do(verdict, experiment):
     return advice
 
 
-def held_out_sentence(verdict, steps):
+def held_out_sentence(verdict: Mapping[str, Any], steps: Sequence[Mapping[str, Any]]) -> str:
     held_out = verdict["heldout"]
     before, after = held_out["before"]["rms_m"], held_out["after"]["rms_m"]
     poses = counted(held_out["poses"], "pose")
@@ -191,18 +199,18 @@ def held_out_sentence(verdict, steps):
     )
 
 
-def _found(effect):
+def _found(effect: Mapping[str, Any]) -> str:
     return found_words(effect["name"], effect["members"])
 
 
-def _ambiguity(effect):
+def _ambiguity(effect: Mapping[str, Any]) -> str:
     if not effect["alternatives"]:
         return f"Its probability is {probability_words(effect['probability'])}."
     others = listed((alternative_words(name) for name in effect["alternatives"]), MOST_NAMES, last="or")
     return f"Instead of {physical_name(effect['name'])} it may be {others}: these measurements do not distinguish them."
 
 
-def _unsure_location(effect):
+def _unsure_location(effect: Mapping[str, Any]) -> list[str]:
     found = [entry for entry in effect["locations"] if entry["probability"] >= LEAST_SHOWN]
     if len(effect["members"]) > 1 or not found or found[0]["probability"] >= _SURE:
         return []
@@ -213,7 +221,7 @@ def _unsure_location(effect):
     return [f"Its location is less certain: {each}."]
 
 
-def _transforms(faults):
+def _transforms(faults: Sequence[Mapping[str, Any]]) -> list[str]:
     """What turns the data into data that fit, where a fault says so."""
     return [
         f"{capital(words(fault['name']))}: the data fit with "
@@ -224,7 +232,7 @@ def _transforms(faults):
     ]
 
 
-def _with_interval(value, step):
+def _with_interval(value: float, step: Mapping[str, Any]) -> str:
     """A length with its 95 % interval, in one unit."""
     low, high = step["heldout_rms_m_low"], step["heldout_rms_m_high"]
     if not np.isfinite([low, high]).all():
@@ -234,6 +242,6 @@ def _with_interval(value, step):
     return f"{number} [{plain(factor * low)}, {plain(factor * high)}]\u00a0{unit}"
 
 
-def location_words(effect, location):
+def location_words(effect: str, location: str) -> str:
     """A location in words, without its effect: links 1, 2 and 3 (one section)."""
     return effect_words(effect, [location]).removeprefix(physical_name(effect)).strip().removeprefix("of ") or "the whole robot"

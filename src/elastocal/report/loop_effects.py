@@ -1,6 +1,9 @@
 """Effects that a campaign was found to have, and faults of its data, as its report presents them."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 from elastocal.diagnosis.words import alternative_words, listed, physical_name
 from elastocal.effects.catalogue import effects
@@ -19,6 +22,10 @@ from elastocal.report.wording import (
     words,
 )
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
 NONE_FOUND = {
     "adequate": "No mechanism of the catalogue is needed to explain these measurements.",
     "unexplained": "No mechanism of the catalogue explains these measurements.",
@@ -28,7 +35,7 @@ NONE_FOUND = {
 _MOST_PARAMETERS, _SHOWN_PARAMETERS = 16, 10
 
 
-def effect_facts(effect):
+def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
     """What the report says of one effect or fault of the data."""
     known = [entry for entry in effect["parameters"] if not entry.get("held")]
     rest = ""
@@ -74,14 +81,14 @@ def effect_facts(effect):
     }
 
 
-def description(effect):
+def description(effect: str) -> str:
     """What an effect of the catalogue is, in the words of its module, without the formula."""
     module = effects().get(effect)
-    summary = module.__doc__.split("\n\n")[0].replace("\n", " ") if module else words(effect)
+    summary = module.__doc__.split("\n\n")[0].replace("\n", " ") if module and module.__doc__ else words(effect)
     return re.sub(r", \w+\([^,]*=.*$", "", summary.split(":")[0]).rstrip(".")
 
 
-def _evidence(evidence):
+def _evidence(evidence: Sequence[float | None] | None) -> str:
     """RMS distance between measured and predicted positions as written and with the fault corrected."""
     if not evidence or None in evidence or len(evidence) < 2:
         return ""
@@ -89,16 +96,16 @@ def _evidence(evidence):
     return f"As written the data lie {length(before)} RMS from the nominal robot, corrected {length(after)}."
 
 
-def _of_data_joints(effect):
+def _of_data_joints(effect: Mapping[str, Any]) -> str:
     joints = effect["joints"] if effect["family"] == OF_DATA else ()
     return f" of joint{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}" if joints else ""
 
 
-def _gain(gain):
+def _gain(gain: float) -> str:
     return f"lowers the held-out RMS by {100 * gain:.0f} %" if gain >= 0 else f"raises the held-out RMS by {-100 * gain:.0f} %"
 
 
-def _parameter_row(entry, members):
+def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str]:
     # The longest, since keys may have blanks and one may begin another.
     member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default=None)
     # What belongs to an effect as a whole, such as its largest sag, is no member's; faults of the data have none.
@@ -114,5 +121,5 @@ def _parameter_row(entry, members):
     return [*row, "measurements" if entry["std_error"] else ""]
 
 
-def _distance_from_zero(entry):
+def _distance_from_zero(entry: Mapping[str, Any]) -> float:
     return abs(entry["value"]) / entry["std_error"] if entry["std_error"] else 0.0

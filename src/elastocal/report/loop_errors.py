@@ -1,11 +1,18 @@
 """Errors of a campaign's models on held-out poses, as tables and sentences of its report: by step, by split, by range."""
 
+from __future__ import annotations
+
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.words import in_words, listed
 from elastocal.report.wording import MICRO, MILLI, counted, length, minus, percent
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
 METRICS = ("mean", "rms", "p95", "max")
 SPLITS = {"held out": "validation poses (held out)", "joint space": "block of joint space", "session": "session"}
@@ -13,7 +20,7 @@ SPLITS = {"held out": "validation poses (held out)", "joint space": "block of jo
 _MOST_BLOCKS = 12
 
 
-def step_rows(steps, floor_m):
+def step_rows(steps: Sequence[Mapping[str, Any]], floor_m: float | None) -> dict[str, Any]:
     """Rows of the table before and after; each error as a list of lines: value, interval, multiple of the noise floor."""
     largest = max(step["heldout_max_m"] for step in steps)
     factor, unit = (MILLI, "mm") if largest >= 1e-3 else (MICRO, "µm")
@@ -33,7 +40,7 @@ def step_rows(steps, floor_m):
     return {"unit": unit, "rows": rows}
 
 
-def split_rows(splits):
+def split_rows(splits: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Rows of the splits table: what was left out, poses, RMS error before and after, reduction; errors with intervals."""
     if not splits:
         return {"unit": "mm", "rows": [], "left_out": 0, "changed": False}
@@ -64,7 +71,9 @@ def split_rows(splits):
     return {"unit": unit, "rows": rows, "left_out": left_out, "changed": changed}
 
 
-def as_judged(splits, steps, heldout):
+def as_judged(
+    splits: Sequence[dict[str, Any]], steps: Sequence[Mapping[str, Any]], heldout: Mapping[str, Any]
+) -> list[dict[str, Any]]:
     """Rows of the splits, that of the held-out poses with the intervals that stand in the table of the steps.
 
     Parameters
@@ -88,7 +97,7 @@ def as_judged(splits, steps, heldout):
     return [row | judged if row["split"] == "held out" else row for row in splits]
 
 
-def range_sentence(heldout):
+def range_sentence(heldout: Mapping[str, Any]) -> str:
     """How many validation poses lie outside the range of the fitted ones, and what the errors are inside and outside."""
     by_range, poses = heldout["outside_range"], counted(heldout["poses"], "validation pose")
     share = (
@@ -109,19 +118,19 @@ def range_sentence(heldout):
     )
 
 
-def _before_and_after(before, after):
+def _before_and_after(before: str, after: str) -> str:
     return after if before == after else f"{before} before and {after} after"
 
 
-def _error_unit(lengths_m):
+def _error_unit(lengths_m: Sequence[float]) -> tuple[float, str]:
     return (MILLI, "mm") if max(lengths_m) >= 1e-3 else (MICRO, "µm")
 
 
-def _number(value, unit):
+def _number(value: float, unit: str) -> str:
     return f"{value:.3f}" if unit == "mm" else minus(f"{value:.0f}")
 
 
-def _interval(row, name, factor, unit):
+def _interval(row: Mapping[str, Any], name: str, factor: float, unit: str) -> str:
     low, high = (factor * row[f"{name}_{end}"] for end in ("low", "high"))
     if np.isnan(low) or np.isnan(high):
         return "–"

@@ -1,14 +1,21 @@
 """The next experiment that a campaign's report proposes: the states to measure, and what is said of them."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.words import in_words
 from elastocal.report.wording import minus, plain
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
-def experiment_facts(rows, said=None):
+
+def experiment_facts(rows: Sequence[Mapping[str, Any]], said: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """Table of the states proposed, angles in degrees, and what is said of them.
 
     Parameters
@@ -36,7 +43,8 @@ def experiment_facts(rows, said=None):
     heads = ["point", *(f"{name} °" for name in angles), *(f"{name} {unit}" for name, unit in loads.items())]
     heads += [*(["approach"] if sides else []), *(["weight kg"] if weighed else []), "separation"]
     several = len({row["effect"] for row in rows}) > 1
-    shown, gains = [], []
+    shown: list[list[str]] = []
+    gains: list[tuple[str, str, str]] = []
     for row in rows:
         cells = [row["point"], *(f"{np.degrees(row[name]):.1f}" for name in angles)]
         cells += [f"{round(row[name])}" for name in loads]

@@ -1,5 +1,9 @@
 """Everything that the report of a campaign states, worded, from the files that the loop wrote."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.diagnosis.words import in_words
 from elastocal.report.first_page import (
     AT_FAULT,
@@ -18,8 +22,22 @@ from elastocal.report.loop_method import method, setting_rows, untestable_rows
 from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
 from elastocal.report.wording import as_sentence, length
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
 
-def loop_facts(verdict, steps, splits, experiment, table, descriptions, parameters):
+    import numpy as np
+
+
+def loop_facts(
+    verdict: Mapping[str, Any],
+    steps: Sequence[Mapping[str, Any]],
+    splits: Sequence[dict[str, Any]],
+    experiment: Sequence[Mapping[str, Any]],
+    table: Mapping[str, np.ndarray],
+    descriptions: Mapping[str, Any],
+    parameters: Mapping[str, np.ndarray],
+) -> dict[str, Any]:
     """Facts for the report of a campaign.
 
     Parameters
@@ -28,7 +46,7 @@ def loop_facts(verdict, steps, splits, experiment, table, descriptions, paramete
         Contents of verdict.json.
     steps, splits, experiment : list of dict
         Rows of before_after.csv, splits.csv and next_experiment.csv.
-    table, parameters : dict of str to ndarray
+    table, parameters : dict of str to ndarray (N,)
         Columns of the residuals and of the parameters of the final model.
     descriptions : dict
         Contents of campaign.json.

@@ -1,11 +1,18 @@
 """What a campaign measured and how noisy it is, as rows and sentences of its report."""
 
+from __future__ import annotations
+
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.words import listed
 from elastocal.report.wording import MICRO, counted, grouped, length, percent, plain
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
 
 NOISE_SOURCES = {
     "repeats": "The noise is taken from the differences between repeats of the same state.",
@@ -14,12 +21,12 @@ NOISE_SOURCES = {
 }
 
 
-def measured(table, descriptions):
+def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:
     """Rows of what was measured: name, training, held out.
 
     Parameters
     ----------
-    table : dict of str to ndarray
+    table : dict of str to ndarray (N,)
         Columns of the residuals table.
     descriptions : dict
         Contents of campaign.json.
@@ -37,7 +44,7 @@ def measured(table, descriptions):
     return [[name, *(part[name] for part in parts)] for name in parts[0]]
 
 
-def noise_rows(noise, with_orientation):
+def noise_rows(noise: Mapping[str, Any], with_orientation: bool) -> list[list[str]]:
     """Rows of the noise: name, value with unit."""
     rows = [["sensor, each component of a position", length(noise["position_m"])]]
     if with_orientation:
@@ -54,7 +61,7 @@ def noise_rows(noise, with_orientation):
     return rows
 
 
-def misfit_sentence(misfit):
+def misfit_sentence(misfit: Mapping[str, float] | None) -> str:
     """What the models leave on the fitted poses, against the noise.
 
     Parameters
@@ -78,7 +85,7 @@ def misfit_sentence(misfit):
     )
 
 
-def _part(part, campaign):
+def _part(part: Mapping[str, np.ndarray], campaign: Mapping[str, Any]) -> dict[str, str]:
     """What was measured in one part of the measurements."""
     if not len(part["pose"]):
         return dict.fromkeys(("campaign", "measurements"), "none")
@@ -121,5 +128,5 @@ def _part(part, campaign):
     }
 
 
-def _distinct(part, *names):
+def _distinct(part: Mapping[str, np.ndarray], *names: str) -> int:
     return len(np.unique(np.column_stack([part[name] for name in names]), axis=0))

@@ -1,12 +1,19 @@
 """How a campaign was diagnosed: numbers of the method, its settings, and candidates that could not be tested."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 from elastocal.diagnosis.words import listed, physical_name
 from elastocal.report.wording import as_sentence, capital, counted, grouped, members_words, percent, words
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
 
-def method(verdict, descriptions):
+
+def method(verdict: Mapping[str, Any], descriptions: Mapping[str, Any]) -> dict[str, str | bool]:
     """Numbers and names that the account of the method states.
 
     Parameters
@@ -36,7 +43,7 @@ def method(verdict, descriptions):
     }
 
 
-def setting_rows(settings):
+def setting_rows(settings: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
     """Rows of the settings: name, value, reason."""
     rows = []
     for name, entry in settings.items():
@@ -45,7 +52,7 @@ def setting_rows(settings):
     return rows
 
 
-def untestable_rows(untestable):
+def untestable_rows(untestable: Mapping[str, str]) -> list[list[str]]:
     """Candidates that were not tested, one row for each effect and reason.
 
     Parameters
@@ -57,7 +64,7 @@ def untestable_rows(untestable):
     -------
     list of list of str
     """
-    found = {}
+    found: dict[tuple[str, str], list[str]] = {}
     for key, reason in untestable.items():
         # Reasons that differ from joint to joint are one reason.
         alike = re.sub(r"^\d+ angles of joint \d+ where \d+ are needed$", "too few different joint angles", reason)

@@ -1,11 +1,18 @@
 """Pages of a campaign's report."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from elastocal.report.typesetting import compile_document
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Any
 
-def write_loop_report(path, facts, figures):
+
+def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str]) -> None:
     """Compile the report of a campaign; the file appears whole or not at all.
 
     Parameters

@@ -1,11 +1,18 @@
 """Parameters of a campaign's final model as rows of its report: those identified and those that are not."""
 
+from __future__ import annotations
+
 from collections import Counter
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
 from elastocal.diagnosis.words import candidate_words, listed
 from elastocal.report.wording import capital, scaled, words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from typing import Any
 
 # A standard error above this share of the prior's says what the prior says.
 _OF_THE_PRIOR = 0.7
@@ -13,7 +20,7 @@ _OF_THE_PRIOR = 0.7
 _MOST_OTHERS = 40
 
 
-def compliance_rows(compliance):
+def compliance_rows(compliance: Mapping[str, Sequence[float]]) -> list[list[str]]:
     """Rows of the compliances: joint, before, after with its standard error."""
     rows = []
     for joint, (before, after, error) in enumerate(
@@ -27,14 +34,14 @@ def compliance_rows(compliance):
     return rows
 
 
-def other_parameters(verdict, parameters):
+def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Estimates of the declared model beside the compliances, and how many there are of them, of frames and of targets.
 
     Parameters
     ----------
     verdict : dict
         Contents of verdict.json.
-    parameters : dict of str to ndarray
+    parameters : dict of str to ndarray (N,)
         Of the final model.
 
     Returns
@@ -43,7 +50,8 @@ def other_parameters(verdict, parameters):
         ``rows`` of the table, how many more there are (``left_out``), and ``placement`` in words.
     """
     mine = {member for effect in verdict["effects"] for member in effect.get("members", [])}
-    rows, counts = [], Counter()
+    rows: list[list[str]] = []
+    counts: Counter[str] = Counter()
     columns = (parameters[name] for name in ("owner", "parameter", "value", "std_error", "unit", "held", "prior_std"))
     for owner, name, value, error, unit, held, prior in zip(*columns, strict=True):
         if held or owner in mine or owner in ("fit", "joint_compliance") or mostly_prior(error, prior):
@@ -60,21 +68,21 @@ def other_parameters(verdict, parameters):
     }
 
 
-def held_rows(held):
+def held_rows(held: Iterable[str]) -> list[list[str]]:
     """Parameters that the measurements do not determine, one row for each owner."""
-    owners = {}
+    owners: dict[str, list[str]] = {}
     for name in held:
         owner, parameter = name.rsplit(" ", 1)
         owners.setdefault(owner, []).append(words(parameter))
     return [[capital(candidate_words(owner)), ", ".join(names)] for owner, names in owners.items()]
 
 
-def left_to_priors(parameters):
+def left_to_priors(parameters: Mapping[str, np.ndarray]) -> list[str]:
     """Parameters about which the measurements say hardly more than their priors.
 
     Parameters
     ----------
-    parameters : dict of str to ndarray
+    parameters : dict of str to ndarray (N,)
         Of the final model.
 
     Returns
@@ -86,15 +94,23 @@ def left_to_priors(parameters):
     return [f"{owner} {name}" for owner, name in zip(parameters["owner"][mine], parameters["parameter"][mine], strict=True)]
 
 
-def mostly_prior(std_error, prior_std):
+@overload
+def mostly_prior(std_error: float, prior_std: float) -> bool: ...
+
+
+@overload
+def mostly_prior(std_error: np.ndarray, prior_std: np.ndarray) -> np.ndarray: ...
+
+
+def mostly_prior(std_error: float | np.ndarray, prior_std: float | np.ndarray) -> bool | np.ndarray:
     """Whether a standard error says hardly more than the prior's.
 
     Parameters
     ----------
-    std_error, prior_std : float or ndarray
+    std_error, prior_std : float or ndarray (N,)
 
     Returns
     -------
-    bool or ndarray of bool
+    bool or ndarray of bool (N,)
     """
     return std_error > _OF_THE_PRIOR * prior_std

@@ -1,9 +1,20 @@
 """Pages of the study's report: a typst document over its tables, figures and answers."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from elastocal.report.typesetting import compile_document
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+    from pathlib import Path
+    from typing import Any
 
-def write_report(path, facts, tables, figures):
+
+def write_report(
+    path: str | Path, facts: Mapping[str, Any], tables: Mapping[str, Sequence[Sequence[str]]], figures: Iterable[str]
+) -> None:
     """Compile the report; the file appears whole or not at all.
 
     Parameters

@@ -1,17 +1,24 @@
 """A typst document of this folder to a PDF, with the data and pictures that it reads beside it."""
 
+from __future__ import annotations
+
 import json
 import shutil
 import tempfile
 from importlib import resources
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typst
 
 from elastocal.io.atomic_writes import atomic_write
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+    from typing import Any
 
-def compile_document(path, document, data, figures=()):
+
+def compile_document(path: str | Path, document: str, data: Mapping[str, Any], figures: Iterable[str] = ()) -> None:
     """Compile a document; the PDF appears whole or not at all.
 
     Parameters
@@ -33,4 +40,4 @@ def compile_document(path, document, data, figures=()):
         for figure in figures:
             shutil.copy(figure, folder)
         with atomic_write(path) as partial:
-            typst.compile(source, output=partial, format="pdf", root=folder)
+            typst.compile(source, output=Path(partial), format="pdf", root=source.parent)

@@ -1,10 +1,16 @@
 """Numbers, units and names of the loop as people write them."""
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.words import at_joints, detail_words
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 MICRO, MILLI = 1e6, 1e3
 # A blank at which no line ends.
@@ -13,38 +19,38 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _KEY = re.compile(r"^(?P<effect>[^@\[]+)(?:@(?P<joints>[\d+]+))?(?:\[(?P<detail>.*)\])?$")
 
 
-def words(name):
+def words(name: str) -> str:
     """A name of the catalogue or of a parameter as words."""
     return name.replace("_", " ")
 
 
-def capital(text):
+def capital(text: str) -> str:
     """A text with a capital at its beginning."""
     return text[:1].upper() + text[1:]
 
 
-def as_sentence(text):
+def as_sentence(text: str) -> str:
     """A text with a capital and a full stop."""
     text = text.strip()
     return capital(text) + ("" if text.endswith(".") else ".")
 
 
-def minus(text):
+def minus(text: str) -> str:
     """A number with a true minus sign."""
     return text.replace("-", "−")
 
 
-def counted(number, one, many=None):
+def counted(number: int, one: str, many: str | None = None) -> str:
     """A number with its noun, with thin spaces in large numbers."""
     return f"{grouped(number)} {one if number == 1 else many or one + 's'}"
 
 
-def grouped(number):
+def grouped(number: int) -> str:
     """A whole number with a thin space between thousands."""
     return f"{number:,}".replace(",", "\u2009")
 
 
-def members_words(keys, most=12):
+def members_words(keys: Iterable[str], most: int = 12) -> str:
     """What an effect was found as: its joints or links and variants, those of one joint together.
 
     Parameters
@@ -57,13 +63,14 @@ def members_words(keys, most=12):
     -------
     str
     """
-    details = {}
+    details: dict[tuple[str, tuple[int, ...]], list[str]] = {}
     for key in sorted(keys, key=_natural):
         found = _KEY.match(key)
-        joints = tuple((found["joints"] or "").split("+")) if found["joints"] else ()
+        assert found, key
+        joints = tuple(map(int, found["joints"].split("+"))) if found["joints"] else ()
         details.setdefault((found["effect"], joints), []).append(detail_words(found["effect"], found["detail"] or ""))
     # Single joints of which the same is to be told stand together.
-    alike = {}
+    alike: dict[tuple[str, tuple[int, ...] | None, str], list[int]] = {}
     for (effect, joints), which in details.items():
         group = (effect, joints if len(joints) != 1 else None, ", ".join(filter(None, which)))
         alike.setdefault(group, []).extend(joints)
@@ -75,11 +82,11 @@ def members_words(keys, most=12):
     return "; ".join(shown[:most]) + (f"; {len(shown) - most} more" if len(shown) > most else "")
 
 
-def _natural(key):
+def _natural(key: str) -> list[int | str]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", key)]
 
 
-def length(metres, digits=3):
+def length(metres: float | None, digits: int = 3) -> str:
     """A length with its unit, µm below one millimetre; "unknown" where there is none."""
     if metres is None:
         return "unknown"
@@ -87,7 +94,7 @@ def length(metres, digits=3):
     return f"{plain(factor * metres, digits)}{_TIED}{unit}"
 
 
-def plain(value, digits=3):
+def plain(value: float, digits: int = 3) -> str:
     """A number with so many significant digits and without an exponent."""
     if value == 0:
         return "0"
@@ -96,12 +103,12 @@ def plain(value, digits=3):
     return f"{value:.{max(0, digits - 1 - power)}f}"
 
 
-def percent(share):
+def percent(share: float) -> str:
     """A share in percent."""
     return f"{100 * share:.0f}{_TIED}%"
 
 
-def probability_words(probability):
+def probability_words(probability: float) -> str:
     """A probability in whole percent; none is said to be 0 or 100 %."""
     if probability < 0.005:
         return f"<{_TIED}1{_TIED}%"
@@ -110,7 +117,7 @@ def probability_words(probability):
     return percent(probability)
 
 
-def scaled(value, error, unit):
+def scaled(value: float, error: float | None, unit: str) -> tuple[str, str]:
     """A value with its standard error in a unit that suits it.
 
     Parameters
@@ -145,7 +152,7 @@ def scaled(value, error, unit):
     return text.replace("-", "−"), shown
 
 
-def _unit(value, unit):
+def _unit(value: float, unit: str) -> tuple[float, str]:
     shown = {"1": "", "–": ""}.get(unit, unit)
     factor = 1.0
     if re.match(r"rad\b(?!/rad)", unit) and abs(value) < 1e-2:
