@@ -15,7 +15,10 @@ References
    1997.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +26,11 @@ from elastocal.diagnosis.evidence import blocks_of, log_likelihood, log_sum_exp
 from elastocal.diagnosis.search import REACH
 from elastocal.diagnosis.statistics import null_draws
 from elastocal.diagnosis.summed import Sums
+
+if TYPE_CHECKING:
+    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.search import Problem
+    from elastocal.diagnosis.statistics import Products, Statistics
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,7 @@ class Alarm:
     raised: bool
 
 
-def alarm_of(problem, products, pose_error_rad, stream):
+def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float, stream: np.random.Generator) -> Alarm:
     """Test whether the declared model lacks anything.
 
     Parameters
@@ -69,13 +77,15 @@ def alarm_of(problem, products, pose_error_rad, stream):
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
 
-def _near(pose_error_rad, fitted, reach):
+def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> np.ndarray:
     """Sizes of the pose error that draws of the fitted one can make likely: its own, and some to either side."""
     place = int(np.argmin(np.abs(pose_error_rad - fitted)))
     return np.arange(max(place - reach, 0), min(place + reach + 1, len(pose_error_rad)))
 
 
-def _average_bayes_factors(problem, statistics, log_pose, along, squares):
+def _average_bayes_factors(
+    problem: Problem, statistics: Statistics, log_pose: np.ndarray, along: np.ndarray, squares: np.ndarray
+) -> np.ndarray:
     """Log of the average Bayes factor for N sets of measurements, ndarray (N,).
 
     Parameters
@@ -105,11 +115,11 @@ def _average_bayes_factors(problem, statistics, log_pose, along, squares):
     return total - nothing
 
 
-def _alternatives(problem):
+def _alternatives(problem: Problem) -> tuple[list[Unit], list[float]]:
     """Every unit, and every mechanism with one law at all its locations in one size; with their log prior odds."""
     prior = problem.prior
     alternatives, log_priors = list(problem.units), [prior.log_odds_of([unit]) for unit in problem.units]
-    laws = {}
+    laws: dict[tuple[str, str, tuple[float, ...]], list[Unit]] = {}
     for unit in problem.units:
         if unit.candidate:
             laws.setdefault((unit.mechanism, unit.candidate.detail, unit.shapes), []).append(unit)

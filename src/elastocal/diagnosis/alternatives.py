@@ -20,12 +20,22 @@ References
 .. [3] Kolchinsky, A. and Tracey, B. D., Estimating mixture entropy with pairwise distances, Entropy 19, 2017.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.statistics import normal_equations
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from elastocal.diagnosis.diagnose import Evidence
+    from elastocal.diagnosis.new_states import Instrument
+    from elastocal.diagnosis.search import Model
 
 # Draws of each model's coefficients.
 _DRAWS = 4
@@ -51,15 +61,15 @@ class Members:
         Times white noise, deviations of its coefficients.
     """
 
-    names: tuple
+    names: tuple[tuple[str, ...], ...]
     hypothesis: np.ndarray
     log_weights: np.ndarray
-    columns: tuple
+    columns: tuple[np.ndarray, ...]
     means: np.ndarray
-    precisions: tuple
-    roots: tuple
+    precisions: tuple[np.ndarray, ...]
+    roots: tuple[np.ndarray, ...]
 
-    def without(self, hypotheses):
+    def without(self, hypotheses: Sequence[int]) -> Members:
         """These models without those of some hypotheses."""
         kept = np.flatnonzero(~np.isin(self.hypothesis, hypotheses))
         numbers = [h for h in range(len(self.names)) if h not in hypotheses]
@@ -67,12 +77,13 @@ class Members:
             tuple(self.names[h] for h in numbers),
             np.searchsorted(numbers, self.hypothesis[kept]),
             self.log_weights[kept] - log_sum_exp(self.log_weights[kept]),
-            *(tuple(values[m] for m in kept) for values in (self.columns,)),
+            tuple(self.columns[m] for m in kept),
             self.means[kept],
-            *(tuple(values[m] for m in kept) for values in (self.precisions, self.roots)),
+            tuple(self.precisions[m] for m in kept),
+            tuple(self.roots[m] for m in kept),
         )
 
-    def drawn(self, model, count, stream):
+    def drawn(self, model: int, count: int, stream: np.random.Generator) -> np.ndarray:
         """Coefficients from the posterior of one model, ndarray (count, U)."""
         found = np.repeat(self.means[model][None], count, axis=0)
         white = stream.standard_normal((count, len(self.columns[model])))
@@ -80,7 +91,9 @@ class Members:
         return found
 
 
-def members_of(evidence, kept, instrument, lead, factor):
+def members_of(
+    evidence: Evidence, kept: Mapping[tuple[str, ...], Sequence[Model]], instrument: Instrument, lead: Model, factor: float
+) -> Members:
     """Posterior of the coefficients of each model, in units of the noise that the leading model leaves.
 
     All models are taken at the pose error of the leading one; half-normal priors count as normal ones.
@@ -126,11 +139,11 @@ def members_of(evidence, kept, instrument, lead, factor):
             means.append(mean)
             precisions.append(whole)
             roots.append(np.linalg.inv(np.linalg.cholesky(whole)).T)
-    odds = np.array(odds)
+    log_weights = np.array(odds)
     return Members(
         tuple(kept),
         np.array(hypothesis),
-        odds - log_sum_exp(odds),
+        log_weights - log_sum_exp(log_weights),
         tuple(columns),
         np.array(means),
         tuple(precisions),
@@ -138,7 +151,7 @@ def members_of(evidence, kept, instrument, lead, factor):
     )
 
 
-def _misfits(members, information, truths):
+def _misfits(members: Members, information: np.ndarray, truths: np.ndarray) -> np.ndarray:
     """-2 ln p_j on average, but for what is common to all models, for measurements that true coefficients make.
 
     Parameters
@@ -186,18 +199,18 @@ class Criterion:
     source: np.ndarray
 
     @classmethod
-    def of(cls, members, stream):
+    def of(cls, members: Members, stream: np.random.Generator) -> Criterion:
         """With fresh draws."""
         count = len(members.means)
         truths = np.concatenate([members.drawn(model, _DRAWS, stream) for model in range(count)])
         return cls(members, truths, np.repeat(np.arange(count), _DRAWS))
 
     @property
-    def work(self):
+    def work(self) -> int:
         """Multiplications for one entry."""
         return sum(len(columns) ** 3 for columns in self.members.columns) + self.truths.size * self.truths.shape[1]
 
-    def left(self, information):
+    def left(self, information: np.ndarray) -> np.ndarray:
         """Entropy left after experiments of some information (N, U, U), ndarray (N,), nats."""
         misfits = _misfits(self.members, information, self.truths)
         own = misfits[:, np.arange(len(self.source)), self.source]

@@ -11,13 +11,23 @@ References
    Science 14, 1999.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.statistics import normal_equations
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.search import Model, Posterior, Problem
 
 # Models that hold less than this move no digit that is reported.
 _LEAST_PROBABILITY = 0.002
@@ -34,11 +44,11 @@ class Averaged:
     std_error : dict of (str, str) to float
     """
 
-    shift: dict
-    std_error: dict
+    shift: dict[tuple[str, str], float]
+    std_error: dict[tuple[str, str], float]
 
 
-def averaged(linearized, posterior, best, owners):
+def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: Sequence[tuple[str, str]]) -> Averaged:
     """Average over the models of a posterior.
 
     Parameters
@@ -56,13 +66,14 @@ def averaged(linearized, posterior, best, owners):
     """
     likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
-    moments, exact = {}, None
-    for model, probability in likely:
-        found = _moments(linearized, model, equations[model.pose_error_rad], owners)
-        exact = found if model is best else exact
+    each = [(model, _moments(linearized, model, equations[model.pose_error_rad], owners)) for model, _ in likely]
+    exact = next(found for model, found in each if model is best)
+    moments: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
+    for (_, probability), (_, found) in zip(likely, each, strict=True):
         for name, (mean, variance) in found.items():
             moments.setdefault(name, []).append((probability, mean, variance))
-    shift, std_error = {}, {}
+    shift: dict[tuple[str, str], float] = {}
+    std_error: dict[tuple[str, str], float] = {}
     for name, entries in moments.items():
         weight, mean, variance = np.array(entries).T
         weight = weight / weight.sum()
@@ -73,7 +84,7 @@ def averaged(linearized, posterior, best, owners):
     return Averaged(shift, std_error)
 
 
-def expected_to_help(problem, posterior, model):
+def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bool:
     """Whether predictions are expected to be better with a model than without it, at poses like those of the measurements.
 
     By the posterior expectation of squared error: with d the displacement that a model predicts and E d its mean over all
@@ -98,15 +109,16 @@ def expected_to_help(problem, posterior, model):
     return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
 
 
-def _likely(posterior, best):
+def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     """Models that count, and the best, with their probabilities."""
     pairs = zip(posterior.models, posterior.probabilities, strict=True)
     return [(model, probability) for model, probability in pairs if probability >= _LEAST_PROBABILITY or model is best]
 
 
-def squares_explained(problem, model):
+def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model makes, dict of str to float."""
-    coefficients, gram, found = _predicted(problem, model), problem.statistics.gram[0], {}
+    coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
+    found: dict[str, float] = {}
     for mechanism in {problem.units[number].mechanism for number in model.units}:
         units = [problem.units[number] for number in model.units if problem.units[number].mechanism == mechanism]
         columns = np.concatenate([unit.columns for unit in units])
@@ -114,7 +126,7 @@ def squares_explained(problem, model):
     return found
 
 
-def _predicted(problem, model):
+def _predicted(problem: Problem, model: Model) -> np.ndarray:
     """Coefficients of all columns in a model at its most probable sizes, in plausible sizes, ndarray (K,)."""
     coefficients = np.zeros(problem.statistics.gram.shape[1])
     if model.units:
@@ -125,7 +137,9 @@ def _predicted(problem, model):
     return coefficients
 
 
-def _moments(linearized, model, equations, owners):
+def _moments(
+    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]]
+) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, units = linearized.products, [linearized.problem.units[number] for number in model.units]
     declared = products.declared
@@ -142,17 +156,19 @@ def _moments(linearized, model, equations, owners):
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
     for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model), strict=True):
-        for index, parameter in enumerate(unit.candidate.parameters if unit.candidate else ()):
+        if unit.candidate is None:
+            continue
+        for index, parameter in enumerate(unit.candidate.parameters):
             found[unit.candidate.key, parameter.name] = unit.sizes[index] * value[index], unit.sizes[index] ** 2 * spread[index]
     return found
 
 
-def _coefficients(problem, units, model):
+def _coefficients(problem: Problem, units: Sequence[Unit], model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
     """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
     return _joint(problem, units, model).moments() if units else []
 
 
-def _joint(problem, units, model):
+def _joint(problem: Problem, units: Sequence[Unit], model: Model) -> Joint:
     places = np.searchsorted(problem.grid.scales, model.scales)
     base = problem.statistics.log_likelihood + problem.log_pose
     return Joint(problem.statistics, units, problem.grid, base, places)

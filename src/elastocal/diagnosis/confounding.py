@@ -8,13 +8,22 @@ References
    27, 1973.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.diagnosis.search import Problem
 
 # Directions that keep less than this share of a unit's largest are rounding.
 _ROUNDING = 1e-6
 
 
-def angles_between(problem, numbers):
+def angles_between(problem: Problem, numbers: Sequence[int]) -> np.ndarray:
     """Smallest angle between each two of some units.
 
     Parameters
@@ -42,7 +51,7 @@ def angles_between(problem, numbers):
     return np.degrees(np.arccos(np.clip(cosines, 0.0, 1.0)))
 
 
-def nearest_angles(problem, found):
+def nearest_angles(problem: Problem, found: Sequence[int]) -> np.ndarray:
     """Angle of each unit to the nearest of those found.
 
     Parameters
@@ -71,7 +80,7 @@ def nearest_angles(problem, found):
     return nearest
 
 
-def _orthonormal(gram, columns):
+def _orthonormal(gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(gram[np.ix_(columns, columns)])
     kept = values > _ROUNDING * max(values[-1], np.finfo(float).tiny)
     return vectors[:, kept] / np.sqrt(values[kept])

@@ -1,6 +1,9 @@
 """The two calls: `diagnose` looks at training poses alone, `judge` opens the held-out ones, once, at the end."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +20,18 @@ from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.random_streams import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from elastocal.data_checks.protocol import Fault
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.search import Posterior
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.verdict import Conclusion, Hypothesis
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.noise import Noise
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -36,7 +51,7 @@ class Step:
 
     name: str
     kind: str
-    fitted: object
+    fitted: Fit
 
 
 @dataclass(frozen=True)
@@ -53,10 +68,10 @@ class Evidence:
         Whether the effects found enter the model.
     """
 
-    linearized: object
-    posterior: object
+    linearized: Linearized
+    posterior: Posterior
     alarm: Alarm
-    conclusion: object
+    conclusion: Conclusion
     adopted: bool
 
 
@@ -74,23 +89,23 @@ class Diagnosis:
         Contents of verdict.json, but for what held-out poses say.
     """
 
-    case: object
-    steps: tuple
+    case: Case
+    steps: tuple[Step, ...]
     evidence: Evidence | None
-    document: dict = field(repr=False)
+    document: dict[str, Any] = field(repr=False)
 
     @property
-    def declared(self):
+    def declared(self) -> Fit:
         """Fit of the declared model."""
         return next(step.fitted for step in self.steps if step.kind == "declared")
 
     @property
-    def final(self):
+    def final(self) -> Fit:
         """Fit with all effects that were adopted."""
         return self.steps[-1].fitted
 
 
-def diagnose(case, settings, seed, progress=None):
+def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str], None] | None = None) -> Diagnosis:
     """Find what the declared model of a campaign lacks.
 
     Parameters
@@ -127,7 +142,7 @@ def diagnose(case, settings, seed, progress=None):
     return Diagnosis(case, tuple(steps), found, document)
 
 
-def _explained(case, declared, settings, seed, tell):
+def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
     candidates = list(case.candidates.values())
     about, searched = searched_part(declared, case.observations, settings)
@@ -163,7 +178,7 @@ def _explained(case, declared, settings, seed, tell):
     return Evidence(problem, found, alarm, conclusion, adopted), final
 
 
-def _effect_steps(case, declared, final, found):
+def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
     model = found.posterior.models[found.conclusion.best.model]
     chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
@@ -178,12 +193,24 @@ def _effect_steps(case, declared, final, found):
     return steps
 
 
-def _document(case, noise, steps, with_effects, found, known, settings, warnings):
+def _document(
+    case: Case,
+    noise: Noise,
+    steps: Sequence[Step],
+    with_effects: Fit,
+    found: Evidence | None,
+    known: Sequence[Fault],
+    settings: Settings,
+    warnings: Sequence[str],
+) -> dict[str, Any]:
     declared, final = steps[1].fitted, steps[-1].fitted
     listed = [vars(fault) | {"parameters": [vars(value) for value in fault.parameters]} for fault in known]
     decisive = [fault for fault in listed if fault["decisive"]]
     springs = Averaged({}, {})
-    entries, probabilities, untestable, misfit = [findings.fault_entry(fault) for fault in decisive], None, {}, None
+    entries = [findings.fault_entry(fault) for fault in decisive]
+    probabilities: dict[str, Any] | None = None
+    untestable: dict[str, str] = {}
+    misfit: dict[str, float] | None = None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
     said = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
     if found:
@@ -225,19 +252,19 @@ def _document(case, noise, steps, with_effects, found, known, settings, warnings
     }
 
 
-def _told(conclusion, alarm):
+def _told(conclusion: Conclusion, alarm: Alarm) -> str:
     best = " + ".join(conclusion.best.mechanisms) or "nothing"
     return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
 
 
-def _misfit(found):
+def _misfit(found: Evidence) -> dict[str, float]:
     """Mean square of the residual over that of the noise: declared, and with the most probable model."""
     problem, models = found.linearized.problem, found.posterior.models
     best = models[found.conclusion.best.model] if found.conclusion.best.mechanisms else found.posterior.nothing
     return {"before": mean_square_left(problem, found.posterior.nothing), "after": mean_square_left(problem, best)}
 
 
-def _noise_facts(measured, left):
+def _noise_facts(measured: Noise, left: Noise) -> dict[str, Any]:
     return {
         "source": measured.source,
         "position_m": measured.position_m,
@@ -249,7 +276,7 @@ def _noise_facts(measured, left):
     }
 
 
-def _noise_warnings(measured, left, settings):
+def _noise_warnings(measured: Noise, left: Noise, settings: Settings) -> list[str]:
     factor = left.position_m / measured.position_m
     if factor < settings.relinearize_noise:
         return []
@@ -257,7 +284,7 @@ def _noise_warnings(measured, left, settings):
     return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
 
 
-def _pose_error_warnings(left, linearized):
+def _pose_error_warnings(left: Noise, linearized: Linearized) -> list[str]:
     if left.pose_rad < linearized.pose_std_error_rad:
         return []
     return [
@@ -266,14 +293,14 @@ def _pose_error_warnings(left, linearized):
     ]
 
 
-def _averages(declared, found, best):
+def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averaged:
     """Averages beside the exact fit of a hypothesis, or of the declared model."""
-    best = found.posterior.models[best.model] if best else found.posterior.nothing
+    model = found.posterior.models[best.model] if best else found.posterior.nothing
     owners = [(owner, parameter.name) for owner, parameter in declared.parameters]
-    return averaged(found.linearized, found.posterior, best, owners)
+    return averaged(found.linearized, found.posterior, model, owners)
 
 
-def _compliances(declared, final, springs):
+def _compliances(declared: Fit, final: Fit, springs: Averaged) -> dict[str, list[float]]:
     joints = final.model.sites.joints
     after, deviations = joint_compliances(final.model, final.estimate).copy(), np.zeros(joints)
     if final.model.identifies_compliance:

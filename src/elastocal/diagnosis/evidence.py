@@ -27,15 +27,25 @@ References
    Methods 10, 2005.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import lapack, solve_triangular
 from scipy.special import log_ndtr
 
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Iterator, Sequence
 
-def log_sum_exp(values, axis=None):
+    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import Statistics
+
+
+def log_sum_exp(values: np.ndarray, axis: int | None = None) -> np.ndarray:
     """ln of the sum of exponentials, as scipy's logsumexp without its cost on small arrays.
 
     Parameters
@@ -45,7 +55,8 @@ def log_sum_exp(values, axis=None):
 
     Returns
     -------
-    ndarray or float
+    ndarray
+        Without that axis; of no dimension where all are summed.
     """
     highest = np.max(values, axis=axis, keepdims=True)
     highest = np.where(np.isfinite(highest), highest, 0.0)
@@ -66,19 +77,19 @@ class Grid:
     scales: np.ndarray
     log_weights: np.ndarray
 
-    def of(self, unit):
+    def of(self, unit: Unit) -> np.ndarray:
         """Logarithms of the weights for one unit: its smallest size and those above share them, ndarray (S,)."""
         return self._from[unit.smallest]
 
     @cached_property
-    def _from(self):
+    def _from(self) -> np.ndarray:
         """Weights from each size on, ndarray (S, S)."""
         places = np.arange(len(self.scales))
         weights = np.where(places < places[:, None], -np.inf, self.log_weights)
         return weights - log_sum_exp(weights, axis=1)[:, None]
 
 
-def scale_weights(scales, settings):
+def scale_weights(scales: Sequence[float] | np.ndarray, settings: Settings) -> np.ndarray:
     """Logarithms of the prior weights of sizes: log-normal pieces below and above the most likely size.
 
     Parameters
@@ -96,7 +107,7 @@ def scale_weights(scales, settings):
     return log_weights - log_sum_exp(log_weights)
 
 
-def pose_weights(pose_error_rad, settings):
+def pose_weights(pose_error_rad: np.ndarray, settings: Settings) -> np.ndarray:
     """Logarithms of the prior weights of sizes of the pose error, one of which is zero.
 
     Parameters
@@ -113,17 +124,19 @@ def pose_weights(pose_error_rad, settings):
     return np.log(np.where(there, share, 1.0 - settings.pose_error_probability))
 
 
-def log_likelihood(squares, freedom):
+def log_likelihood(squares: np.ndarray, freedom: int) -> np.ndarray:
     """l(rss): the profiled likelihood of the noise, which is at least one.
 
     Parameters
     ----------
     squares : ndarray
+        Of any shape.
     freedom : int
 
     Returns
     -------
     ndarray
+        Of the same shape.
     """
     variance = np.maximum(squares / freedom, 1.0)
     return -0.5 * freedom * np.log(variance) - 0.5 * squares / variance
@@ -152,15 +165,15 @@ class Conditioned:
     log_occam: np.ndarray
 
     @cached_property
-    def gram(self):
+    def gram(self) -> np.ndarray:
         """W'MW given these columns, ndarray (T, K, K)."""
         return self.free - self.cross.transpose(0, 2, 1) @ self.cross if self.cross.shape[1] else self.free
 
-    def blocks_of(self, units, chosen):
+    def blocks_of(self, units: Sequence[Unit], chosen: Sequence[int]) -> Blocks:
         """As `blocks_of` of the whole matrix, of which only the blocks of these units are made."""
         return _decomposed(units, chosen, self._part)
 
-    def _part(self, at):
+    def _part(self, at: np.ndarray) -> np.ndarray:
         part = self.free[:, at[:, :, None], at[:, None, :]]
         if not self.cross.shape[1]:
             return part
@@ -168,7 +181,7 @@ class Conditioned:
         return part - mine.transpose(0, 1, 3, 2) @ mine
 
 
-def condition(statistics, columns, deviations, log_pose):
+def condition(statistics: Statistics, columns: np.ndarray, deviations: np.ndarray, log_pose: np.ndarray) -> Conditioned:
     """Take columns into the model.
 
     Parameters
@@ -214,13 +227,13 @@ class Blocks:
     columns : tuple of ndarray of int (U, d)
     """
 
-    members: tuple
-    values: tuple
-    vectors: tuple
-    columns: tuple
+    members: tuple[np.ndarray, ...]
+    values: tuple[np.ndarray, ...]
+    vectors: tuple[np.ndarray, ...]
+    columns: tuple[np.ndarray, ...]
 
 
-def blocks_of(gram, units, chosen):
+def blocks_of(gram: np.ndarray, units: Sequence[Unit], chosen: Sequence[int]) -> Blocks:
     """Decompose the Gram matrix of each of some units.
 
     Parameters
@@ -237,12 +250,12 @@ def blocks_of(gram, units, chosen):
     return _decomposed(units, chosen, lambda at: gram[:, at[:, :, None], at[:, None, :]])
 
 
-def _decomposed(units, chosen, part_of):
-    chosen = np.asarray(chosen, int)
-    width = np.array([len(units[number].columns) for number in chosen], int)
+def _decomposed(units: Sequence[Unit], chosen: Sequence[int], part_of: Callable[[np.ndarray], np.ndarray]) -> Blocks:
+    numbers = np.asarray(chosen, int)
+    width = np.array([len(units[number].columns) for number in numbers], int)
     members, values, vectors, columns = [], [], [], []
     for size in np.unique(width):
-        mine = chosen[width == size]
+        mine = numbers[width == size]
         at = np.array([units[number].columns for number in mine])
         part = part_of(at)
         found, turned = np.linalg.eigh(part) if size > 1 else (part[..., 0], np.ones_like(part))
@@ -253,7 +266,7 @@ def _decomposed(units, chosen, part_of):
     return Blocks(tuple(members), tuple(values), tuple(vectors), tuple(columns))
 
 
-def added_evidence(conditioned, blocks, grid, freedom, units):
+def added_evidence(conditioned: Conditioned, blocks: Blocks, grid: Grid, freedom: int, units: Sequence[Unit]) -> np.ndarray:
     """Log evidence of a model with each of some units added, at every size of that unit.
 
     Parameters
@@ -307,7 +320,9 @@ class Evaluated:
     without: np.ndarray
 
 
-def evaluate(statistics, units, grid, log_pose, start):
+def evaluate(
+    statistics: Statistics, units: Sequence[Unit], grid: Grid, log_pose: np.ndarray, start: Iterable[float]
+) -> Evaluated:
     """Evidence of one model, averaged over the sizes of its units.
 
     The sum over all combinations of sizes is taken as the product of the sums over each size about the mode; exact for one
@@ -337,8 +352,8 @@ def evaluate(statistics, units, grid, log_pose, start):
     if not units:
         values = base + log_likelihood(statistics.squares, statistics.freedom)
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
-    places = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
-    present = Joint(statistics, units, grid, base, np.array(places))
+    nearest = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
+    present = Joint(statistics, units, grid, base, np.array(nearest))
     for _ in range(_MOST_ASCENTS):
         profiles = present.profiles()
         best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
@@ -368,7 +383,7 @@ _MOST_ASCENTS, _NO_GAIN = 30, 1e-9
 _MANY_COLUMNS = 30
 
 
-def _inverses(matrices):
+def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Inverses and log determinants of symmetric positive matrices (T, D, D)."""
     if matrices.shape[1] < _MANY_COLUMNS:
         factors = np.linalg.cholesky(matrices)
@@ -399,7 +414,7 @@ class Joint:
         Size of each unit in the grid.
     """
 
-    def __init__(self, statistics, units, grid, base, places):
+    def __init__(self, statistics: Statistics, units: Sequence[Unit], grid: Grid, base: np.ndarray, places: np.ndarray) -> None:
         self.units, self.grid, self.base, self.places = units, grid, base, places
         self.freedom = statistics.freedom
         self.scales, self.weights = grid.scales[places], [grid.of(unit) for unit in units]
@@ -422,31 +437,31 @@ class Joint:
         self.by_pose_error = values + self.sign_factors.sum(axis=0)
         self.log_density = float(log_sum_exp(self.by_pose_error) + self.log_weights.sum())
 
-    def profiles(self):
+    def profiles(self) -> list[np.ndarray]:
         """Log density over the sizes of each unit, the others as they are, for size zero first; list of ndarray (1 + S,)."""
-        found = [None] * len(self.units)
+        found: dict[int, np.ndarray] = {}
         for number, seen in self._given_the_others():
             density, _, _ = self._profile(number, *seen)
             found[number] = log_sum_exp(density, axis=1) + self._log_weights_of(number)
-        return found
+        return [found[number] for number in range(len(self.units))]
 
-    def moments(self):
+    def moments(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Mean and variance of the coefficients of each unit, averaged over its sizes and tau; list of two ndarray (d,)."""
-        found = [None] * len(self.units)
+        found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         for number, seen in self._given_the_others():
             density, mean, variance = self._profile(number, *seen)
             log_weights = density[1:] + self._log_weights_of(number)[1:, None]
             weights = np.exp(log_weights - log_sum_exp(log_weights))[..., None]
             center = (weights * mean).sum(axis=(0, 1))
             found[number] = center, (weights * (variance + (mean - center) ** 2)).sum(axis=(0, 1))
-        return found
+        return [found[number] for number in range(len(self.units))]
 
-    def _log_weights_of(self, number):
+    def _log_weights_of(self, number: int) -> np.ndarray:
         """Prior weights of all sizes as they are, but for those of one unit: none for size zero, and all of its grid."""
         others = np.delete(self.log_weights, number).sum()
         return np.concatenate([[0.0], self.weights[number]]) + others
 
-    def _given_the_others(self):
+    def _given_the_others(self) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]]:
         """What each unit sees with the others integrated out: number, and eigenvalues and eigenvectors of its Gram matrix, its
         products with the measurements along these, squares and ln |I + D^1/2 G D^1/2| without it."""
         widths = np.diff(self.starts)
@@ -463,9 +478,17 @@ class Joint:
             turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0]
             for place, number in enumerate(numbers):
                 seen = np.clip(values[:, place], 0.0, None), vectors[:, place], turned[:, place]
-                yield number, (*seen, squares[:, place], log_det[:, place])
+                yield int(number), (*seen, squares[:, place], log_det[:, place])
 
-    def _profile(self, number, values, vectors, turned, squares, log_det):
+    def _profile(
+        self,
+        number: int,
+        values: np.ndarray,
+        vectors: np.ndarray,
+        turned: np.ndarray,
+        squares: np.ndarray,
+        log_det: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Log density (1 + S, T) over the sizes of a unit, zero first; mean and variance (S, T, d) of its coefficients."""
         unit = self.units[number]
         variances = np.concatenate([[0.0], self.grid.scales**2])[:, None, None]
@@ -480,7 +503,9 @@ class Joint:
         return density, mean, variance * np.maximum(left[1:] / self.freedom, 1.0)[..., None]
 
 
-def _log_sign_factor(mean, variance, signs, squares, freedom):
+def _log_sign_factor(
+    mean: np.ndarray, variance: np.ndarray, signs: np.ndarray, squares: np.ndarray, freedom: int
+) -> np.ndarray:
     """Half-normal priors where physics gives the sign: ln 2 Phi(mean / std) of each such coefficient, summed."""
     signed = np.flatnonzero(signs)
     sigma = np.sqrt(np.maximum(squares / freedom, 1.0))[..., None]

@@ -1,5 +1,9 @@
 """What was found, as people and files want it: effects with parameters, probabilities and what else may be meant."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from elastocal.diagnosis.confounding import nearest_angles
@@ -10,6 +14,18 @@ from elastocal.effects import payload
 from elastocal.effects.full_load import lever_m
 from elastocal.fitting.linearization import effect_columns
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from elastocal.diagnosis.alarm import Alarm
+    from elastocal.diagnosis.averaging import Averaged
+    from elastocal.diagnosis.search import Posterior, Problem
+    from elastocal.diagnosis.verdict import Conclusion
+    from elastocal.effects.protocol import Candidate, Parameter, Shape
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Model
+    from elastocal.fitting.observations import Observations
+
 # Hypotheses and locations with less than this are not listed.
 _LEAST_LISTED = 0.001
 # Standard errors beyond which a value is taken at its word, and times the plausible size that no machine reaches.
@@ -19,7 +35,7 @@ _OF_MASS = {"kg": "rad kg/(N m)", "kg m": "rad kg m/(N m)"}
 _SCALED = ("value", "std_error", "prior_std")
 
 
-def location_words(mechanism, location):
+def location_words(mechanism: str, location: Sequence[int | str]) -> str:
     """A location in words: joint 2, links 2 and 3, joint 4 orders 1-2.
 
     Parameters
@@ -38,7 +54,7 @@ def location_words(mechanism, location):
     return " ".join(filter(None, [where, *names])) or ("base" if mechanism == OTHER else "")
 
 
-def probability_facts(problem, posterior, conclusion, alarm):
+def probability_facts(problem: Problem, posterior: Posterior, conclusion: Conclusion, alarm: Alarm) -> dict[str, Any]:
     """Probabilities as they stand in verdict.json.
 
     Returns
@@ -66,7 +82,15 @@ def probability_facts(problem, posterior, conclusion, alarm):
     }
 
 
-def effect_entries(problem, posterior, conclusion, alarm, final, averages, observations):
+def effect_entries(
+    problem: Problem,
+    posterior: Posterior,
+    conclusion: Conclusion,
+    alarm: Alarm,
+    final: Fit,
+    averages: Averaged,
+    observations: Observations,
+) -> list[dict[str, Any]]:
     """Entries of the effects found, those of the most probable mechanisms first.
 
     Parameters
@@ -90,7 +114,7 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages, obser
     units = [problem.units[number] for number in numbers]
     entries = []
     for name in sorted(conclusion.best.named, key=lambda name: -conclusion.mechanisms[name]):
-        members = [unit.candidate for unit in units if unit.mechanism == name]
+        members = [unit.candidate for unit in units if unit.candidate and unit.mechanism == name]
         where = location_probabilities(problem, posterior, name)
         values = [entry for member in members for entry in parameter_entries(member, final, averages)]
         entries.append(
@@ -115,14 +139,14 @@ def effect_entries(problem, posterior, conclusion, alarm, final, averages, obser
     return entries
 
 
-def _angle_to_nearest(problem, found):
+def _angle_to_nearest(problem: Problem, found: Sequence[int]) -> float | None:
     """Angle of what was found of a mechanism to the nearest candidate of another one; None where there is no other."""
     mechanism = problem.units[found[0]].mechanism
     others = [unit.mechanism not in (mechanism, OTHER) for unit in problem.units]
     return float(nearest_angles(problem, found)[others].min()) if any(others) else None
 
 
-def parameter_entries(member, final, averages):
+def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list[dict[str, Any]]:
     """Parameters and shapes of one candidate in a fit.
 
     How far springs of unknown compliance sag does not tell a mass. Where the compliances are those of the robot
@@ -141,6 +165,7 @@ def parameter_entries(member, final, averages):
     effect = next(effect for effect in final.model.effects if effect.key == member.key)
     mine = np.flatnonzero([owner == member.key for owner, _ in final.parameters])
     values = np.concatenate(final.values_of(member.key))
+    unknowns: list[Parameter | Shape] = [*effect.parameters, *effect.shapes]
     entries = [
         {
             "name": f"{member.key} {parameter.name}",
@@ -150,13 +175,13 @@ def parameter_entries(member, final, averages):
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
         }
-        for parameter, value, index in zip((*effect.parameters, *effect.shapes), values, mine, strict=True)
+        for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
     told = final.model.identifies_compliance or member.family != "gravity"
     return entries if told else [_product(entry, final.model) if entry["unit"] in _OF_MASS else entry for entry in entries]
 
 
-def _product(entry, model):
+def _product(entry: dict[str, Any], model: Model) -> dict[str, Any]:
     """The entry of a mass, or of a first moment, times the compliance of the joint that a weight at the end turns most."""
     sites, compliance = model.sites, model.nominal_compliance
     turned = [c * lever_m(sites, j) if sites.carried_links(j) else 0.0 for j, c in enumerate(compliance)]
@@ -166,7 +191,7 @@ def _product(entry, model):
     return entry | scaled | {"name": f"{owner} compliance_of_joint_{joint + 1}_times_{name}", "unit": _OF_MASS[entry["unit"]]}
 
 
-def sag_entries(name, members, final, observations):
+def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observations: Observations) -> list[dict[str, Any]]:
     """How far weight lets a target sag at most, where the measurements tell no masses.
 
     Its standard error is by the delta method.
@@ -186,7 +211,9 @@ def sag_entries(name, members, final, observations):
     list of dict
         One entry, in m; none where the effect is not of gravity, or where its masses can be told.
     """
-    if members[0].family != "gravity" or final.model.identifies_compliance or final.conditions is None:
+    if members[0].family != "gravity" or final.model.identifies_compliance:
+        return []
+    if final.conditions is None or final.joint_jacobian is None:
         return []
     jacobian = final.joint_jacobian[:, :3]
     columns = effect_columns([(member, ()) for member in members], final.conditions, jacobian, observations.state)
@@ -200,7 +227,7 @@ def sag_entries(name, members, final, observations):
     return [{"name": f"{name} largest_sag", "value": size, "std_error": error, "unit": "m", "prior_std": None, "held": False}]
 
 
-def fault_entry(fault):
+def fault_entry(fault: Mapping[str, Any]) -> dict[str, Any]:
     """Entry of a decisive fault of the data.
 
     Parameters
@@ -230,7 +257,7 @@ def fault_entry(fault):
     }
 
 
-def implausible(final, entries, rated_kg=None):
+def implausible(final: Fit, entries: Iterable[Mapping[str, Any]], rated_kg: float | None = None) -> list[str]:
     """Warnings of found parameters that nature does not allow, however many effects were found.
 
     Parameters

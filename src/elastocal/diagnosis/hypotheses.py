@@ -4,10 +4,20 @@ A unit is one candidate of the catalogue with given shape values. Units of one m
 orders) that differ in their law are variants, of which a model holds one at most.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.special import gammaln, logsumexp
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.diagnosis.other import Competitor
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.effects.protocol import Candidate
 
 OTHER = "other"
 
@@ -20,7 +30,7 @@ class Unit:
     ----------
     mechanism : str
         Name of the effect, or `OTHER`.
-    location : tuple
+    location : tuple of int or str
         Where it acts; equal for variants of one mechanism at one location.
     candidate : Candidate or None
         None for `OTHER`.
@@ -40,20 +50,24 @@ class Unit:
     """
 
     mechanism: str
-    location: tuple
-    candidate: object
-    shapes: tuple
+    location: tuple[int | str, ...]
+    candidate: Candidate | None
+    shapes: tuple[float, ...]
     columns: np.ndarray
     sizes: np.ndarray
     signs: np.ndarray
     log_prior: float = 0.0
-    competitor: object = None
+    competitor: Competitor | None = None
     smallest: int = 0
 
     @property
-    def key(self):
+    def key(self) -> str:
         """Unique name: key of the candidate, with the shape values."""
-        name = self.candidate.key if self.candidate else f"{OTHER}{list(self.location)} {self.competitor.name}"
+        if self.candidate:
+            name = self.candidate.key
+        else:
+            assert self.competitor is not None
+            name = f"{OTHER}{list(self.location)} {self.competitor.name}"
         return name + "".join(f" {shape:.3g}" for shape in self.shapes)
 
 
@@ -77,10 +91,10 @@ class Prior:
        Annals of Statistics 38, 2010.
     """
 
-    log_odds: dict
-    log_counts: dict
+    log_odds: dict[str, float]
+    log_counts: dict[str, np.ndarray]
 
-    def log_odds_of(self, units):
+    def log_odds_of(self, units: Iterable[Unit]) -> float:
         """Logarithm of the prior odds of a model against "nothing".
 
         Parameters
@@ -98,14 +112,14 @@ class Prior:
             total += self.log_odds[mechanism] + self.log_counts[mechanism][count]
         return float(total)
 
-    def added(self, unit, count):
+    def added(self, unit: Unit, count: int) -> float:
         """Change of the log prior odds when a unit joins a model that has its mechanism at `count` locations."""
         counts = self.log_counts[unit.mechanism]
         change = counts[count + 1] - counts[count] if count else self.log_odds[unit.mechanism] + counts[1]
         return unit.log_prior + change
 
 
-def prior_of(units, settings):
+def prior_of(units: Sequence[Unit], settings: Settings) -> Prior:
     """Prior of all models that units can form.
 
     Parameters
@@ -117,7 +131,8 @@ def prior_of(units, settings):
     -------
     Prior
     """
-    odds, counts = {}, {}
+    odds: dict[str, float] = {}
+    counts: dict[str, np.ndarray] = {}
     special = {"link_weight": settings.gravity_probability, OTHER: settings.other_probability}
     for mechanism in dict.fromkeys(unit.mechanism for unit in units):
         probability = special.get(mechanism, settings.mechanism_probability)
@@ -131,7 +146,9 @@ def prior_of(units, settings):
     return Prior(odds, counts)
 
 
-def units_of(tested, features, settings):
+def units_of(
+    tested: Sequence[tuple[Candidate, Sequence[float]]], features: Sequence[tuple[Competitor, int]], settings: Settings
+) -> tuple[Unit, ...]:
     """Units of candidates and of the competitor, numbered in the order of their columns.
 
     Parameters
@@ -146,7 +163,9 @@ def units_of(tested, features, settings):
     -------
     tuple of Unit
     """
-    start, units, laws = 0, [], {}
+    start = 0
+    units: list[Unit] = []
+    laws: dict[tuple[str, tuple[int | str, ...]], list[str]] = {}
     for candidate, _ in tested:
         laws.setdefault((candidate.effect, candidate.location), []).append(candidate.key)
     shares = _shares_of_shapes(tested)
@@ -168,12 +187,12 @@ def units_of(tested, features, settings):
     return tuple(units)
 
 
-def _shares_of_shapes(tested):
+def _shares_of_shapes(tested: Iterable[tuple[Candidate, Sequence[float]]]) -> dict[tuple[str, tuple[float, ...]], float]:
     """Prior share of each shape of a candidate: of the range of what bends it, the part nearest to it."""
-    tried = {}
+    tried: dict[str, tuple[Candidate, list[tuple[float, ...]]]] = {}
     for candidate, shapes in tested:
         tried.setdefault(candidate.key, (candidate, []))[1].append(tuple(shapes))
-    found = {}
+    found: dict[tuple[str, tuple[float, ...]], float] = {}
     for key, (candidate, values) in tried.items():
         shares = np.ones(1) if len(values) == 1 else candidate.shapes[0].shares([value for (value,) in values])
         found |= {(key, value): share for value, share in zip(values, shares, strict=True)}

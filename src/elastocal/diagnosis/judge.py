@@ -1,6 +1,9 @@
 """The last step: every model on poses that no step has seen."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +28,17 @@ from elastocal.validation.held_out import (
 )
 from elastocal.validation.splits import error_row, split_rows
 
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+    from elastocal.campaigns.campaign import Measurements
+    from elastocal.diagnosis.diagnose import Diagnosis, Step
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations, States
+    from elastocal.validation.held_out import Errors
+
 _REPLICATES = 1000
 
 
@@ -40,11 +54,11 @@ class Verdict:
         Of before_after.csv.
     """
 
-    document: dict
-    rows: list
+    document: dict[str, Any]
+    rows: list[dict[str, Any]]
 
 
-def judge(diagnosis, held_out, seed):
+def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """Open the held-out poses and state the verdict.
 
     Parameters
@@ -71,9 +85,10 @@ def judge(diagnosis, held_out, seed):
     return Verdict(document, rows)
 
 
-def _gains(rows):
+def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     """Share by which each step lowers the held-out RMS."""
-    gains, last = {}, None
+    gains: dict[str, float] = {}
+    last = None
     for row in rows:
         if row["kind"] == "effect":
             gains[row["step"].removeprefix("+ ")] = float(1 - row["heldout_rms_m"] / last)
@@ -82,7 +97,9 @@ def _gains(rows):
     return gains
 
 
-def heldout_errors(steps, case, held_out, seed):
+def heldout_errors(
+    steps: Sequence[Step], case: Case, held_out: Case, seed: int
+) -> tuple[list[dict[str, Any]], dict[str, Any], list[str]]:
     """Errors of every step on training and held-out poses.
 
     Parameters
@@ -112,7 +129,7 @@ def heldout_errors(steps, case, held_out, seed):
     for step, error, limit in zip(steps, errors, limits, strict=True):
         training = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
         tested = summary(error.distance)
-        row = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
+        row: dict[str, Any] = {"step": step.name, "kind": step.kind, "parameters": int((~step.fitted.held).sum())}
         row |= {f"train_{name}": training[name] for name in METRICS}
         for name in METRICS:
             row |= {f"heldout_{name}": tested[name]}
@@ -135,7 +152,7 @@ def heldout_errors(steps, case, held_out, seed):
     return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
 
 
-def outside_poses(steps, case, held_out):
+def outside_poses(steps: Iterable[Step], case: Case, held_out: Case) -> np.ndarray:
     """Which held-out poses lie outside the range of those that the last model was fitted to.
 
     Parameters
@@ -156,7 +173,7 @@ def outside_poses(steps, case, held_out):
     return np.bincount(state_clusters(unseen.states), outside) > 0
 
 
-def split_table(diagnosis, held_out, seed):
+def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
     """Errors on the held-out poses beside those that cross-validation of the training poses predicts.
 
     Parameters
@@ -172,26 +189,24 @@ def split_table(diagnosis, held_out, seed):
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)
     unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
-    rows = [error_row("held out", "all", *unseen, _REPLICATES, draws)]
+    rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
-def residual_blocks(diagnosis, held_out):
+def residual_blocks(diagnosis: Diagnosis, held_out: Case) -> Iterator[dict[str, np.ndarray]]:
     """Blocks of the residuals table: training measurements, then held-out ones; every measurement before and after."""
     case, steps, before, after = diagnosis.case, diagnosis.steps, diagnosis.declared, diagnosis.final
     inside = np.zeros(case.observations.cluster.max() + 1, bool)
     for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
         observations, order = _in_order(part.campaign.measurements)
-        off, position = [], None
-        for fitted in (before, after):
-            model, estimate = _placed(fitted, case, part)
-            off.append(residuals(model, estimate, observations, conditions(model, estimate, observations.states)))
-            position = measured_in_base(estimate, observations)[0]
+        placed = [_placed(fitted, case, part) for fitted in (before, after)]
+        off = [residuals(*each, observations, conditions(*each, observations.states)) for each in placed]
+        position = measured_in_base(placed[-1][1], observations)[0]
         measurements = part.campaign.measurements.select(order)
         yield residual_columns(measurements, unseen, outside[state_clusters(measurements)], position, *off)
 
 
-def _placed(fitted, case, part):
+def _placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
     """Model and estimate for the measurements of a part: as fitted, or with frames and targets of another campaign."""
     if _same_campaign(case, part):
         return fitted.model, placed_estimate(fitted, part.observations)
@@ -200,11 +215,11 @@ def _placed(fitted, case, part):
     return model, fit_frames(carried, model, part.observations, fitted.noise)
 
 
-def _same_campaign(case, part):
+def _same_campaign(case: Case, part: Case) -> bool:
     return part is case or part.campaign.name == case.campaign.name
 
 
-def carried_over(fitted, states):
+def carried_over(fitted: Fit, states: States) -> Fit:
     """A fit without the effects that another campaign cannot have, or does not record: a wandering tracker, a temperature.
 
     Parameters
@@ -227,7 +242,7 @@ def carried_over(fitted, states):
     return replace(fitted, model=model, estimate=estimate)
 
 
-def _in_order(measurements):
+def _in_order(measurements: Measurements) -> tuple[Observations, np.ndarray]:
     """Every measurement as an observation of its own, and the order of the measurements in which they come."""
     observations, _ = each_approach(measurements)
     approach = () if measurements.approach is None else tuple(measurements.approach.T[::-1])
@@ -236,14 +251,16 @@ def _in_order(measurements):
     )
 
 
-def _range_warnings(by_range, poses):
+def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:
     count = by_range["poses"]
     if not count:
         return []
     return [f"{count} of {poses} validation poses lie outside the range of the fitted poses: errors there are extrapolated"]
 
 
-def _warnings(steps, rows, errors, before, after):
+def _warnings(
+    steps: Sequence[Step], rows: Sequence[Mapping[str, Any]], errors: Sequence[Errors], before: int, after: int
+) -> list[str]:
     if before == after:
         return []
     found = []

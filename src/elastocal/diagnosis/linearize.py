@@ -1,6 +1,9 @@
 """From a fit of the declared model to the problem that is searched: columns of every unit, whitened, and their products."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.stats import chi2
@@ -17,6 +20,22 @@ from elastocal.fitting.observations import part_at, parts_of, select_states, spr
 from elastocal.fitting.parameters import nonlinear_parameters as shape_parameters
 from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+
+    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import Products, Statistics
+    from elastocal.diagnosis.summed import Sums
+    from elastocal.effects.conditions import Conditions
+    from elastocal.effects.protocol import Candidate, Parameter
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.linearization import Linearization
+    from elastocal.fitting.model import Model as FittedModel
+    from elastocal.fitting.observations import Observations, States
+    from elastocal.fitting.whitening import Whitening
+    from elastocal.mechanics.sites import Sites
 
 # Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
@@ -38,29 +57,38 @@ class Linearized:
     Attributes
     ----------
     problem : Problem
-    products : Products
+    products : Products or Sums
         Of one pass over the measurements.
     declared_size : float
         Size of declared geometry, in plausible sizes, that makes the measurements most probable.
     untestable : dict of str to str
         Why a candidate is not tested.
     about : Fit
+    around : Conditions
+        Of the states looked at.
     candidates : frozenset of str
         Keys of all candidates: parameters of the fit that they own are coefficients of units here.
     pose_std_error_rad : float
         With which the measurements of one pose tell a joint angle.
     """
 
-    problem: object
-    products: object
+    problem: Problem
+    products: Products | Sums
     declared_size: float
-    untestable: dict
-    about: object
-    candidates: frozenset
+    untestable: dict[str, str]
+    about: Fit
+    around: Conditions
+    candidates: frozenset[str]
     pose_std_error_rad: float
 
 
-def linearized(fitted, observations, candidates, settings, shapes=None):
+def linearized(
+    fitted: Fit,
+    observations: Observations,
+    candidates: Sequence[Candidate],
+    settings: Settings,
+    shapes: dict[str, list[tuple[float, ...]]] | None = None,
+) -> Linearized:
     """Gather what the measurements say of a fit and of all candidates.
 
     Coefficients count from zero, not from the fit: what candidates and declared geometry contribute to the prediction is
@@ -80,7 +108,7 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     -------
     Linearized
     """
-    around, sites = fitted.conditions, fitted.model.sites
+    around, sites = _conditions_of(fitted, observations), fitted.model.sites
     untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
@@ -93,7 +121,7 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
     present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
-    source = _Source(fitted, observations, tested, laws, units, found, values)
+    source = _Source(fitted, observations, around, tested, laws, units, found, values)
     width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
@@ -106,12 +134,15 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     grid = unit_rad * np.array(settings.pose_steps)
     if held:
         (block,) = source.blocks(parts)
-        products = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
-        grid = grid[pose_errors_within_reach(statistics_of(products.without_candidates, grid), settings)]
+        whole = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        grid = grid[pose_errors_within_reach(statistics_of(whole.without_candidates, grid), settings)]
+        products: Products | Sums = whole
     else:
         chosen = spread_poses(observations, SAMPLE_ROWS // observations.rows)
         some, seen = selected(fitted, observations, chosen)
-        (block,) = replace(source, fitted=some, observations=seen).blocks(parts_of(seen, len(seen)))
+        (block,) = replace(source, fitted=some, observations=seen, around=_conditions_of(some, seen)).blocks(
+            parts_of(seen, len(seen))
+        )
         sample = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
         products = summed(source.blocks(parts), triangle[:-1, :-1], sample, deviation, present, grid)
@@ -122,10 +153,17 @@ def linearized(fitted, observations, candidates, settings, shapes=None):
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, size, untestable, fitted, keys, unit_rad)
+    return Linearized(problem, products, size, untestable, fitted, around, keys, unit_rad)
 
 
-def declared_geometry(model):
+def _conditions_of(fitted: Fit, observations: Observations) -> Conditions:
+    """Conditions of the states of a fit: as it keeps them, or found again where they were too many."""
+    if fitted.conditions is None:
+        return conditions(fitted.model, fitted.estimate, observations.states)
+    return fitted.conditions
+
+
+def declared_geometry(model: FittedModel) -> set[str]:
     """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
     return {
         effect.effect
@@ -135,7 +173,7 @@ def declared_geometry(model):
     }
 
 
-def prior_deviations(fitted, parameters, owners, size):
+def prior_deviations(fitted: Fit, parameters: Sequence[Parameter], owners: Iterable[str], size: float) -> np.ndarray:
     """Standard deviations of the priors of declared parameters, for one size of declared geometry.
 
     Parameters
@@ -149,21 +187,29 @@ def prior_deviations(fitted, parameters, owners, size):
 
     Returns
     -------
-    ndarray
+    ndarray (P,)
     """
     sized = {effect.key for effect in fitted.model.effects if effect.effect in declared_geometry(fitted.model)}
     own = [p.plausible * size if owner in sized else p.prior_std for p, owner in zip(parameters, owners, strict=True)]
     return np.array([_WIDE * p.plausible if prior is None else prior for p, prior in zip(parameters, own, strict=True)])
 
 
-def has_prior(fitted):
-    """Which parameters of a fit have a prior about zero, declared geometry among them, ndarray of bool."""
+def has_prior(fitted: Fit) -> np.ndarray:
+    """Which parameters of a fit have a prior about zero, declared geometry among them, ndarray of bool (P,)."""
     sized = declared_geometry(fitted.model)
     effects = {effect.key: effect.effect for effect in fitted.model.effects}
     return np.array([p.prior_std is not None or effects.get(owner) in sized for owner, p in fitted.parameters], bool)
 
 
-def declared_size(fitted, parameters, owners, triangle, count, present, settings):
+def declared_size(
+    fitted: Fit,
+    parameters: Sequence[Parameter],
+    owners: Collection[str],
+    triangle: np.ndarray,
+    count: int,
+    present: np.ndarray,
+    settings: Settings,
+) -> float:
     """Size of declared geometry that makes the measurements most probable by type II maximum likelihood [1]_.
 
     One number for all, at the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the
@@ -175,6 +221,8 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
         Of the sensitivities to the declared parameters and the residual, whitened.
     count : int
         Rows of these.
+    present : ndarray (P,)
+        As in `statistics.products_of`.
 
     Returns
     -------
@@ -200,7 +248,7 @@ def declared_size(fitted, parameters, owners, triangle, count, present, settings
     return best[1]
 
 
-def smallest_shown(statistics, units, settings):
+def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
     """The smallest size at which each unit would be found with a power of one half, were it the only candidate.
 
     A test for one direction, with a Bonferroni correction for all units, reaches that where the non-centrality is the critical
@@ -214,7 +262,7 @@ def smallest_shown(statistics, units, settings):
 
     Returns
     -------
-    ndarray of int
+    ndarray of int (number of units,)
         Place among the sizes; their number where even the largest, the plausible one, is too small to be seen.
     """
     critical = chi2.isf(settings.alarm_level / max(len(units), 1), 1)
@@ -231,38 +279,43 @@ class _Source:
     ----------
     fitted : Fit
     observations : Observations
+    around : Conditions
+        Of their states.
     tested : list of (Candidate, tuple)
     against : list of other.Law
     units : tuple of Unit
         Of both.
-    found : ndarray of bool
+    found : ndarray of bool (P,)
         Which parameters of the fit are those of candidates.
-    values : ndarray
+    values : ndarray (P,)
         Of the parameters, in which the prediction is linear; zero for shapes.
     """
 
-    fitted: object
-    observations: object
-    tested: list
-    against: list
-    units: tuple
+    fitted: Fit
+    observations: Observations
+    around: Conditions
+    tested: list[tuple[Candidate, tuple[float, ...]]]
+    against: list[other.Law]
+    units: tuple[Unit, ...]
     found: np.ndarray
     values: np.ndarray
 
-    def lines(self, parts):
+    def lines(
+        self, parts: Iterable[tuple[slice, slice]]
+    ) -> Iterator[tuple[Linearization, Observations, np.ndarray, Callable[[np.ndarray], np.ndarray]]]:
         """Linearization, conditions, states and whitening of each part."""
         fitted = self.fitted
         for states, seen in parts:
             some = part_at(self.observations, states, seen)
-            line = linearize(fitted.model, fitted.estimate, some, at_states(fitted.conditions, states))
+            line = linearize(fitted.model, fitted.estimate, some, at_states(self.around, states))
             jacobian, root = fitted.jacobian_at(line, seen), np.sqrt(fitted.weights[seen])
             yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_measurements), root)
 
-    def declared_part(self, parts):
+    def declared_part(self, parts: Iterable[tuple[slice, slice]]) -> tuple[np.ndarray, float]:
         """Triangular factor of declared sensitivities and residual; standard error with which one pose tells a joint."""
-        information = []
+        information: list[np.ndarray] = []
 
-        def rows():
+        def rows() -> Iterator[np.ndarray]:
             for line, some, jacobian, white in self.lines(parts):
                 squares = (white(jacobian) ** 2).sum(axis=1) / jacobian.shape[-1]
                 information.append(np.bincount(np.repeat(some.cluster, some.rows), squares))
@@ -271,12 +324,13 @@ class _Source:
         triangle = triangle_of(rows())
         return triangle, float(1.0 / np.sqrt(np.median(np.concatenate(information))))
 
-    def blocks(self, parts):
+    def blocks(self, parts: Iterable[tuple[slice, slice]]) -> Iterator[WhiteRows]:
         """`WhiteRows` of each part."""
         sizes = np.concatenate([unit.sizes for unit in self.units])
         for line, some, jacobian, white in self.lines(parts):
             around = line.conditions
-            laws = [*self.tested, *((law, ()) for law in self.against)]
+            # A law has of a candidate what `effect_columns` asks of it, its displacement.
+            laws = [*self.tested, *((cast("Candidate", law), ()) for law in self.against)]
             made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
             made *= sizes
             residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]
@@ -289,15 +343,15 @@ class _Source:
             )
 
 
-def _white(whitener, root):
-    def white(values):
+def _white(whitener: Whitening, root: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    def white(values: np.ndarray) -> np.ndarray:
         weighted = values * root.reshape(-1, *[1] * (values.ndim - 1))
         return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
 
     return white
 
 
-def searched_part(fitted, observations, settings):
+def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:
     """What the search looks at of a fit and its observations: no more than so many, at poses spread over the campaign.
 
     Parameters
@@ -313,7 +367,7 @@ def searched_part(fitted, observations, settings):
     return selected(fitted, observations, spread_poses(observations, settings.searched_observations))
 
 
-def selected(fitted, observations, chosen):
+def selected(fitted: Fit, observations: Observations, chosen: np.ndarray) -> tuple[Fit, Observations]:
     """A fit and its observations in some of the states.
 
     Parameters
@@ -333,12 +387,14 @@ def selected(fitted, observations, chosen):
     elif not chosen.all():
         around = at_states(around, chosen)
     seen = chosen[observations.state]
-    kept = {name: getattr(fitted, name) for name in ("weights", "residual", "joint_jacobian")}
-    parts = {name: None if values is None else values[seen] for name, values in kept.items()}
-    return replace(fitted, conditions=around, **parts), some
+    jacobian = None if fitted.joint_jacobian is None else fitted.joint_jacobian[seen]
+    kept = replace(
+        fitted, conditions=around, weights=fitted.weights[seen], residual=fitted.residual[seen], joint_jacobian=jacobian
+    )
+    return kept, some
 
 
-def shapes_tried(candidate, fitted):
+def shapes_tried(candidate: Candidate, fitted: Fit) -> list[tuple[float, ...]]:
     """Values of the shape of a candidate over its range, list of tuple.
 
     Where the fit has the candidate, its value alone; or, where a search must try many lest it step over the law, which is a law
@@ -351,20 +407,20 @@ def shapes_tried(candidate, fitted):
     if candidate.key in {effect.key for effect in fitted.model.effects}:
         (value,) = fitted.values_of(candidate.key)[1].tolist()
         reach = _CLOSER_STILL * np.diff(values[:2]).sum()
-        values = [value]
+        values = np.array([value])
         if shape.tried > 1:
             about = shape.between(value - reach, value + reach, 2 * _SHAPES_CLOSER + 1)
             values = np.unique(np.clip(about, shape.lowest, shape.highest))
     return [(float(value),) for value in values]
 
 
-def shapes_looked_at_closely(problem, alone):
+def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, list[tuple[float, ...]]]:
     """Values of the shapes of the best candidates, closer to each other about the best value of each.
 
     Parameters
     ----------
     problem : Problem
-    alone : ndarray
+    alone : ndarray (number of units,)
         Log Bayes factor of each unit alone.
 
     Returns
@@ -374,11 +430,11 @@ def shapes_looked_at_closely(problem, alone):
     """
     units = problem.units
     odds = alone + [problem.prior.log_odds_of([unit]) for unit in units]
-    found = {}
+    found: dict[str, list[tuple[float, ...]]] = {}
     for number in np.argsort(-odds):
         unit = units[number]
         near = odds[number] > odds.max() - _NEAR_THE_BEST and alone[number] > _WORTH_A_LOOK
-        if near and unit.shapes and unit.candidate.key not in found:
+        if near and unit.shapes and unit.candidate and unit.candidate.key not in found:
             (shape,), (best,) = unit.candidate.shapes, unit.shapes
             tried = sorted(other.shapes[0] for other in units if other.candidate and other.candidate.key == unit.candidate.key)
             place = tried.index(best)
@@ -390,7 +446,7 @@ def shapes_looked_at_closely(problem, alone):
     return found
 
 
-def lacking(candidate, sites, states):
+def lacking(candidate: Candidate, sites: Sites, states: States) -> str:
     """Why the measurements cannot test a candidate at all; empty where they might."""
     missing = sorted(candidate.needs - offered(sites, states))
     if missing:

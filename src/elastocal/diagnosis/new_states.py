@@ -7,7 +7,10 @@ cell: measurements of its force have no errors. A repeat is another entry: it co
 than a pose close by.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from scipy.constants import g as standard_gravity
@@ -20,6 +23,16 @@ from elastocal.fitting.linearization import effect_columns, linearize
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.fitting.whitening import whitening
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.mechanics.robot import Robot
 
 # Without a ladder of loads: each pose without its load and under it, and under the opposite one where the campaign has such.
 WITHOUT_AND_WITH, BOTH_SENSES = (0.0, 1.0), (0.0, 1.0, -1.0)
@@ -56,17 +69,23 @@ class Entries:
     approach: np.ndarray | None
     weighed: np.ndarray
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.joint_angles)
 
-    def at(self, chosen):
+    def at(self, chosen: np.ndarray | list[int]) -> Entries:
         """Some of the entries."""
-        return Entries(**{name: None if value is None else value[chosen] for name, value in vars(self).items()})
+        approach = None if self.approach is None else self.approach[chosen]
+        return Entries(self.joint_angles[chosen], self.wrench[chosen], approach, self.weighed[chosen])
 
-    def then(self, others):
+    def then(self, others: Entries) -> Entries:
         """These entries and others."""
-        pairs = zip(vars(self).items(), vars(others).values(), strict=True)
-        return Entries(**{name: None if mine is None else np.concatenate([mine, more]) for (name, mine), more in pairs})
+        both = None if self.approach is None or others.approach is None else np.concatenate([self.approach, others.approach])
+        return Entries(
+            np.concatenate([self.joint_angles, others.joint_angles]),
+            np.concatenate([self.wrench, others.wrench]),
+            both,
+            np.concatenate([self.weighed, others.weighed]),
+        )
 
 
 @dataclass(frozen=True)
@@ -101,12 +120,12 @@ class Reach:
     either_sense: bool
     down: np.ndarray
     weights: bool
-    shares: tuple
+    shares: tuple[float, ...]
     free: bool
     approach_noted: bool
 
 
-def reach_of(states, robot, joint_limits, ladder, weights):
+def reach_of(states: States, robot: Robot, joint_limits: np.ndarray, ladder: tuple[float, ...] | None, weights: bool) -> Reach:
     """What a robot can be asked to do after a campaign.
 
     Parameters
@@ -150,7 +169,7 @@ def reach_of(states, robot, joint_limits, ladder, weights):
     )
 
 
-def drawn(reach, count, stream):
+def drawn(reach: Reach, count: int, stream: np.random.Generator) -> Entries:
     """Random entries within reach.
 
     Parameters
@@ -185,7 +204,7 @@ def drawn(reach, count, stream):
     return Entries(angles, wrench, approaches(reach, count, stream), weighed)
 
 
-def near(reach, entries, count, radius, stream):
+def near(reach: Reach, entries: Entries, count: int, radius: float, stream: np.random.Generator) -> Entries:
     """Neighbours of entries: other angles, for half of them another direction of the load, now and then the other side.
 
     Parameters
@@ -210,16 +229,16 @@ def near(reach, entries, count, radius, stream):
         turn = radius * stream.standard_normal((len(found), 3)) * (stream.random((len(found), 1)) < 0.5)
         turn[found.weighed] = 0.0
         wrench = _turned(wrench, Rotation.from_rotvec(turn))
-    if reach.free and reach.approach_noted:
+    if reach.free and approach is not None:
         approach = approach * np.where(stream.random(angles.shape) < _OTHER_SIDE, -1.0, 1.0)[:, None]
     return Entries(np.clip(angles, *reach.limits.T), wrench, approach, found.weighed)
 
 
-def _turned(wrench, rotation):
+def _turned(wrench: np.ndarray, rotation: Rotation) -> np.ndarray:
     return np.concatenate([rotation.apply(wrench[:, :3]), rotation.apply(wrench[:, 3:])], axis=1)
 
 
-def approaches(reach, count, stream):
+def approaches(reach: Reach, count: int, stream: np.random.Generator) -> np.ndarray | None:
     """Random senses of approach: one for each entry where it is chosen, else one for each share of its load.
 
     Returns
@@ -253,7 +272,7 @@ class Instrument:
     sizes : ndarray (U,)
     of_load_cell : ndarray of bool (U,)
         Columns of effects that a reference weight does not have.
-    declared, added : ndarray of bool
+    declared, added : ndarray of bool (P,)
         Which of the model's parameters are those of the products, and which belong to targets that are not there yet.
     noise : Noise
         With the error common to the measurements of a pose.
@@ -262,31 +281,31 @@ class Instrument:
     reach : Reach
     """
 
-    model: object
-    estimate: object
+    model: Model
+    estimate: Estimate
     own: int
-    linearized: object
-    laws: list
+    linearized: Linearized
+    laws: list[tuple[Candidate | other.Law, tuple[float, ...]]]
     columns: np.ndarray
     sizes: np.ndarray
     of_load_cell: np.ndarray
     declared: np.ndarray
     added: np.ndarray
-    noise: object
+    noise: Noise
     states: States
     reach: Reach
 
     @property
-    def extra_points(self):
+    def extra_points(self) -> range:
         """Measuring points without a target of the campaign, as numbers of targets."""
         return range(self.own, len(self.model.targets))
 
     @property
-    def unknowns(self):
+    def unknowns(self) -> int:
         """Number of columns: declared parameters, units, offsets of further targets."""
         return int(self.declared.sum()) + len(self.columns) + int(self.added.sum())
 
-    def information(self, entries, targets):
+    def information(self, entries: Entries, targets: Sequence[int]) -> np.ndarray:
         """Fisher information on all unknowns in each entry, ndarray (E, U, U).
 
         Parameters
@@ -301,7 +320,7 @@ class Instrument:
             parts.append(rows.transpose(0, 2, 1) @ rows)
         return np.concatenate(parts)
 
-    def rows(self, entries, targets):
+    def rows(self, entries: Entries, targets: Sequence[int]) -> np.ndarray:
         """Whitened sensitivities of the measurements of each entry, ndarray (E, rows, U)."""
         observations = self.observations(entries, targets)
         around = conditions(self.model, self.estimate, observations.states)
@@ -309,7 +328,9 @@ class Instrument:
         around = replace(around, progress=np.ones(len(observations.states)))
         line = linearize(self.model, self.estimate, observations, around)
         jacobian, state, around = line.coordinate_jacobian, observations.state, line.conditions
-        made = effect_columns(self.laws, around, jacobian, state) * self.sizes
+        # A law has of a candidate what `effect_columns` asks of it, its displacement.
+        laws = cast("list[tuple[Candidate, tuple[float, ...]]]", self.laws)
+        made = effect_columns(laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
         every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
@@ -320,7 +341,7 @@ class Instrument:
         rows = np.concatenate([rows, added], axis=-1)
         return rows.reshape(len(entries), -1, rows.shape[-1])
 
-    def observations(self, entries, targets):
+    def observations(self, entries: Entries, targets: Sequence[int]) -> Observations:
         """Entries as observations, those of an entry together; what is measured stays zero."""
         # A weight only hangs.
         shares = np.where(entries.weighed[:, None], np.abs(self.reach.shares), self.reach.shares)
@@ -338,13 +359,20 @@ class Instrument:
             None if self.states.time_s is None else np.full(count, self.states.time_s.max()),
             usual,
         )
-        targets = np.asarray(targets, int)
-        state, target = np.repeat(np.arange(count), len(targets)), np.tile(targets, count)
+        state, target = np.repeat(np.arange(count), len(targets)), np.tile(np.asarray(targets, int), count)
         rotation = np.tile(np.eye(3), (len(target), 1, 1)) if self.model.rows == 6 else None
         return Observations(states, state, target, np.zeros((len(target), 3)), rotation)
 
 
-def instrument_of(linearized, fitted, numbers, noise, states, reach, further_targets):
+def instrument_of(
+    linearized: Linearized,
+    fitted: Fit,
+    numbers: Iterable[int],
+    noise: Noise,
+    states: States,
+    reach: Reach,
+    further_targets: bool,
+) -> Instrument:
     """What tells the information in entries.
 
     Parameters
@@ -373,12 +401,16 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     new = {f"target {target.name}" for target in model.targets[own:]}
     added = np.array([owner in new for owner in owners], bool)
     declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
-    laws, columns, sizes, cell = [], [], [], []
-    problem, campaign = linearized.problem, linearized.about.conditions
+    laws: list[tuple[Candidate | other.Law, tuple[float, ...]]] = []
+    columns, sizes, cell = [], [], []
+    problem, campaign = linearized.problem, linearized.around
     for number in numbers:
         unit = problem.units[number]
-        law = unit.candidate or other.law_of(unit.competitor, campaign, problem.settings.other_features)
-        laws.append((law, unit.shapes))
+        if unit.candidate:
+            laws.append((unit.candidate, unit.shapes))
+        else:
+            assert unit.competitor is not None
+            laws.append((other.law_of(unit.competitor, campaign, problem.settings.other_features), unit.shapes))
         columns.append(unit.columns)
         sizes.append(unit.sizes)
         cell.append(np.full(len(unit.columns), unit.candidate is not None and unit.candidate.family == "load"))
@@ -400,7 +432,7 @@ def instrument_of(linearized, fitted, numbers, noise, states, reach, further_tar
     )
 
 
-def _with_targets_everywhere(model, estimate):
+def _with_targets_everywhere(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
     """One more target on each measuring point without, at an unknown place where all of the campaign's own are unknown."""
     taken = {target.point for target in model.targets}
     bare = [point.name for point in model.sites.chain.points if point.name not in taken]

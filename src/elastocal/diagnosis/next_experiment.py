@@ -12,7 +12,10 @@ References
    1980.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +35,16 @@ from elastocal.diagnosis.proposal import (
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.verdict import ADEQUATE, NAMED, NOT_TESTABLE
 
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.diagnosis.alternatives import Members
+    from elastocal.diagnosis.diagnose import Diagnosis, Evidence
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.new_states import Entries, Instrument
+    from elastocal.diagnosis.search import Model
+    from elastocal.diagnosis.settings import Settings
+
 # States that are looked at, and entries among them that greedy search and exchange choose from: as many by what they tell alone
 # as at random, for some tell only together with others.
 _STATES, _SHORT_LIST = 10_000, 300
@@ -47,7 +60,14 @@ _EXCHANGES = 2
 _WORTH_A_TARGET = 0.05
 
 
-def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
+def propose(
+    diagnosis: Diagnosis,
+    joint_limits: np.ndarray,
+    settings: Settings,
+    stream: np.random.Generator,
+    poses: int = 10,
+    ladder: tuple[float, ...] | None = None,
+) -> Proposal:
     """Choose the poses and loads that most probably resolve what a diagnosis leaves ambiguous.
 
     Parameters
@@ -68,8 +88,10 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     Proposal
     """
     joints, case, evidence = len(joint_limits), diagnosis.case, diagnosis.evidence
+    if evidence is None:
+        return without_poses(joints, (), (), DATA_AT_FAULT)
     kept, reason = _ambiguous(evidence, settings)
-    best = evidence.conclusion.best.mechanisms if evidence else ()
+    best = evidence.conclusion.best.mechanisms
     if reason:
         return without_poses(joints, best, (), reason)
     problem = evidence.linearized.problem
@@ -108,7 +130,7 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     return Proposal(
         entries.joint_angles,
         entries.wrench,
-        entries.approach[:, 0] if reach.free and reach.approach_noted else None,
+        entries.approach[:, 0] if reach.free and entries.approach is not None else None,
         entries.weighed,
         reach.shares,
         tuple(dict.fromkeys(instrument.model.targets[target].point for target in targets)),
@@ -123,10 +145,8 @@ def propose(diagnosis, joint_limits, settings, stream, poses=10, ladder=None):
     )
 
 
-def _ambiguous(evidence, settings):
+def _ambiguous(evidence: Evidence, settings: Settings) -> tuple[dict[tuple[str, ...], list[Model]], str]:
     """Models of each credible hypothesis, the best first, each by falling probability; or why there is nothing to resolve."""
-    if evidence is None:
-        return {}, DATA_AT_FAULT
     conclusion, found = evidence.conclusion, evidence.posterior
     if conclusion.verdict in (ADEQUATE, NOT_TESTABLE):
         return {}, NOTHING_MISSING if conclusion.verdict == ADEQUATE else NOTHING_TESTABLE
@@ -139,7 +159,7 @@ def _ambiguous(evidence, settings):
     if len(names) < 2 or (conclusion.verdict == NAMED and not instead):
         return {}, NOTHING_AMBIGUOUS
     units = evidence.linearized.problem.units
-    models = {name: [] for name in names}
+    models: dict[tuple[str, ...], list[Model]] = {name: [] for name in names}
     for model in found.models:
         name = tuple(sorted({units[n].mechanism for n in model.units}))
         if name in models:
@@ -149,7 +169,9 @@ def _ambiguous(evidence, settings):
     return {name: [m for m in each if m is each[0] or any(m is other for other in extra)] for name, each in models.items()}, ""
 
 
-def _searched(members, instrument, poses, stream):
+def _searched(
+    members: Members, instrument: Instrument, poses: int, stream: np.random.Generator
+) -> tuple[Entries, np.ndarray, list[int]]:
     """The experiment that leaves least entropy: its entries, their information, and the targets that are read."""
     criterion, reach = Criterion.of(members, stream), instrument.reach
     every = list(range(len(instrument.model.targets)))
@@ -158,7 +180,7 @@ def _searched(members, instrument, poses, stream):
     short = max(int(share * _SHORT_LIST), 2 * poses)
     entries = new_states.drawn(reach, max(int(share * pool), short), stream)
     entries, information = _short_list(criterion, instrument, entries, every, short, stream)
-    chosen = []
+    chosen: list[int] = []
     for _ in range(poses):
         total = information[chosen].sum(axis=0)
         left = criterion.left(total + information)
@@ -178,16 +200,23 @@ def _searched(members, instrument, poses, stream):
         tried = new_states.near(reach, entries, _NEIGHBOURS, radius, stream)
         told = instrument.information(tried, every)
         numbers = np.arange(poses)
-        pool, known = entries.then(tried), np.concatenate([information, told])
+        both, known = entries.then(tried), np.concatenate([information, told])
         for place in range(poses):
             mine = np.append(place, poses + _NEIGHBOURS * place + np.arange(_NEIGHBOURS))
             rest = known[np.delete(numbers, place)].sum(axis=0)
             numbers[place] = mine[int(np.argmin(criterion.left(rest + known[mine])))]
-        entries, information = pool.at(numbers), known[numbers]
+        entries, information = both.at(numbers), known[numbers]
     return _without_idle_targets(criterion, instrument, entries, information, every)
 
 
-def _short_list(criterion, instrument, entries, targets, count, stream):
+def _short_list(
+    criterion: Criterion,
+    instrument: Instrument,
+    entries: Entries,
+    targets: Sequence[int],
+    count: int,
+    stream: np.random.Generator,
+) -> tuple[Entries, np.ndarray]:
     """Half of a short list by what entries tell alone, half at random."""
     left, size = [], max(int(_MEMORY / instrument.unknowns**2), 1)
     for start in range(0, len(entries), size):
@@ -199,7 +228,9 @@ def _short_list(criterion, instrument, entries, targets, count, stream):
     return kept, instrument.information(kept, targets)
 
 
-def _without_idle_targets(criterion, instrument, entries, information, targets):
+def _without_idle_targets(
+    criterion: Criterion, instrument: Instrument, entries: Entries, information: np.ndarray, targets: list[int]
+) -> tuple[Entries, np.ndarray, list[int]]:
     """Leave out targets on further points that are not worth mounting."""
     nothing = np.zeros((1, *information.shape[1:]))
     start = criterion.left(nothing)[0]
@@ -212,9 +243,10 @@ def _without_idle_targets(criterion, instrument, entries, information, targets):
     return entries, information, targets
 
 
-def _by_worth(members, information, stream):
+def _by_worth(members: Members, information: np.ndarray, stream: np.random.Generator) -> np.ndarray:
     """Order of the entries in which each leaves least entropy after those before it."""
-    criterion, order = Criterion.of(members, stream), []
+    criterion = Criterion.of(members, stream)
+    order: list[int] = []
     total = np.zeros(information.shape[1:])
     for _ in range(len(information)):
         left = criterion.left(total + information)
@@ -224,14 +256,14 @@ def _by_worth(members, information, stream):
     return np.array(order)
 
 
-def _present_separation(linearized, found, alternative, factor):
+def _present_separation(linearized: Linearized, found: Model, alternative: Model, factor: float) -> float:
     """What the present measurements separate an effect as large as the one found from a model that is fitted to it."""
     problem = linearized.problem
     statistics = problem.statistics
     at = int(np.argmin(np.abs(statistics.pose_error_rad - found.pose_error_rad)))
     gram, along = statistics.gram[at] / factor**2, statistics.along[at] / factor**2
 
-    def of(model):
+    def of(model: Model) -> tuple[np.ndarray, np.ndarray]:
         columns = np.concatenate([np.zeros(0, int), *(problem.units[n].columns for n in model.units)])
         deviations = factor * np.repeat(model.scales, [len(problem.units[n].columns) for n in model.units])
         return columns, gram[np.ix_(columns, columns)] + np.diag(deviations**-2)

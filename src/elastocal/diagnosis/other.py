@@ -20,12 +20,22 @@ References
    Systems 24, 2011.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.random_streams import stream
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    from elastocal.effects.conditions import Conditions
 
 # Deviations that no machine would hide: joints about an arc minute, the base a tenth of a millimetre and of a milliradian.
 JOINT_RAD, BASE_M, BASE_RAD = 2e-4, 1e-4, 1e-4
@@ -54,17 +64,17 @@ class Competitor:
         Joints turn; the base does either.
     """
 
-    location: tuple
+    location: tuple[int, ...]
     law: str
     motion: str = TURN
 
     @property
-    def name(self):
+    def name(self) -> str:
         """Tells the laws of one location apart."""
         return self.law if self.location else f"{self.law} {self.motion}"
 
 
-def competitors(campaign):
+def competitors(campaign: Conditions) -> list[Competitor]:
     """Laws of which a campaign has inputs, at each joint and at the base.
 
     Parameters
@@ -99,13 +109,14 @@ class Law:
     """
 
     competitor: Competitor
-    campaign: object
+    campaign: Conditions
     size: float
-    parts: tuple
+    parts: tuple[tuple[int, Callable[[np.ndarray], np.ndarray], Callable[[Conditions], np.ndarray]], ...]
 
-    def displacement(self, around):
+    def displacement(self, around: Conditions) -> list[dict[int, np.ndarray]]:
         """For each feature a displacement of one coordinate in some states, list of dict of int to ndarray (S,)."""
-        location, found = self.competitor.location, []
+        location = self.competitor.location
+        found: list[dict[int, np.ndarray]] = []
         largest = np.abs(_load(self.campaign, location)).max(initial=0.0)
         for coordinate, smooth, named in self.parts:
             waves = smooth(_inputs(around, self.competitor, coordinate, self.campaign)) - named(around)
@@ -115,7 +126,7 @@ class Law:
         return found
 
 
-def law_of(competitor, campaign, features):
+def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     """Draw the displacements by one law.
 
     Parameters
@@ -141,14 +152,14 @@ def law_of(competitor, campaign, features):
     return Law(competitor, campaign, size, tuple(parts))
 
 
-def _coordinates(around, competitor):
+def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:
     """Coordinates of the sites that a law displaces."""
     if competitor.location:
         return [competitor.location[0] - 1]
     return list(around.sites.base[:3] if competitor.motion == SHIFT else around.sites.base[3:])
 
 
-def _waves(count, inputs, draws):
+def _waves(count: int, inputs: int, draws: np.random.Generator) -> Callable[[np.ndarray], np.ndarray]:
     """Random functions of so many inputs, values (S, count), whose squares sum to about one; without an input zero."""
     low, high = np.log(_LENGTH_SCALES)
     lengths = np.exp(draws.uniform(low, high, count))
@@ -157,7 +168,7 @@ def _waves(count, inputs, draws):
     return lambda values: size * np.cos(values @ frequency + phase)
 
 
-def _named_part(competitor, campaign, waves):
+def _named_part(competitor: Competitor, campaign: Conditions, waves: np.ndarray) -> Callable[[Conditions], np.ndarray]:
     """What is constant in waves (S, count) over a campaign, and at a joint what goes straight with its angle; for any states.
 
     A zero offset, a transmission ratio, a frame that is fitted: the catalogue has names for these.
@@ -173,7 +184,7 @@ def _named_part(competitor, campaign, waves):
     return lambda around: mean + np.outer(around.joint_angles[:, joint] - center, slope)
 
 
-def _inputs(around, competitor, coordinate, campaign):
+def _inputs(around: Conditions, competitor: Competitor, coordinate: int, campaign: Conditions) -> np.ndarray:
     """Inputs of a law for one of its coordinates, each of size about one, ndarray (S, D).
 
     Angles as points of a circle, all about their mean. What is constant or absent in the campaign is left out.
@@ -182,44 +193,48 @@ def _inputs(around, competitor, coordinate, campaign):
     return np.concatenate([np.zeros((len(around.joint_angles), 0)), *parts], axis=1)
 
 
-def _scaled(values, known):
+def _scaled(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     known, values = (np.reshape(each, (len(each), -1)).astype(float) for each in (known, values))
     spread = np.abs(known - known.mean(axis=0)).max(axis=0, initial=0.0)
     differ = spread > _ROUNDING * np.maximum(np.abs(known).max(axis=0, initial=0.0), 1.0)
     return ((values - known.mean(axis=0)) / np.where(differ, spread, 1.0))[:, differ]
 
 
-def _angles(joints):
+def _angles(joints: Iterable[int]) -> list[Callable[[Conditions], np.ndarray]]:
     """Points of a circle for some joints, counted from 0."""
-    return [lambda around, j=j, wave=wave: wave(around.joint_angles[:, j]) for j in joints for wave in (np.cos, np.sin)]
+    return [partial(_on_circle, wave, joint) for joint in joints for wave in (np.cos, np.sin)]
 
 
-def _own(joint, campaign):
+def _on_circle(wave: Callable[[np.ndarray], np.ndarray], joint: int, around: Conditions) -> np.ndarray:
+    return wave(around.joint_angles[:, joint])
+
+
+def _own(joint: int, campaign: Conditions) -> list[Callable[[Conditions], np.ndarray]]:
     approach = [lambda around: around.approach[:, joint]] if campaign.approach is not None else []
     return [*_angles([joint]), lambda around: around.total[:, joint], *approach]
 
 
-def _neighbours(joint, campaign):
+def _neighbours(joint: int, campaign: Conditions) -> list[Callable[[Conditions], np.ndarray]]:
     beside = [other for other in (joint - 1, joint, joint + 1) if 0 <= other < campaign.sites.joints]
     return [*_angles(beside), lambda around: around.total[:, joint]]
 
 
-def _time(coordinate, campaign):
+def _time(coordinate: int, campaign: Conditions) -> list[Callable[[Conditions], np.ndarray]]:
     names = ("time_s", "temperature_c", "progress")
-    return [lambda around, name=name: getattr(around, name) for name in names if getattr(campaign, name) is not None]
+    return [attrgetter(name) for name in names if getattr(campaign, name) is not None]
 
 
-def _force(coordinate, campaign):
+def _force(coordinate: int, campaign: Conditions) -> list[Callable[[Conditions], np.ndarray]]:
     return [lambda around: around.total[:, coordinate]]
 
 
-def _place(coordinate, campaign):
+def _place(coordinate: int, campaign: Conditions) -> list[Callable[[Conditions], np.ndarray]]:
     return [lambda around: around.motion.position[0].T]
 
 
 _INPUTS = {OWN: _own, NEIGHBOURS: _neighbours, TIME: _time, FORCE: _force, PLACE: _place}
 
 
-def _load(around, location):
+def _load(around: Conditions, location: tuple[int, ...]) -> np.ndarray:
     """Torque on the joint, or force on the base, ndarray (S,)."""
     return around.total[:, location[0] - 1] if location else np.linalg.norm(around.wrench[:, :3], axis=1)

@@ -8,11 +8,18 @@ References
 .. [1] Raiffa, H. and Schlaifer, R., Applied Statistical Decision Theory, Harvard University, 1961.
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.stats import norm
 
 from elastocal.diagnosis.evidence import log_sum_exp
 from elastocal.diagnosis.proposal import MOST_POSES, WANTED_PROBABILITY
+
+if TYPE_CHECKING:
+    from elastocal.diagnosis.alternatives import Members
 
 # Separations with which odds of 19:1 are reached in half of all experiments: ln 19 = lambda / 2 - z sqrt(lambda).
 HALF_RESOLVED = 2 * np.log(19.0)
@@ -30,7 +37,7 @@ class Promise:
     .. [1] Glasserman, P. and Yao, D. D., Some guidelines and guarantees for common random numbers, Management Science 38, 1992.
     """
 
-    def __init__(self, members, stream):
+    def __init__(self, members: Members, stream: np.random.Generator) -> None:
         self.members = members
         hypotheses = len(members.names)
         self.log_prior = np.array([log_sum_exp(members.log_weights[members.hypothesis == h]) for h in range(hypotheses)])
@@ -39,12 +46,18 @@ class Promise:
             mine = np.flatnonzero(members.hypothesis == h)
             share = np.exp(members.log_weights[mine] - self.log_prior[h])
             counts = np.bincount(stream.choice(len(mine), PROMISE_DRAWS, p=share / share.sum()), minlength=len(mine))
-            truths += [members.drawn(model, count, stream) for model, count in zip(mine, counts, strict=True)]
+            truths += [members.drawn(int(model), int(count), stream) for model, count in zip(mine, counts, strict=True)]
         self.truths = np.concatenate(truths)
         self.white = stream.standard_normal(self.truths.shape)
 
-    def log_factors(self, information):
-        """ln p of the simulated measurements under each hypothesis, but for what is common to all; ndarray (N, H)."""
+    def log_factors(self, information: np.ndarray) -> np.ndarray:
+        """ln p of the simulated measurements under each hypothesis, but for what is common to all; ndarray (N, H).
+
+        Parameters
+        ----------
+        information : ndarray (U, U)
+            Of a whole experiment.
+        """
         members = self.members
         values, vectors = np.linalg.eigh(information)
         noise = self.white @ (vectors * np.sqrt(np.clip(values, 0.0, None))).T
@@ -62,7 +75,7 @@ class Promise:
         found = [log_sum_exp(logs[:, members.hypothesis == h], axis=1) for h in range(len(members.names))]
         return np.column_stack(found) - self.log_prior
 
-    def separations(self, logs):
+    def separations(self, logs: np.ndarray) -> np.ndarray:
         """Separation of the best hypothesis from each by `log_factors` of an experiment, ndarray (H,); 0 for the best.
 
         Twice the mean log Bayes factor for the truth, or, where that is carried by a few large draws, the separation of two
@@ -78,7 +91,7 @@ class Promise:
             found[h] = max(min(2.0 * mean, separation_resolved(often)), 0.0)
         return found
 
-    def resolved(self, logs):
+    def resolved(self, logs: np.ndarray) -> float:
         """Probability that the right hypothesis ends up with odds of 19:1, by `log_factors` of an experiment."""
         logs = logs + self.log_prior
         right = logs[np.arange(len(logs)), self.hypothesis] - log_sum_exp(logs, axis=1) >= np.log(0.95)
@@ -86,7 +99,7 @@ class Promise:
         return float(right @ weights / weights.sum())
 
 
-def separation_resolved(probability):
+def separation_resolved(probability: float) -> float:
     """Separation of two fixed hypotheses with which one gets odds of 19:1 so often: ln 19 = lambda / 2 - z sqrt(lambda).
 
     The log Bayes factor of two normal distributions with one covariance is normal, with mean lambda / 2 and variance lambda.
@@ -103,7 +116,7 @@ def separation_resolved(probability):
     return float((z + np.sqrt(z**2 + 2 * np.log(19.0))) ** 2) if probability > 0 else 0.0
 
 
-def poses_needed(promise, total, resolved):
+def poses_needed(promise: Promise, total: np.ndarray, resolved: np.ndarray) -> int | None:
     """Poses after which 90 % are resolved: of those proposed, or as many more as tell the same.
 
     By bisection in the number of poses.

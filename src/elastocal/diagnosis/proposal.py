@@ -1,6 +1,9 @@
 """A proposal for the next experiment, as whoever drives the robot and whoever reads the report want it."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -8,6 +11,11 @@ from scipy.constants import g as standard_gravity
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.mechanics.components import WRENCH_NAMES
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterator
+
+    from elastocal.mechanics.robot import Robot
 
 # Said where nothing within reach helps.
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
@@ -59,22 +67,22 @@ class Proposal:
     wrench: np.ndarray
     approach: np.ndarray | None
     reference_weight: np.ndarray
-    shares: tuple
-    points: tuple
+    shares: tuple[float, ...]
+    points: tuple[str, ...]
     separation: np.ndarray
     resolved: np.ndarray
     present: float
     poses_needed: int | None
-    best: tuple
-    nearest: tuple
-    indistinguishable: tuple
+    best: tuple[str, ...]
+    nearest: tuple[str, ...]
+    indistinguishable: tuple[tuple[str, ...], ...]
     reason: str
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.separation)
 
 
-def without_poses(joints, best, indistinguishable, reason):
+def without_poses(joints: int, best: tuple[str, ...], indistinguishable: tuple[tuple[str, ...], ...], reason: str) -> Proposal:
     """A proposal without poses.
 
     Parameters
@@ -107,7 +115,7 @@ def without_poses(joints, best, indistinguishable, reason):
     )
 
 
-def table_of(proposal, robot):
+def table_of(proposal: Proposal, robot: Robot) -> pd.DataFrame:
     """The proposal as whoever drives the robot wants it.
 
     Parameters
@@ -124,7 +132,7 @@ def table_of(proposal, robot):
         ``reference_weight_kg`` where a weight is asked for.
     """
     joints, count = robot.joints, len(proposal)
-    columns = {
+    columns: dict[str, Any] = {
         "effect": [f"{words(proposal.best)} or {words(proposal.nearest)}"] * count,
         "pose": np.arange(count),
         "load": proposal.wrench.any(axis=1).astype(int),
@@ -146,7 +154,7 @@ def table_of(proposal, robot):
     return pd.DataFrame(columns)
 
 
-def facts_of(proposal):
+def facts_of(proposal: Proposal) -> dict[str, Any]:
     """What verdict.json says of the next experiment.
 
     Parameters
@@ -170,7 +178,7 @@ def facts_of(proposal):
     }
 
 
-def sentence_of(proposal):
+def sentence_of(proposal: Proposal) -> str:
     """What the report says of the next experiment.
 
     Parameters
@@ -196,7 +204,7 @@ def sentence_of(proposal):
     )
 
 
-def words(mechanisms):
+def words(mechanisms: Collection[str]) -> str:
     """A hypothesis in words: joint_tilt, payload and link_weight, joint_tilt or a related mechanism."""
     named = [name for name in mechanisms if name != OTHER]
     if not named:
@@ -204,7 +212,7 @@ def words(mechanisms):
     return " and ".join(named) + (" with a related mechanism" if OTHER in mechanisms else "")
 
 
-def _left_aside(proposal):
+def _left_aside(proposal: Proposal) -> Iterator[str]:
     """Sentences on the alternatives that nothing within reach tells from the best: instead of it, or beside it."""
     best = set(proposal.best)
     instead = [words(name) for name in proposal.indistinguishable if not set(name) > best or OTHER in set(name) - best]

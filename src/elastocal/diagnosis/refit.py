@@ -9,13 +9,24 @@ References
 .. [1] Hoerl, A. E. and Kennard, R. W., Ridge regression: biased estimation for nonorthogonal problems, Technometrics 12, 1970.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.linearize import declared_geometry
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameter_values
+
+if TYPE_CHECKING:
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.search import Model, Problem
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 
 @dataclass(frozen=True)
@@ -30,11 +41,11 @@ class Selected:
         Size of declared geometry, in plausible sizes.
     """
 
-    effects: tuple
+    effects: tuple[tuple[Candidate, np.ndarray], ...]
     declared_size: float
 
 
-def selected(linearized, model):
+def selected(linearized: Linearized, model: Model) -> Selected:
     """What a model of the posterior is for the exact fit.
 
     Parameters
@@ -54,7 +65,9 @@ def selected(linearized, model):
     return Selected(tuple(effects), linearized.declared_size)
 
 
-def fit_with_sizes(declared, observations, noise, chosen, near=None, **options):
+def fit_with_sizes(
+    declared: Fit, observations: Observations, noise: Noise, chosen: Selected, near: Fit | None = None, **options: float
+) -> Fit:
     """Fit the declared model with the effects of a selected one.
 
     Parameters
@@ -92,7 +105,7 @@ def fit_with_sizes(declared, observations, noise, chosen, near=None, **options):
     return fit(replace(model, effects=known).with_effects(effects), observations, noise, start, near is not None, **options)
 
 
-def mean_square_left(problem, model):
+def mean_square_left(problem: Problem, model: Model) -> float:
     """Mean square of the whitened residual that a model leaves, by the linearised problem.
 
     Parameters
@@ -114,7 +127,7 @@ def mean_square_left(problem, model):
     return float((statistics.squares[place] - along @ np.linalg.solve(inner, along)) / statistics.freedom)
 
 
-def mean_square(fitted):
+def mean_square(fitted: Fit) -> float:
     """Mean square of the whitened residual of an exact fit, over all that is left free, its priors included.
 
     Parameters
@@ -135,7 +148,7 @@ def mean_square(fitted):
     return float(squares / (white.size - (~known & ~fitted.held).sum()))
 
 
-def remaining_noise(problem, model, taken, least):
+def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) -> Noise:
     """Noise as a model leaves it.
 
     Parameters
@@ -156,7 +169,7 @@ def remaining_noise(problem, model, taken, least):
     return replace(least.scaled(factor), pose_rad=float(np.sqrt(max(left, 1.0))) * model.pose_error_rad)
 
 
-def _with_prior(candidate, deviations):
+def _with_prior(candidate: Candidate, deviations: np.ndarray) -> Candidate:
     parameters = tuple(
         replace(parameter, prior_std=float(deviation), sized=True)
         for parameter, deviation in zip(candidate.parameters, deviations, strict=True)

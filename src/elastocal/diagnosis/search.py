@@ -12,13 +12,17 @@ References
    window, Journal of the American Statistical Association 89, 1994.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from heapq import nlargest
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.evidence import (
+    Evaluated,
     Grid,
     added_evidence,
     condition,
@@ -28,7 +32,14 @@ from elastocal.diagnosis.evidence import (
     pose_weights,
     scale_weights,
 )
-from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.hypotheses import OTHER, Prior
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Sequence
+
+    from elastocal.diagnosis.hypotheses import Unit
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.diagnosis.statistics import Statistics
 
 # Models below the best by more than this, in log odds, hold nothing.
 _NEGLIGIBLE = 9.0
@@ -52,18 +63,18 @@ class Problem:
     settings : Settings
     """
 
-    statistics: object
-    units: tuple
-    prior: object
-    settings: object
+    statistics: Statistics
+    units: tuple[Unit, ...]
+    prior: Prior
+    settings: Settings
 
     @cached_property
-    def grid(self):
+    def grid(self) -> Grid:
         """Sizes of a unit."""
         return Grid(np.array(self.settings.scales), scale_weights(self.settings.scales, self.settings))
 
     @property
-    def log_pose(self):
+    def log_pose(self) -> np.ndarray:
         """Logarithm of the prior weight of each size of the pose error, ndarray (T,)."""
         return pose_weights(self.statistics.pose_error_rad, self.settings)
 
@@ -78,13 +89,13 @@ class Model:
         Rising.
     log_odds : float
         Posterior log odds against the declared model alone.
-    scales : ndarray
+    scales : ndarray (m,)
         Most probable size of each unit.
     pose_error_rad : float
         Most probable size of the error common to the measurements of a pose.
     """
 
-    units: tuple
+    units: tuple[int, ...]
     log_odds: float
     scales: np.ndarray
     pose_error_rad: float
@@ -97,20 +108,20 @@ class Posterior:
     Attributes
     ----------
     models : tuple of Model
-    probabilities : ndarray
+    probabilities : ndarray (M,)
         "Nothing" among them.
     """
 
-    models: tuple
+    models: tuple[Model, ...]
     probabilities: np.ndarray
 
     @property
-    def nothing(self):
+    def nothing(self) -> Model:
         """The declared model alone."""
         return next(model for model in self.models if not model.units)
 
 
-def initial_screening(problem):
+def initial_screening(problem: Problem) -> tuple[Model, np.ndarray]:
     """The declared model alone, and each unit alone against it.
 
     Parameters
@@ -128,7 +139,7 @@ def initial_screening(problem):
     return searcher.measure(()), np.array(single)
 
 
-def posterior(problem, known=()):
+def posterior(problem: Problem, known: Collection[str] = ()) -> Posterior:
     """Search the models.
 
     Parameters
@@ -149,7 +160,7 @@ def posterior(problem, known=()):
     return searcher.weigh()
 
 
-def pose_errors_within_reach(statistics, settings):
+def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.ndarray:
     """Sizes of the pose error up to the largest that "nothing" makes likely: what a model adds leaves no more to it.
 
     And up to `REACH` steps beyond the most likely, for measurements that are simulated with that may look like more.
@@ -164,13 +175,13 @@ def pose_errors_within_reach(statistics, settings):
     -------
     ndarray of bool (T,)
     """
-    problem = Problem(statistics, (), None, settings)
+    problem = Problem(statistics, (), Prior({}, {}), settings)
     weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
     largest = max(np.flatnonzero(weights > weights.max() + _UNLIKELY)[-1], np.argmax(weights) + REACH)
     return np.arange(len(weights)) <= largest
 
 
-def likely_pose_errors(statistics, units, settings):
+def likely_pose_errors(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
     """Sizes of the pose error that "nothing" or some good single unit makes likely; zero, to which Gram matrices refer, always.
 
     Parameters
@@ -184,7 +195,7 @@ def likely_pose_errors(statistics, units, settings):
     -------
     ndarray of bool (T,)
     """
-    problem = Problem(statistics, tuple(units), None, settings)
+    problem = Problem(statistics, tuple(units), Prior({}, {}), settings)
     conditioned = condition(statistics, np.zeros(0, int), np.zeros(0), problem.log_pose)
     blocks = conditioned.blocks_of(units, range(len(units)))
     found = added_evidence(conditioned, blocks, problem.grid, statistics.freedom, units)
@@ -194,29 +205,32 @@ def likely_pose_errors(statistics, units, settings):
     return likely
 
 
-def _likely(by_pose_error, total, empty):
+def _likely(by_pose_error: np.ndarray, total: np.ndarray, empty: Evaluated) -> np.ndarray:
     good = np.argsort(-total)[:_TELLING_UNITS]
     weights = log_sum_exp(by_pose_error[:, good], axis=2)
     weights = np.column_stack([weights - log_sum_exp(weights, axis=0), empty.log_pose])
-    return (weights > _UNLIKELY).any(axis=1)
+    return np.any(weights > _UNLIKELY, axis=1)
 
 
 class _Searcher:
     """Models met so far with their approximate log odds, and the sizes at which they were met."""
 
-    def __init__(self, problem):
+    def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.statistics, self.log_pose = problem.statistics, problem.log_pose
         self.grid = problem.grid
         self.empty = self.evaluated((), ())
-        self.met, self.sizes, self.measured, self.extended = {(): 0.0}, {(): self.empty.scales}, {}, set()
+        self.met: dict[tuple[int, ...], float] = {(): 0.0}
+        self.sizes: dict[tuple[int, ...], np.ndarray] = {(): self.empty.scales}
+        self.measured: dict[tuple[int, ...], Model] = {}
+        self.extended: set[tuple[int, ...]] = set()
         self.extend(())
 
-    def evaluated(self, model, start):
+    def evaluated(self, model: tuple[int, ...], start: Iterable[float]) -> Evaluated:
         """Evidence of a model in full."""
         return evaluate(self.statistics, [self.problem.units[n] for n in model], self.grid, self.log_pose, start)
 
-    def extend(self, model):
+    def extend(self, model: tuple[int, ...]) -> None:
         """Meet a model with each single unit added."""
         if model in self.extended or len(model) >= self.problem.settings.largest_model:
             return
@@ -249,13 +263,13 @@ class _Searcher:
                 best = self.grid.scales[np.argmax(found[number])]
                 self.sizes[key] = np.concatenate([sizes[:place], [best], sizes[place:]])
 
-    def keep_likely_pose_errors(self, by_pose_error, total):
+    def keep_likely_pose_errors(self, by_pose_error: np.ndarray, total: np.ndarray) -> None:
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
         kept = np.flatnonzero(_likely(by_pose_error, total, self.empty))
         self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
         self.empty = self.evaluated((), self.empty.scales)
 
-    def measure(self, model):
+    def measure(self, model: tuple[int, ...]) -> Model:
         """Meet a model as it is, in full, and what it would be without each of its units."""
         start = self.sizes.get(model)
         if start is None:
@@ -273,33 +287,34 @@ class _Searcher:
                 self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
 
-    def pose_error(self, found):
+    def pose_error(self, found: Evaluated) -> float:
         """Most probable size of the pose error, rad."""
         return float(self.statistics.pose_error_rad[np.argmax(found.log_pose)])
 
-    def start_from_whole_mechanisms(self):
+    def start_from_whole_mechanisms(self) -> None:
         """Meet each mechanism at all its locations, with the best variant at each."""
         units = self.problem.units
         for mechanism in dict.fromkeys(unit.mechanism for unit in units if unit.mechanism != OTHER):
-            best = {}
+            best: dict[tuple[int | str, ...], tuple[int]] = {}
             for number, unit in enumerate(units):
-                if unit.mechanism == mechanism and self.met[(number,)] > self.met.get(best.get(unit.location), -np.inf):
+                present = best.get(unit.location)
+                if unit.mechanism == mechanism and (present is None or self.met[(number,)] > self.met[present]):
                     best[unit.location] = (number,)
             whole = tuple(sorted(number for (number,) in best.values()))
             if 1 < len(whole) <= self.problem.settings.largest_model:
                 self.measure(whole)
 
-    def start_from(self, known):
+    def start_from(self, known: Collection[str]) -> None:
         """Meet the model of some candidates, each with the best of its shapes."""
-        best = {}
+        best: dict[tuple[str, tuple[int | str, ...]], tuple[int]] = {}
         for number, unit in enumerate(self.problem.units):
             if unit.candidate and unit.candidate.key in known:
                 place = unit.mechanism, unit.location
-                best[place] = max(best.get(place, (number,)), (number,), key=self.met.get)
+                best[place] = max(best.get(place, (number,)), (number,), key=self.met.__getitem__)
         if best:
             self.measure(tuple(sorted(number for (number,) in best.values())))
 
-    def grow(self):
+    def grow(self) -> None:
         """Extend the best models that have not been, in rounds, until rounds bring nothing better."""
         settings, idle, rising = self.problem.settings, 0, False
         while idle < settings.patience:
@@ -308,7 +323,7 @@ class _Searcher:
             if not waiting:
                 break
             # While the best gets better, it alone is followed; where it does not, there is time for others.
-            for model in nlargest(1 if rising else settings.beam, waiting, key=self.met.get):
+            for model in nlargest(1 if rising else settings.beam, waiting, key=self.met.__getitem__):
                 if model not in self.measured:
                     self.measure(model)
                 self.extend(model)
@@ -316,11 +331,11 @@ class _Searcher:
             rising = gained > _BETTER
             idle = 0 if rising else idle + 1
 
-    def weigh(self):
+    def weigh(self) -> Posterior:
         """Evaluate the best models in full."""
         best = max(self.met.values())
         good = [model for model, odds in self.met.items() if odds > best - _NEGLIGIBLE]
-        order = nlargest(self.problem.settings.kept_models, good, key=self.met.get)
+        order = nlargest(self.problem.settings.kept_models, good, key=self.met.__getitem__)
         models = [self.measured.get(model) or self.measure(model) for model in order]
         if () not in order:
             models.append(self.measured[()])

@@ -1,9 +1,12 @@
 """Every number that a diagnosis rests on, with its reason and its source; recorded in verdict.json."""
 
 from dataclasses import asdict, dataclass, field, fields
+from typing import Any, TypeVar
+
+_Value = TypeVar("_Value")
 
 
-def _setting(default, reason):
+def _setting(default: _Value, reason: str) -> _Value:
     return field(default=default, metadata={"reason": reason})
 
 
@@ -38,18 +41,18 @@ class Settings:
     further_location: float = _setting(
         0.5, "ratio of the geometric prior on the number of locations of a mechanism: one defect at five joints is one finding"
     )
-    scales: tuple = _setting(
+    scales: tuple[float, ...] = _setting(
         (0.01, 0.03, 0.1, 0.3, 1.0),
         "sizes of an effect in plausible sizes that are averaged over; capped at 1, for larger ones extrapolate badly",
     )
     scale_center: float = _setting(0.1, "most likely size of an effect, in plausible sizes")
-    scale_spread: tuple = _setting(
+    scale_spread: tuple[float, float] = _setting(
         (3.0, 0.7), "spread of the logarithm of the size below and above the center: small effects are common"
     )
-    declared_sizes: tuple = _setting(
+    declared_sizes: tuple[float, ...] = _setting(
         (0.1, 0.3, 1.0, 3.0, 10.0), "sizes of declared geometry: measured robots exceed data-sheet tolerances tenfold"
     )
-    pose_steps: tuple = _setting(
+    pose_steps: tuple[float, ...] = _setting(
         (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
         "grid of the error common to the measurements of a pose, in standard errors of a joint angle from one pose",
     )
@@ -89,7 +92,7 @@ class Settings:
         60, "models whose evidence is computed in full; the rest holds less than 1 % of the probability"
     )
 
-    def document(self):
+    def document(self) -> dict[str, dict[str, Any]]:
         """Name, value and reason of every setting, JSON-serialisable.
 
         Returns

@@ -18,6 +18,8 @@ References
    American Statistical Association 72, 1977.
 """
 
+from __future__ import annotations
+
 import contextlib
 from dataclasses import dataclass, replace
 
@@ -57,7 +59,7 @@ class Statistics:
     log_likelihood: np.ndarray
     freedom: int
 
-    def at(self, chosen):
+    def at(self, chosen: np.ndarray) -> Statistics:
         """The same at some of the sizes of the pose error only."""
         return Statistics(
             self.pose_error_rad[chosen],
@@ -91,6 +93,10 @@ class Products:
         Measurements' components.
     freedom : int
         The same less what the declared model fits.
+    into_basis : ndarray (P, P)
+        Turns declared columns into orthonormal ones.
+    projected : ndarray (P, K + 1)
+        What the orthonormal columns have in those of the candidates and the residual.
     """
 
     declared: int
@@ -105,7 +111,7 @@ class Products:
     projected: np.ndarray
 
     @property
-    def without_candidates(self):
+    def without_candidates(self) -> Products:
         """Of the declared model alone."""
         kept = np.append(np.arange(self.declared), self.gram.shape[0] - 1)
         return replace(
@@ -116,7 +122,7 @@ class Products:
             projected=self.projected[:, -1:],
         )
 
-    def alike(self, declared, candidates, columns):
+    def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Whitened rows at other states in the parameters of these products.
 
         Parameters
@@ -134,7 +140,16 @@ class Products:
         return rows_alike(self, declared, candidates, columns)
 
 
-def products_of(declared, candidates, residual, jacobian, pose, prior_std, present, joint_rad):
+def products_of(
+    declared: np.ndarray,
+    candidates: np.ndarray,
+    residual: np.ndarray,
+    jacobian: np.ndarray,
+    pose: np.ndarray,
+    prior_std: np.ndarray,
+    present: np.ndarray,
+    joint_rad: np.ndarray,
+) -> Products:
     """Gather the products of whitened rows.
 
     Parameters
@@ -215,7 +230,7 @@ def products_of(declared, candidates, residual, jacobian, pose, prior_std, prese
     )
 
 
-def statistics_of(products, pose_error_rad):
+def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Statistics:
     """Sufficient statistics at some sizes of the pose error.
 
     Parameters
@@ -240,7 +255,7 @@ def statistics_of(products, pose_error_rad):
     )
 
 
-def normal_equations(products, tau):
+def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray, float]:
     """Z'Sigma(tau)^-1 Z, and ln |Sigma| beyond that of white noise.
 
     Parameters
@@ -260,7 +275,9 @@ def normal_equations(products, tau):
     return products.gram - rows.T @ rows, log_det
 
 
-def null_draws(products, tau, pose_error_rad, count, stream):
+def null_draws(
+    products: Products | Sums, tau: float, pose_error_rad: np.ndarray, count: int, stream: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
     """Statistics of simulated measurements of the declared model, in which nothing is missing.
 
     A parametric bootstrap [1]_ of the statistics themselves, without drawing measurements.
@@ -288,7 +305,8 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     """
     if isinstance(products, Sums):
         gram = _marginal(normal_equations(products, tau)[0], products.declared)[0]
-        return tuple(drawn[None] for drawn in null_draws_of(products, gram, count, stream))
+        along, squares = null_draws_of(products, gram, count, stream)
+        return along[None], squares[None]
     poses, joints, width = products.pose_rows.shape
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
     # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
@@ -326,7 +344,7 @@ def null_draws(products, tau, pose_error_rad, count, stream):
     return np.array(found_along), np.array(found_squares)
 
 
-def _root(covariance, rows):
+def _root(covariance: np.ndarray, rows: int) -> np.ndarray:
     """A matrix whose product with its transpose is the covariance of products, of size about one, of so many white rows.
 
     The Cholesky factor where there are more rows than products, which is nine times as fast; else by eigenvectors, since the
@@ -342,7 +360,7 @@ def _root(covariance, rows):
     return vectors[:, kept] * np.sqrt(values[kept])
 
 
-def _pseudo_inverse(grams):
+def _pseudo_inverse(grams: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions that are not rounding (G, n), Moore-Penrose inverse and root (G, n, n), of symmetric positive matrices."""
     values, vectors = np.linalg.eigh(grams)
     kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
@@ -351,18 +369,18 @@ def _pseudo_inverse(grams):
     return kept, inverse, vectors * (kept * np.sqrt(values))[:, None]
 
 
-def _joint_deviations(products, tau):
+def _joint_deviations(products: Products, tau: float) -> np.ndarray:
     return np.sqrt(tau**2 + products.joint_rad**2)
 
 
-def _pose_inverse(products, tau):
+def _pose_inverse(products: Products, tau: float) -> np.ndarray:
     """(Lambda^-1 + C_p)^-1 = Lambda^1/2 (I + Lambda^1/2 C_p Lambda^1/2)^-1 Lambda^1/2, ndarray (G, n, n)."""
     deviation = _joint_deviations(products, tau)
     inner = np.eye(len(deviation)) + deviation[:, None] * products.pose_gram * deviation
     return deviation[:, None] * np.linalg.inv(inner) * deviation
 
 
-def _pose_factor(products, tau):
+def _pose_factor(products: Products, tau: float) -> tuple[np.ndarray, float]:
     """Rows whose squares are what the pose error takes from Z'Z, and ln |Sigma| beyond that of white noise."""
     deviation = _joint_deviations(products, tau)
     width = products.pose_rows.shape[2]
@@ -375,7 +393,7 @@ def _pose_factor(products, tau):
     return rows.reshape(-1, width), float(log_det)
 
 
-def _marginal(total, declared):
+def _marginal(total: np.ndarray, declared: int) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Schur complement of the declared columns: W'MW, W'My, y'My and ln |X'Sigma^-1 X|."""
     factor = np.linalg.cholesky(total[:declared, :declared])
     cross = solve_triangular(factor, total[:declared, declared:], lower=True)

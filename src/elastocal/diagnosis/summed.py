@@ -6,9 +6,15 @@ of them in a sample of the measurements taken off, so that what is summed is of 
 algebra.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
 
 # Beyond this many values of whitened columns a problem is summed: as many as take 60 MB, of which there are ten copies.
 MOST_HELD = 8_000_000
@@ -16,6 +22,18 @@ MOST_HELD = 8_000_000
 SAMPLE_ROWS = 6000
 # Values of whitened columns in a block.
 _BLOCK_VALUES = 1_500_000
+
+
+class InBasis(Protocol):
+    """What tells the parameters of products: see `statistics.Products`."""
+
+    @property
+    def into_basis(self) -> np.ndarray:
+        """ndarray (P, P)."""
+
+    @property
+    def projected(self) -> np.ndarray:
+        """ndarray (P, K + 1)."""
 
 
 @dataclass(frozen=True)
@@ -68,32 +86,33 @@ class Sums:
     projected: np.ndarray
 
     @property
-    def gram(self):
+    def gram(self) -> np.ndarray:
         """Z'Z."""
         return self.totals[0]
 
-    def alike(self, declared, candidates, columns):
+    def alike(self, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """As `Products.alike`."""
         return rows_alike(self, declared, candidates, columns)
 
 
-def rows_alike(products, declared, candidates, columns):
+def rows_alike(products: InBasis, declared: np.ndarray, candidates: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """See `Products.alike`."""
     basis = declared @ products.into_basis
     return np.concatenate([basis, candidates - basis @ products.projected[:, columns]], axis=-1)
 
 
-def rows_at_once(columns):
+def rows_at_once(columns: int) -> int:
     """Rows of a block of so many columns."""
     return max(_BLOCK_VALUES // columns, 1)
 
 
-def triangle_of(blocks):
+def triangle_of(blocks: Iterable[np.ndarray]) -> np.ndarray:
     """Triangular factor of rows that come in blocks: sequential TSQR [1]_.
 
     Parameters
     ----------
     blocks : iterable of ndarray (R, k)
+        One at least.
 
     Returns
     -------
@@ -104,14 +123,25 @@ def triangle_of(blocks):
     .. [1] Demmel, J., Grigori, L., Hoemmen, M. and Langou, J., Communication-optimal parallel and sequential QR and LU
        factorizations, SIAM Journal on Scientific Computing 34, 2012.
     """
-    triangle = None
-    for block in blocks:
-        stacked = block if triangle is None else np.concatenate([triangle, block])
-        triangle = np.linalg.qr(stacked, mode="r")
+    rest = iter(blocks)
+    triangle = _triangular_factor(next(rest))
+    for block in rest:
+        triangle = _triangular_factor(np.concatenate([triangle, block]))
     return triangle
 
 
-def summed(blocks, triangle, sample, prior_std, present, pose_error_rad):
+def _triangular_factor(rows: np.ndarray) -> np.ndarray:
+    return np.linalg.qr(rows, mode="r")  # type: ignore[return-value]  # numpy's stubs know of no mode that gives R alone
+
+
+def summed(
+    blocks: Iterable[WhiteRows],
+    triangle: np.ndarray,
+    sample: InBasis,
+    prior_std: np.ndarray,
+    present: np.ndarray,
+    pose_error_rad: np.ndarray,
+) -> Sums:
     """Sum the products of whitened rows.
 
     Parameters
@@ -131,7 +161,7 @@ def summed(blocks, triangle, sample, prior_std, present, pose_error_rad):
     Sums
     """
     prior = np.diag(1.0 / prior_std)
-    factor = np.linalg.qr(np.concatenate([triangle, prior]), mode="r")
+    factor = _triangular_factor(np.concatenate([triangle, prior]))
     norms = np.linalg.norm(factor, axis=0)
     into_basis = np.linalg.inv(factor / norms) / norms[:, None]
     explained = sample.into_basis @ sample.projected
@@ -164,7 +194,7 @@ def summed(blocks, triangle, sample, prior_std, present, pose_error_rad):
     return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
 
 
-def _whitened(every, jacobian, pose, tau):
+def _whitened(every: np.ndarray, jacobian: np.ndarray, pose: np.ndarray, tau: float) -> Iterator[tuple[np.ndarray, float]]:
     """Rows with (I + tau^2 J J')^-1/2 applied, and ln |I + tau^2 J J'|, for each number of rows in a pose."""
     sizes = np.bincount(pose)
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
@@ -176,7 +206,7 @@ def _whitened(every, jacobian, pose, tau):
         yield white.reshape(-1, every.shape[1]), 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
 
 
-def null_draws_of(sums, gram, count, stream):
+def null_draws_of(sums: Sums, gram: np.ndarray, count: int, stream: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Statistics of simulated measurements of the declared model, at the size of the pose error with which they are simulated.
 
     b = W'My is normal with covariance G = W'MW, and y'My is its square in G^-1 and an independent chi-squared of what is left

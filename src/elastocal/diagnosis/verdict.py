@@ -12,11 +12,20 @@ References
 .. [2] Barbieri, M. M. and Berger, J. O., Optimal predictive model selection, Annals of Statistics 32, 2004.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.diagnosis.hypotheses import OTHER
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from elastocal.diagnosis.alarm import Alarm
+    from elastocal.diagnosis.search import Posterior, Problem
 
 ADEQUATE, NAMED, CLASS, SEVERAL = "adequate", "named", "class", "several"
 UNEXPLAINED, NOT_TESTABLE = "unexplained", "not_testable"
@@ -37,17 +46,17 @@ class Hypothesis:
         Number of its most probable model in the posterior.
     """
 
-    mechanisms: tuple
+    mechanisms: tuple[str, ...]
     probability: float
     model: int
 
     @property
-    def named(self):
+    def named(self) -> tuple[str, ...]:
         """Its mechanisms of the catalogue."""
         return tuple(name for name in self.mechanisms if name != OTHER)
 
     @property
-    def kind(self):
+    def kind(self) -> str:
         """Verdict to which it belongs: nothing of the catalogue, one mechanism of some, or more than one."""
         return (UNEXPLAINED, CLASS)[len(self.named)] if len(self.named) < 2 else SEVERAL
 
@@ -70,13 +79,13 @@ class Conclusion:
     """
 
     verdict: str
-    hypotheses: tuple
+    hypotheses: tuple[Hypothesis, ...]
     best: Hypothesis
-    alternatives: dict
-    mechanisms: dict
+    alternatives: dict[str, tuple[str, ...]]
+    mechanisms: dict[str, float]
 
 
-def concluded(problem, posterior, alarm):
+def concluded(problem: Problem, posterior: Posterior, alarm: Alarm) -> Conclusion:
     """State the verdict.
 
     Parameters
@@ -99,7 +108,7 @@ def concluded(problem, posterior, alarm):
     nothing = next(h for h in hypotheses if not h.mechanisms)
     mechanisms = _marginal(hypotheses)
     tested = [unit for unit in problem.units if unit.mechanism != OTHER]
-    of_the_robot = [unit for unit in tested if unit.candidate.family != _OF_THE_SETUP]
+    of_the_robot = [unit for unit in tested if unit.candidate and unit.candidate.family != _OF_THE_SETUP]
     if not tested or not (of_the_robot or alarm.raised):
         return Conclusion(NOT_TESTABLE, hypotheses, nothing, {}, mechanisms)
     if not alarm.raised:
@@ -123,13 +132,15 @@ def concluded(problem, posterior, alarm):
     return Conclusion(kind, hypotheses, best, {name: _instead_of(name, best, credible) for name in best.named}, mechanisms)
 
 
-def _favoured_instead(problem, posterior, best, hypotheses):
+def _favoured_instead(
+    problem: Problem, posterior: Posterior, best: Hypothesis, hypotheses: Iterable[Hypothesis]
+) -> tuple[Hypothesis, ...]:
     """Other single mechanisms under which the measurements are at least as probable, each at its best location.
 
     The best has only its prior over these, which goes by how many locations and laws each has: no name rests on that alone.
     """
 
-    def log_bayes_factor(hypothesis):
+    def log_bayes_factor(hypothesis: Hypothesis) -> float:
         model = posterior.models[hypothesis.model]
         return model.log_odds - problem.prior.log_odds_of(problem.units[number] for number in model.units)
 
@@ -137,9 +148,9 @@ def _favoured_instead(problem, posterior, best, hypotheses):
     return tuple(h for h in single if log_bayes_factor(h) >= log_bayes_factor(best))
 
 
-def _marginal(hypotheses):
+def _marginal(hypotheses: Iterable[Hypothesis]) -> dict[str, float]:
     """Probability of each mechanism, in falling order."""
-    present = {}
+    present: dict[str, float] = {}
     for hypothesis in hypotheses:
         for mechanism in hypothesis.mechanisms:
             # Their sum may exceed one by rounding.
@@ -147,7 +158,7 @@ def _marginal(hypotheses):
     return dict(sorted(present.items(), key=lambda entry: -entry[1]))
 
 
-def hypotheses_of(problem, posterior):
+def hypotheses_of(problem: Problem, posterior: Posterior) -> tuple[Hypothesis, ...]:
     """Probability of each set of mechanisms.
 
     Parameters
@@ -160,24 +171,24 @@ def hypotheses_of(problem, posterior):
     tuple of Hypothesis
         The most probable first; "nothing" is always among them.
     """
-    found = {(): [0.0, -1]}
+    found: dict[tuple[str, ...], tuple[float, int]] = {(): (0.0, -1)}
     for number, (model, probability) in enumerate(zip(posterior.models, posterior.probabilities, strict=True)):
         names = tuple(sorted({problem.units[unit].mechanism for unit in model.units}))
-        entry = found.setdefault(names, [0.0, number])
-        entry[0] += float(probability)
-        entry[1] = number if entry[1] < 0 else entry[1]
+        held, best = found.get(names, (0.0, number))
+        found[names] = held + float(probability), number if best < 0 else best
     ranked = sorted(found.items(), key=lambda item: -item[1][0])
     return tuple(Hypothesis(names, probability, model) for names, (probability, model) in ranked)
 
 
-def location_probabilities(problem, posterior, mechanism):
+def location_probabilities(problem: Problem, posterior: Posterior, mechanism: str) -> dict[tuple[int | str, ...], float]:
     """Probability of each location of a mechanism, given that it is there.
 
     Returns
     -------
     dict of tuple to float
     """
-    total, found = 0.0, {}
+    total = 0.0
+    found: dict[tuple[int | str, ...], float] = {}
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
         locations = {problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism}
         total += probability if locations else 0.0
@@ -186,16 +197,16 @@ def location_probabilities(problem, posterior, mechanism):
     return {location: value / total for location, value in sorted(found.items(), key=lambda entry: -entry[1])}
 
 
-def _credible(hypotheses, probability):
+def _credible(hypotheses: list[Hypothesis], probability: float) -> list[Hypothesis]:
     """Smallest set of hypotheses, in falling order, that holds a probability."""
     reached = np.cumsum([h.probability for h in hypotheses])
     return hypotheses[: int(np.searchsorted(reached, probability)) + 1]
 
 
-def _instead_of(name, best, credible):
+def _instead_of(name: str, best: Hypothesis, credible: Iterable[Hypothesis]) -> tuple[str, ...]:
     """What stands instead of one mechanism in the other credible hypotheses."""
     rest = set(best.mechanisms) - {name}
-    found = []
+    found: list[str] = []
     for hypothesis in credible:
         others = set(hypothesis.mechanisms) - rest
         if hypothesis != best and name not in others:

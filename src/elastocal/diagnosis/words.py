@@ -3,10 +3,16 @@
 Each effect of the catalogue brings its own words; nothing here knows one by name.
 """
 
+from __future__ import annotations
+
 import re
+from typing import TYPE_CHECKING, Any
 
 from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.effects.catalogue import effects
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping, Sequence
 
 NOTHING = "nothing is missing"
 UNKNOWN = "something that the catalogue does not have"
@@ -20,7 +26,7 @@ _PARTS = ("column", "base")
 _MOST_DETAILED = 2
 
 
-def physical_name(effect):
+def physical_name(effect: str) -> str:
     """Physical name of an effect of the catalogue; its own name as words where its module has none.
 
     Parameters
@@ -34,17 +40,17 @@ def physical_name(effect):
     return getattr(effects().get(effect), "WORDS", effect.replace("_", " "))
 
 
-def detail_words(effect, detail):
+def detail_words(effect: str, detail: str) -> str:
     """Which variant of an effect, in words where its module has some."""
     return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
 
 
-def part_of(effect):
+def part_of(effect: str) -> str:
     """What the numbers of an effect count: joints, or links, which begin at the joint of the same number."""
     return getattr(effects().get(effect), "PART", "joint")
 
 
-def listed(items, most=None, rest="more", last="and"):
+def listed(items: Iterable[str], most: int | None = None, rest: str = "more", last: str = "and") -> str:
     """Items in a sentence, at most so many of them."""
     items = list(items)
     if most is not None and len(items) > most:
@@ -52,14 +58,14 @@ def listed(items, most=None, rest="more", last="and"):
     return items[0] if len(items) == 1 else ", ".join(items[:-1]) + f" {last} " + items[-1] if items else "none"
 
 
-def at_joints(effect, joints):
+def at_joints(effect: str, joints: Collection[int]) -> str:
     """Where an effect acts: " of joint 3", or nothing where it is no joint's."""
     if not joints:
         return ""
     return f" of {part_of(effect)}{'s' if len(joints) > 1 else ''} {listed(map(str, joints))}"
 
 
-def effect_words(effect, locations=()):
+def effect_words(effect: str, locations: Iterable[str] = ()) -> str:
     """An effect and where it acts.
 
     Parameters
@@ -76,12 +82,13 @@ def effect_words(effect, locations=()):
     parsed = []
     for location in filter(None, locations):
         found = _LOCATION.match(location)
+        assert found is not None
         numbers = tuple(map(int, found["numbers"].split(" and "))) if found["numbers"] else ()
         parsed.append((numbers, found["detail"]))
     return physical_name(effect) + _where(effect, parsed)
 
 
-def found_words(effect, keys):
+def found_words(effect: str, keys: Iterable[str]) -> str:
     """An effect and where it was found.
 
     Parameters
@@ -98,13 +105,14 @@ def found_words(effect, keys):
     locations = []
     for key in keys:
         found = re.match(_ANY_KEY, key)
+        assert found is not None
         locations.append(
             (tuple(map(int, (found["joints"] or "").split("+"))) if found["joints"] else (), found["detail"] or "")
         )
     return physical_name(effect) + _where(effect, locations)
 
 
-def candidate_words(key):
+def candidate_words(key: str) -> str:
     """The key of a candidate in words: zero offset of joint 3, gear transmission error of joint 1 (orders 1-2).
 
     Parameters
@@ -119,7 +127,7 @@ def candidate_words(key):
     return found_words(found["effect"], [key]) if found else key.replace("_", " ")
 
 
-def hypothesis_words(mechanisms, locations=None):
+def hypothesis_words(mechanisms: Collection[str], locations: Mapping[str, Iterable[str]] | None = None) -> str:
     """A hypothesis, which is a set of mechanisms, in words.
 
     Parameters
@@ -139,7 +147,7 @@ def hypothesis_words(mechanisms, locations=None):
     return " with ".join(named) + (f" or {RELATED}" if OTHER in mechanisms else "")
 
 
-def hypotheses_words(sets):
+def hypotheses_words(sets: Sequence[Mapping[str, Any]]) -> list[str]:
     """Hypotheses in words; those that hold all of the first and more by what they add to it.
 
     Parameters
@@ -151,7 +159,8 @@ def hypotheses_words(sets):
     -------
     list of str
     """
-    first, found = set(sets[0]["mechanisms"]) if sets else set(), []
+    first = set(sets[0]["mechanisms"]) if sets else set()
+    found: list[str] = []
     for entry in sets:
         names = set(entry["mechanisms"])
         if not first or not first < names:
@@ -163,12 +172,12 @@ def hypotheses_words(sets):
     return found
 
 
-def alternative_words(name):
+def alternative_words(name: str) -> str:
     """What may be meant instead of a mechanism: another, or a related one."""
     return RELATED if name == OTHER else physical_name(name)
 
 
-def in_words(text):
+def in_words(text: str) -> str:
     """A text with every name of the catalogue and every key of a candidate in words.
 
     Parameters
@@ -181,7 +190,7 @@ def in_words(text):
     """
     names = "|".join(sorted(effects(), key=len, reverse=True))
 
-    def worded(found):
+    def worded(found: re.Match[str]) -> str:
         # Names that are common words, such as payload, are meant only as keys or where something is said of them.
         plain = "_" not in found["effect"] and not (found["joints"] or found["detail"] or text[found.end() :].startswith(":"))
         return found.group() if plain else candidate_words(found.group())
@@ -189,9 +198,9 @@ def in_words(text):
     return re.sub(r"(?<![\w@])" + _KEY.format(names=names) + r"(?!\w)", worded, text)
 
 
-def _where(effect, locations):
+def _where(effect: str, locations: Iterable[tuple[tuple[int, ...], str]]) -> str:
     """Where an effect acts, by joints or links and details: " of joint 4 (orders 1-2)"."""
-    details = {}
+    details: dict[tuple[int, ...], list[str]] = {}
     for numbers, detail in locations:
         details.setdefault(numbers, []).append(detail)
     singles = len(details) > 1 and all(len(numbers) == 1 for numbers in details)
@@ -201,7 +210,7 @@ def _where(effect, locations):
     return f" {listed(part.strip() for part in parts if part)}" if any(parts) else ""
 
 
-def _located(effect, numbers, detail):
+def _located(effect: str, numbers: tuple[int, ...], detail: str) -> str:
     detail = detail_words(effect, detail)
     # Details without a joint stand alone, but for parts of the robot.
     if not numbers:
