@@ -3,11 +3,27 @@
 Snakemake finds the module by its name. Dry runs and `--verbose` say all that Snakemake says by itself, as does its log file.
 """
 
+from __future__ import annotations
+
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from logging import LogRecord
+
+    class _Record(LogRecord):
+        """What Snakemake's records say beside their message, each kind of event some of it."""
+
+        stats: Mapping[str, int]
+        rule_name: str
+        wildcards: Mapping[str, str]
+        log: Sequence[str]
+
 
 # Beginnings of lines that are no news.
 _NO_NEWS = (
@@ -24,8 +40,10 @@ _FAILED = "At least one job did not complete successfully."
 class LogHandler(LogHandlerBase):
     """One line for each job that starts; of a job that failed, the last line of its log after all else."""
 
-    def __post_init__(self):
-        self._started, self._total, self._failed = 0, 0, []
+    def __post_init__(self) -> None:
+        self._started = 0
+        self._total = 0
+        self._failed: list[tuple[str, list[str]]] = []
 
     writes_to_stream = True
     writes_to_file = False
@@ -33,12 +51,12 @@ class LogHandler(LogHandlerBase):
     has_formatter = False
     needs_rulegraph = False
 
-    def emit(self, record):
+    def emit(self, record: LogRecord) -> None:
         """Write a record."""
-        for line in self._lines(record):
+        for line in self._lines(cast("_Record", record)):
             print(line, file=sys.stdout if self.common_settings.stdout else sys.stderr, flush=True)
 
-    def _lines(self, record):
+    def _lines(self, record: _Record) -> list[str]:
         event = getattr(record, "event", None)
         if self.common_settings.dryrun or self.common_settings.verbose:
             return [self.format(record)]
@@ -61,7 +79,7 @@ class LogHandler(LogHandlerBase):
         return [] if str(record.msg).startswith(_NO_NEWS) else [self.format(record)]
 
 
-def _reason(rule, logs):
+def _reason(rule: str, logs: Sequence[str]) -> str:
     """Last line of the logs of a job that failed."""
     lines = [line for log in logs if Path(log).is_file() for line in Path(log).read_text(encoding="utf-8").splitlines()]
     return next((line for line in reversed(lines) if line.strip()), f"{rule} failed, with nothing in its log {', '.join(logs)}")

@@ -194,7 +194,8 @@ def needed(values: np.ndarray | None) -> np.ndarray:
     ndarray (S,) or (S, n)
         The same.
     """
-    assert values is not None
+    if values is None:
+        raise TypeError("states without what the law of a candidate needs")
     return values
 
 

@@ -1,5 +1,9 @@
 """Which poses lie outside the range of those that a model was fitted to: there its errors are extrapolated."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from elastocal.campaigns.joint_space import beyond_range
@@ -8,8 +12,15 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.observations import part_at, parts_of, state_clusters
 
+if TYPE_CHECKING:
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations, States
 
-def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=None):
+
+def outside_fitted_range(
+    fitted_states: States, states: States, fitted_variance: np.ndarray | None = None, variance: np.ndarray | None = None
+) -> np.ndarray:
     """States at which a model has to extrapolate.
 
     Either a joint stands beyond the fitted poses by more than chance explains, see `joint_space.beyond_range`; or the model
@@ -36,10 +47,14 @@ def outside_fitted_range(fitted_states, states, fitted_variance=None, variance=N
     # Loads and repeats of a pose share its angles.
     _, first = np.unique(state_clusters(fitted_states), return_index=True)
     outside = beyond_range(fitted_states.joint_angles[first], states.joint_angles)
-    return outside if variance is None else outside | (variance > fitted_variance.max(initial=0.0))
+    if fitted_variance is None or variance is None:
+        return outside
+    return outside | (variance > fitted_variance.max(initial=0.0))
 
 
-def predictive_variances(fitted, observations, model, estimate, unseen):
+def predictive_variances(
+    fitted: Fit, observations: Observations, model: Model, estimate: Estimate, unseen: Observations
+) -> tuple[np.ndarray, np.ndarray]:
     """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
 
     The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
@@ -94,7 +109,7 @@ def predictive_variances(fitted, observations, model, estimate, unseen):
     return _largest(own, cluster), _largest(other, unseen.state)
 
 
-def _variances_left_out(wanted, whitened, root, cluster):
+def _variances_left_out(wanted: np.ndarray, whitened: np.ndarray, root: np.ndarray, cluster: np.ndarray) -> np.ndarray:
     """Variance (M,) of each position with the measurements of its own pose left out of the fit, by Woodbury's identity."""
     projected, own = wanted @ root.T, whitened @ root.T
     variance = (projected**2).sum(axis=(1, 2))
@@ -111,7 +126,7 @@ def _variances_left_out(wanted, whitened, root, cluster):
     return variance
 
 
-def _largest(values, group):
+def _largest(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     found = np.zeros(group.max() + 1)
     np.maximum.at(found, group, values)
     return found

@@ -1,6 +1,9 @@
 """Errors on poses that no step has seen: before and after, with intervals over poses."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import binom
@@ -13,6 +16,14 @@ from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states
 from elastocal.fitting.prediction import residuals
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from typing import Any
+
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
@@ -44,12 +55,12 @@ class Errors:
     cluster: np.ndarray
 
     @property
-    def poses(self):
+    def poses(self) -> int:
         """Number of poses."""
         return int(self.cluster.max()) + 1
 
 
-def position_errors(model, estimate, observations):
+def position_errors(model: Model, estimate: Estimate, observations: Observations) -> Errors:
     """Distances between measured and predicted positions.
 
     Parameters
@@ -70,7 +81,7 @@ def position_errors(model, estimate, observations):
     return Errors(distance, observations.cluster)
 
 
-def placed_estimate(fitted, observations):
+def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     """The estimate of a fit for other observations of its targets, whose sessions it may not have seen.
 
     A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
@@ -100,7 +111,7 @@ def placed_estimate(fitted, observations):
     )
 
 
-def summary(distance):
+def summary(distance: np.ndarray) -> dict[str, np.ndarray]:
     """Mean, RMS, 95th percentile and maximum.
 
     Parameters
@@ -135,7 +146,9 @@ class Reduction:
     std_error: float
 
 
-def intervals(errors, replicates, stream, reference=0):
+def intervals(
+    errors: Sequence[Errors], replicates: int, stream: np.random.Generator, reference: int = 0
+) -> tuple[list[dict[str, np.ndarray]], list[Reduction]]:
     """95 % intervals of the summary, for as few poses as a campaign holds out.
 
     Poses are the independent units; measurements of one pose share errors. Mean and RMS, and the ratio of two RMS, have
@@ -190,7 +203,7 @@ def intervals(errors, replicates, stream, reference=0):
     return found, [_reduction(squares[reference], square, weights) for square in squares]
 
 
-def share_below_largest(poses):
+def share_below_largest(poses: int) -> float:
     """Share of all poses whose errors stay below the largest error seen, at 95 % confidence; free of any distribution.
 
     The one-sided tolerance limit of a sample's maximum [1]_.
@@ -211,7 +224,7 @@ def share_below_largest(poses):
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
 
-def _drawn_poses(poses, replicates, stream):
+def _drawn_poses(poses: int, replicates: int, stream: np.random.Generator) -> np.ndarray | None:
     """How often each pose counts in each replicate, ndarray (B, P) of float; None where Student's t is taken instead."""
     if not _FEWEST_TO_DRAW <= poses <= _MOST_TO_DRAW:
         return None
@@ -220,7 +233,7 @@ def _drawn_poses(poses, replicates, stream):
     return weights[(weights > 0).sum(axis=1) > 1]
 
 
-def _log_ratio_interval(over, under, weights):
+def _log_ratio_interval(over: np.ndarray, under: np.ndarray, weights: np.ndarray | None) -> tuple[np.ndarray, float]:
     """Interval (2,) of the logarithm of a ratio of totals over poses (P,), and its standard error."""
     poses = len(over)
     if poses < 2:
@@ -237,7 +250,7 @@ def _log_ratio_interval(over, under, weights):
     return value + error * reach, error
 
 
-def _log_ratios(weights, over, under):
+def _log_ratios(weights: np.ndarray, over: np.ndarray, under: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Logarithms of the ratio of weighted totals, and their jackknife standard errors: ndarray (B,) each."""
     poses = len(over)
     tops, bottoms = weights @ over, weights @ under
@@ -249,14 +262,14 @@ def _log_ratios(weights, over, under):
     return np.log(tops / bottoms), np.sqrt(variance)
 
 
-def _reduction(before, after, weights):
+def _reduction(before: np.ndarray, after: np.ndarray, weights: np.ndarray | None) -> Reduction:
     interval, error = _log_ratio_interval(after, before, weights)
     ratio = np.sqrt(after.sum() / before.sum())
     high, low = 1.0 - np.exp(0.5 * interval)
     return Reduction(float(low), float(high), float(0.5 * ratio * error))
 
 
-def _quantile_interval(errors):
+def _quantile_interval(errors: Errors) -> np.ndarray:
     """Interval (2,) of the 95th percentile by inverting the binomial test at the effective number of measurements."""
     rising, count, poses = np.sort(errors.distance), len(errors.distance), errors.poses
     if poses < 2:
@@ -275,7 +288,7 @@ def _quantile_interval(errors):
     return np.array([bottom, top])
 
 
-def noise_floor(fitted, observations, model, estimate):
+def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate: Estimate) -> float:
     """RMS position error that the noise alone leaves in observations.
 
     Parameters
@@ -302,7 +315,7 @@ def noise_floor(fitted, observations, model, estimate):
     return float(np.sqrt((variance / observations.states.repeats[observations.state]).mean()))
 
 
-def errors_by_range(errors, outside):
+def errors_by_range(errors: Mapping[str, Errors], outside: np.ndarray) -> dict[str, Any]:
     """Errors before and after, inside and outside the range of the fitted poses.
 
     Parameters
@@ -317,18 +330,18 @@ def errors_by_range(errors, outside):
     dict
         ``poses`` outside, and summaries of every stage ``inside`` and ``outside``, None where there is no such pose.
     """
-    found = {"poses": int(outside.sum())}
+    found: dict[str, Any] = {"poses": int(outside.sum())}
     for name, poses in (("inside", ~outside), ("outside", outside)):
         parts = {stage: one.distance[poses[one.cluster]] for stage, one in errors.items()}
         found[name] = {stage: _floats(summary(part)) for stage, part in parts.items()} if poses.any() else None
     return found
 
 
-def _floats(values):
+def _floats(values: Mapping[str, np.ndarray]) -> dict[str, float]:
     return {name: float(value) for name, value in values.items()}
 
 
-def grown(before, after):
+def grown(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
     """Metrics of a summary that got worse.
 
     Parameters

@@ -10,7 +10,10 @@ References
    structure, Ecography 40, 2017.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +23,12 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import select_states, state_clusters
 from elastocal.fitting.registration import registered
 from elastocal.validation.held_out import Errors, intervals, placed_estimate, position_errors, summary
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.observations import Observations, States
 
 # A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
 JOINT_SPACE_BLOCKS = 4
@@ -39,11 +48,11 @@ class Split:
     """
 
     name: str
-    labels: tuple
+    labels: tuple[int, ...]
     part: np.ndarray
 
 
-def splits_of(states):
+def splits_of(states: States) -> list[Split]:
     """The partitions that some states allow: blocks of joint space and, where there are several, sessions.
 
     Parameters
@@ -68,7 +77,7 @@ def splits_of(states):
     return [split for split in found if _fewest_left(split, pose) >= FEWEST_TRAINING_POSES]
 
 
-def cross_validated(fitted, observations, part):
+def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
     """Position errors of observations, each predicted by a refit without the part that it belongs to.
 
     Leave-one-block-out cross-validation. A refit starts from the nominal robot, so that a parameter that only the part left out
@@ -98,7 +107,9 @@ def cross_validated(fitted, observations, part):
     return Errors(distance, observations.cluster)
 
 
-def split_rows(declared, final, observations, replicates, stream):
+def split_rows(
+    declared: Fit, final: Fit, observations: Observations, replicates: int, stream: np.random.Generator
+) -> list[dict[str, Any]]:
     """Cross-validated errors of the declared and the final model over every split that the training poses allow.
 
     Parameters
@@ -128,12 +139,14 @@ def split_rows(declared, final, observations, replicates, stream):
         rows.append(error_row(split.name, "all", before, after, replicates, stream))
         of_each = split.part[observations.state]
         for number, label in enumerate(split.labels):
-            pair = [_part(errors, of_each == number) for errors in (before, after)]
+            pair = _part(before, of_each == number), _part(after, of_each == number)
             rows.append(error_row(split.name, label, *pair, replicates, stream))
     return rows
 
 
-def error_row(split, block, before, after, replicates, stream):
+def error_row(
+    split: str, block: str | int, before: Errors, after: Errors, replicates: int, stream: np.random.Generator
+) -> dict[str, Any]:
     """One row of splits.csv.
 
     Parameters
@@ -149,7 +162,7 @@ def error_row(split, block, before, after, replicates, stream):
     dict
     """
     limits, reductions = intervals([before, after], replicates, stream)
-    row = {"split": split, "block": block, "poses": before.poses}
+    row: dict[str, Any] = {"split": split, "block": block, "poses": before.poses}
     rms = [summary(errors.distance)["rms_m"] for errors in (before, after)]
     for stage, value, limit in zip(("before", "after"), rms, limits, strict=True):
         row |= {f"{stage}_rms_m": value, f"{stage}_rms_m_low": limit["rms_m"][0], f"{stage}_rms_m_high": limit["rms_m"][1]}
@@ -158,10 +171,10 @@ def error_row(split, block, before, after, replicates, stream):
     return row | {"reduction_std_error": change.std_error}
 
 
-def _fewest_left(split, pose):
+def _fewest_left(split: Split, pose: np.ndarray) -> int:
     poses = pose.max() + 1
     return poses - max(len(np.unique(pose[split.part == number])) for number in range(len(split.labels)))
 
 
-def _part(errors, mask):
+def _part(errors: Errors, mask: np.ndarray) -> Errors:
     return Errors(errors.distance[mask], np.unique(errors.cluster[mask], return_inverse=True)[1])
