@@ -180,7 +180,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
         step[number] = _SPRING_STEP * parameter.plausible
         moved = (values + step, corrections) if spring.effect == "joint_compliance" else (values, corrections + step)
         change = (of_others(with_springs(around, *moved)) - present) / step[number]
-        for coordinate in np.flatnonzero(change.any(axis=0)):
+        for coordinate in np.flatnonzero(change.any(axis=0)).tolist():
             laws[number][coordinate] = laws[number].get(coordinate, 0.0) + change[:, coordinate]
     return laws
 

@@ -129,6 +129,7 @@ class Parts:
     def fit(self, estimate: Estimate, held: np.ndarray, covariance: np.ndarray, weights: np.ndarray, converged: bool) -> Fit:
         """The `Fit` of these measurements."""
         model = self.model
+        around: Conditions | None
         if self.line is not None:
             springs = joint_compliances(model, estimate), mass_corrections(model, estimate)
             around = with_springs(self.line.conditions, *springs)
