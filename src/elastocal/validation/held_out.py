@@ -341,7 +341,7 @@ def _floats(values: Mapping[str, np.ndarray]) -> dict[str, float]:
     return {name: float(value) for name, value in values.items()}
 
 
-def grown(before: Mapping[str, float], after: Mapping[str, float]) -> list[str]:
+def grown(before: Mapping[str, float | np.ndarray], after: Mapping[str, float | np.ndarray]) -> list[str]:
     """Metrics of a summary that got worse.
 
     Parameters
