@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import chi2
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.statistics import Products, Statistics
     from elastocal.diagnosis.summed import Sums
     from elastocal.effects.conditions import Conditions
-    from elastocal.effects.protocol import Candidate, Parameter
+    from elastocal.effects.protocol import Candidate, Displacing, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Model as FittedModel
@@ -329,8 +329,7 @@ class _Source:
         sizes = np.concatenate([unit.sizes for unit in self.units])
         for line, some, jacobian, white in self.lines(parts):
             around = line.conditions
-            # A law has of a candidate what `effect_columns` asks of it, its displacement.
-            laws = [*self.tested, *((cast("Candidate", law), ()) for law in self.against)]
+            laws: list[tuple[Displacing, tuple[float, ...]]] = [*self.tested, *((law, ()) for law in self.against)]
             made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
             made *= sizes
             residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]

@@ -10,7 +10,7 @@ than a pose close by.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.constants import g as standard_gravity
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from elastocal.diagnosis.linearize import Linearized
-    from elastocal.effects.protocol import Candidate
+    from elastocal.effects.protocol import Displacing
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
@@ -265,7 +265,7 @@ class Instrument:
         Number of the campaign's own targets, which come first.
     linearized : Linearized
         In the parameters of whose products information is stated.
-    laws : list of (Candidate or other.Law, tuple)
+    laws : list of (Displacing, tuple)
         In the order of the columns.
     columns : ndarray of int (U,)
         Of the statistics.
@@ -285,7 +285,7 @@ class Instrument:
     estimate: Estimate
     own: int
     linearized: Linearized
-    laws: list[tuple[Candidate | other.Law, tuple[float, ...]]]
+    laws: list[tuple[Displacing, tuple[float, ...]]]
     columns: np.ndarray
     sizes: np.ndarray
     of_load_cell: np.ndarray
@@ -328,9 +328,7 @@ class Instrument:
         around = replace(around, progress=np.ones(len(observations.states)))
         line = linearize(self.model, self.estimate, observations, around)
         jacobian, state, around = line.coordinate_jacobian, observations.state, line.conditions
-        # A law has of a candidate what `effect_columns` asks of it, its displacement.
-        laws = cast("list[tuple[Candidate, tuple[float, ...]]]", self.laws)
-        made = effect_columns(laws, around, jacobian, state) * self.sizes
+        made = effect_columns(self.laws, around, jacobian, state) * self.sizes
         weighed = np.repeat(entries.weighed, len(observations) // len(entries))
         made[np.ix_(weighed, np.ones(made.shape[1], bool), self.of_load_cell)] = 0.0
         every = np.concatenate([line.sensitivities[..., self.declared | self.added], made], axis=-1)
@@ -401,7 +399,7 @@ def instrument_of(
     new = {f"target {target.name}" for target in model.targets[own:]}
     added = np.array([owner in new for owner in owners], bool)
     declared = np.array([owner not in linearized.candidates for owner in owners], bool) & ~added
-    laws: list[tuple[Candidate | other.Law, tuple[float, ...]]] = []
+    laws: list[tuple[Displacing, tuple[float, ...]]] = []
     columns, sizes, cell = [], [], []
     problem, campaign = linearized.problem, linearized.around
     for number in numbers:

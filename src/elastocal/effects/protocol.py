@@ -31,6 +31,14 @@ if TYPE_CHECKING:
     Law = Callable[Concatenate[Conditions, ...], Displacements]
 
 
+class Displacing(Protocol):
+    """Whatever displaces coordinates of the sites: a candidate, or a law that is none."""
+
+    @property
+    def displacement(self) -> Law:
+        """By the conditions and a value of each of the shapes."""
+
+
 @dataclass(frozen=True)
 class Parameter:
     """One unknown of an effect.

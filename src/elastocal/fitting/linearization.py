@@ -16,7 +16,7 @@ from elastocal.mechanics.motion import motion
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
-    from elastocal.effects.protocol import Candidate
+    from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
 
@@ -103,7 +103,7 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
 
 
 def effect_columns(
-    effects: Iterable[tuple[Candidate, Iterable[float]]],
+    effects: Iterable[tuple[Displacing, Iterable[float]]],
     conditions: Conditions,
     coordinate_jacobian: np.ndarray,
     state: np.ndarray,
@@ -112,7 +112,7 @@ def effect_columns(
 
     Parameters
     ----------
-    effects : sequence of (Candidate, sequence of float)
+    effects : sequence of (Displacing, sequence of float)
         With their shape parameters.
     conditions : Conditions
     coordinate_jacobian : ndarray (M, rows, C)
