@@ -18,7 +18,7 @@ from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
-from elastocal.loop.schemas import CORRELATIONS
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS
 from elastocal.loop.whole import cases_in
 
 
@@ -77,7 +77,7 @@ def test_an_effect_that_is_not_expected_to_help_is_named_and_the_model_stays_as_
     verdict = judge(diagnosis, held_out, 1).document
     assert verdict["heldout"]["before"] == verdict["heldout"]["after"] and verdict["effects"][0]["heldout_gain"] is None
     facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
-    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
     back = tables.diagnosis_from(diagnosis.case, facts, steps)
     assert [step.kind for step in back.steps] == ["frames", "declared"]
     assert not any(effect["adopted"] for effect in judge(back, held_out, 1).document["effects"])
@@ -128,7 +128,7 @@ def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_ma
 def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
     diagnosis, held_out = request.getfixturevalue(kind)
     facts = json.loads(json.dumps(tables.diagnosis_facts(diagnosis)))
-    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
     back = tables.diagnosis_from(diagnosis.case, facts, steps)
     assert [(step.name, step.kind) for step in back.steps] == [(step.name, step.kind) for step in diagnosis.steps]
     for mine, theirs in zip(back.steps, diagnosis.steps, strict=True):
@@ -153,7 +153,7 @@ def test_a_diagnosis_comes_back_and_is_judged_the_same(kind, request, tmp_path):
 
 def test_the_effect_found_has_its_prior_in_the_table(found, tmp_path):
     diagnosis, _ = found
-    steps = there_and_back(tmp_path / "s.parquet", tables.STEPS, tables.step_blocks(diagnosis))
+    steps = there_and_back(tmp_path / "s.parquet", STEPS, tables.step_blocks(diagnosis))
     last = steps["step"] == len(diagnosis.steps) - 1
     mine = last & (steps["owner"] == "joint_offset@3")
     prior = steps["prior_std"][mine]
@@ -163,7 +163,7 @@ def test_the_effect_found_has_its_prior_in_the_table(found, tmp_path):
 
 def test_models_table_is_the_posterior(found, tmp_path):
     diagnosis, _ = found
-    table = there_and_back(tmp_path / "m.parquet", tables.MODELS, [tables.model_columns(diagnosis)])
+    table = there_and_back(tmp_path / "m.parquet", MODELS, [tables.model_columns(diagnosis)])
     assert table["probability"].sum() == pytest.approx(1.0)
     assert (np.diff(table["probability"]) <= 0).all() and table["model"].tolist() == list(range(len(table["model"])))
     assert "joint_offset" in table["mechanisms"][0] and "joint_offset@3" in table["units"][0]
@@ -172,7 +172,7 @@ def test_models_table_is_the_posterior(found, tmp_path):
 
 def test_every_candidate_is_in_the_table_tested_or_with_a_reason(found, tmp_path):
     diagnosis, _ = found
-    table = there_and_back(tmp_path / "c.parquet", tables.CANDIDATES, [tables.candidate_columns(diagnosis)])
+    table = there_and_back(tmp_path / "c.parquet", CANDIDATES, [tables.candidate_columns(diagnosis)])
     assert set(table["candidate"]) == set(diagnosis.case.candidates)
     tested = np.isfinite(table["log_bayes_factor"])
     assert (tested == (table["note"] == "")).all() and tested.any() and not tested.all()
@@ -195,7 +195,7 @@ def test_bayes_factors_of_the_table_are_those_of_single_units(found):
 
 def test_confounding_has_every_pair_of_tested_candidates_once(found, tmp_path):
     diagnosis, _ = found
-    table = there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])
+    table = there_and_back(tmp_path / "f.parquet", CONFOUNDING, [tables.confounding_columns(diagnosis)])
     problem = diagnosis.evidence.linearized.problem
     numbers = [n for n, unit in enumerate(problem.units) if unit.candidate]
     assert len(table["one"]) == len(numbers) * (len(numbers) - 1) // 2
@@ -207,9 +207,9 @@ def test_confounding_has_every_pair_of_tested_candidates_once(found, tmp_path):
 
 def test_tables_of_a_faulty_campaign_have_no_rows_but_for_the_candidates(faulty, tmp_path):
     diagnosis, _ = faulty
-    assert len(there_and_back(tmp_path / "m.parquet", tables.MODELS, [tables.model_columns(diagnosis)])["model"]) == 0
-    assert len(there_and_back(tmp_path / "f.parquet", tables.CONFOUNDING, [tables.confounding_columns(diagnosis)])["one"]) == 0
-    candidates = there_and_back(tmp_path / "c.parquet", tables.CANDIDATES, [tables.candidate_columns(diagnosis)])
+    assert len(there_and_back(tmp_path / "m.parquet", MODELS, [tables.model_columns(diagnosis)])["model"]) == 0
+    assert len(there_and_back(tmp_path / "f.parquet", CONFOUNDING, [tables.confounding_columns(diagnosis)])["one"]) == 0
+    candidates = there_and_back(tmp_path / "c.parquet", CANDIDATES, [tables.candidate_columns(diagnosis)])
     assert set(candidates["note"]) == {"the measurements are at fault"} and not candidates["chosen"].any()
 
 

@@ -4,8 +4,8 @@ import pandas as pd
 
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import STEPS, final_parameters
-from elastocal.loop.schemas import residuals
+from elastocal.loop.diagnosis_tables import final_parameters
+from elastocal.loop.schemas import STEPS, residuals
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
 

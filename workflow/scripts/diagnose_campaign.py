@@ -13,7 +13,7 @@ from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.opened import opened_case
-from elastocal.loop.schemas import CORRELATIONS
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS
 from elastocal.random_streams import stream
 
 from job import Job, run
@@ -29,11 +29,11 @@ def diagnose_campaign(job: Job) -> None:
     found = replace(found, document=found.document | {"next_experiment": facts_of(proposal)})
     origin = provenance(job.params, **job.wildcards)
     write_json(job.output.diagnosis, tables.diagnosis_facts(found))
-    write_table(job.output.steps, tables.STEPS, tables.step_blocks(found), origin)
+    write_table(job.output.steps, STEPS, tables.step_blocks(found), origin)
     write_table(job.output.correlations, CORRELATIONS, [tables.final_correlations(found)], origin)
-    write_table(job.output.models, tables.MODELS, [tables.model_columns(found)], origin)
-    write_table(job.output.candidates, tables.CANDIDATES, [tables.candidate_columns(found)], origin)
-    write_table(job.output.confounding, tables.CONFOUNDING, [tables.confounding_columns(found)], origin)
+    write_table(job.output.models, MODELS, [tables.model_columns(found)], origin)
+    write_table(job.output.candidates, CANDIDATES, [tables.candidate_columns(found)], origin)
+    write_table(job.output.confounding, CONFOUNDING, [tables.confounding_columns(found)], origin)
 
 
 run(diagnose_campaign, snakemake)

@@ -4,7 +4,7 @@ from elastocal.figures.candidates import probabilities
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import CANDIDATES
+from elastocal.loop.schemas import CANDIDATES
 
 from job import Job, run
 

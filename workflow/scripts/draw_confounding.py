@@ -3,7 +3,7 @@
 from elastocal.figures.candidates import confounding
 from elastocal.figures.style import save
 from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import CANDIDATES, CONFOUNDING
+from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
 
 from job import Job, run
 

@@ -9,7 +9,7 @@ from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.opened import opened_case
-from elastocal.loop.schemas import residuals
+from elastocal.loop.schemas import STEPS, residuals
 
 from job import Job, run
 
@@ -17,7 +17,7 @@ from job import Job, run
 def judge_campaign(job: Job) -> None:
     case = opened_case(job.input.descriptions, job.input.training)
     held_out = opened_case(job.input.descriptions, job.input.held_out, "held_out")
-    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, tables.STEPS))
+    found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     verdict = judge(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))

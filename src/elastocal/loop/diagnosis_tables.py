@@ -12,9 +12,8 @@ from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.search import initial_screening
 from elastocal.fitting.case import noise_facts, noise_from
 from elastocal.fitting.least_squares import fit
-from elastocal.io.storage import Column, TableSchema
 from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
-from elastocal.loop.schemas import PARAMETER_COLUMNS
+from elastocal.loop.schemas import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -22,55 +21,6 @@ if TYPE_CHECKING:
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
-
-STEPS = TableSchema(
-    "steps",
-    (
-        Column("step", "int32", "", "number of the model on the way from the nominal robot to all effects found", minimum=0),
-        *PARAMETER_COLUMNS,
-    ),
-)
-
-MODELS = TableSchema(
-    "models",
-    (
-        Column("model", "int32", "", "rank of the model, 0 the most probable", minimum=0),
-        Column("probability", "float64", "", "posterior probability"),
-        Column("log_odds", "float64", "", "posterior log odds against the declared model"),
-        Column("mechanisms", "text", "", "its mechanisms, joined by +; nothing, and other, are mechanisms here"),
-        Column("units", "text", "", "its candidates with shape values, joined by ;"),
-        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the measurements of a pose"),
-    ),
-)
-
-CANDIDATES = TableSchema(
-    "candidates",
-    (
-        Column("candidate", "text", "", "effect @ joints [variant]"),
-        Column("effect", "text", "", "name in the catalogue"),
-        Column("family", "text", "", "family in the catalogue"),
-        Column("joints", "text", "", "joints concerned, from 1, joined by +"),
-        Column("shape", "float64", "", "value of the shape parameter, where there is one", missing=True),
-        Column("parameters", "int32", "", "number of its parameters", minimum=0),
-        Column(
-            "log_bayes_factor", "float64", "", "of it alone against the declared model, averaged over its size", missing=True
-        ),
-        Column("probability", "float64", "", "posterior probability that it is in the model", missing=True),
-        Column("noncentrality", "float64", "", "of a test for it if it had its plausible size", missing=True),
-        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
-        Column("chosen", "bool", "", "whether the most probable model has it"),
-        Column("note", "text", "", "why it was not tested"),
-    ),
-)
-
-CONFOUNDING = TableSchema(
-    "confounding",
-    (
-        Column("one", "text", "", "candidate"),
-        Column("other", "text", "", "candidate"),
-        Column("angle_deg", "float64", "deg", "smallest angle between their sensitivities beyond the declared model"),
-    ),
-)
 
 
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
@@ -181,8 +131,8 @@ def candidate_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]
             if unit.candidate:
                 gram = problem.statistics.gram[0][np.ix_(unit.columns, unit.columns)]
                 shape = unit.shapes[0] if unit.shapes else np.nan
-                told = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
-                rows.append((unit.candidate, shape, *told, ""))
+                figures = (factors[number], inclusion[number], np.linalg.eigvalsh(gram)[-1], angles[number], number in chosen)
+                rows.append((unit.candidate, shape, *figures, ""))
     tested = {row[0].key for row in rows}
     untestable = evidence.linearized.untestable if evidence else dict.fromkeys(candidates, "the measurements are at fault")
     for key, candidate in candidates.items():

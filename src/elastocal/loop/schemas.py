@@ -49,12 +49,61 @@ PARAMETER_COLUMNS = (
     Column("prior_std", "float64", "", "standard deviation of the normal prior about zero, if there is one", missing=True),
 )
 
+STEPS = TableSchema(
+    "steps",
+    (
+        Column("step", "int32", "", "number of the model on the way from the nominal robot to all effects found", minimum=0),
+        *PARAMETER_COLUMNS,
+    ),
+)
+
 CORRELATIONS = TableSchema(
     "correlations",
     (
         Column("one", "text", "", "owner and name of a parameter"),
         Column("other", "text", "", "owner and name of another"),
         Column("correlation", "float64", "", "of their estimates"),
+    ),
+)
+
+MODELS = TableSchema(
+    "models",
+    (
+        Column("model", "int32", "", "rank of the model, 0 the most probable", minimum=0),
+        Column("probability", "float64", "", "posterior probability"),
+        Column("log_odds", "float64", "", "posterior log odds against the declared model"),
+        Column("mechanisms", "text", "", "its mechanisms, joined by +; nothing, and other, are mechanisms here"),
+        Column("units", "text", "", "its candidates with shape values, joined by ;"),
+        Column("pose_error_rad", "float64", "rad", "most probable error of a joint common to the measurements of a pose"),
+    ),
+)
+
+CANDIDATES = TableSchema(
+    "candidates",
+    (
+        Column("candidate", "text", "", "effect @ joints [variant]"),
+        Column("effect", "text", "", "name in the catalogue"),
+        Column("family", "text", "", "family in the catalogue"),
+        Column("joints", "text", "", "joints concerned, from 1, joined by +"),
+        Column("shape", "float64", "", "value of the shape parameter, where there is one", missing=True),
+        Column("parameters", "int32", "", "number of its parameters", minimum=0),
+        Column(
+            "log_bayes_factor", "float64", "", "of it alone against the declared model, averaged over its size", missing=True
+        ),
+        Column("probability", "float64", "", "posterior probability that it is in the model", missing=True),
+        Column("noncentrality", "float64", "", "of a test for it if it had its plausible size", missing=True),
+        Column("angle_deg", "float64", "deg", "angle of its sensitivities to the nearest effect found", missing=True),
+        Column("chosen", "bool", "", "whether the most probable model has it"),
+        Column("note", "text", "", "why it was not tested"),
+    ),
+)
+
+CONFOUNDING = TableSchema(
+    "confounding",
+    (
+        Column("one", "text", "", "candidate"),
+        Column("other", "text", "", "candidate"),
+        Column("angle_deg", "float64", "deg", "smallest angle between their sensitivities beyond the declared model"),
     ),
 )
 
