@@ -1,5 +1,6 @@
 """Robots and campaigns for the plant's tests, which need MuJoCo: the extra `blind`, not among the pins of other tests."""
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -12,7 +13,9 @@ except ImportError:
     collect_ignore_glob = ["test_*.py"]
 else:
     # By name, for without MuJoCo not even the names could be had.
-    arms, campaigns, robots = (import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot"))
+    arms, campaigns, robots, sizing = (
+        import_module(f"elastocal.plant.{name}") for name in ("arm", "campaigns", "physical_robot", "sizing")
+    )
 
 
 @pytest.fixture(scope="session", params=["kuka", "fanuc", "abb", "gp180", "iiwa14"])
@@ -51,6 +54,12 @@ def small():
 @pytest.fixture(scope="session")
 def schedule(fanuc_arm, small):
     return campaigns.schedule_of(fanuc_arm, small, 2)
+
+
+@pytest.fixture(scope="session")
+def yardstick(fanuc_specimen, schedule):
+    # As slow as a campaign of usual length, in which a stand that is knocked is so between two of its poses.
+    return sizing.Yardstick(fanuc_specimen, replace(schedule, time_s=3.0 * schedule.time_s))
 
 
 @pytest.fixture

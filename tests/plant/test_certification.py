@@ -3,11 +3,10 @@
 import time
 from dataclasses import replace
 
-import mujoco
 import numpy as np
-import pinocchio as pin
 import pytest
 from analysed_robots import ROBOTS, analysed
+from arms_at_rest import STATES, angles_and_wrenches, at_rest, loading_of
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.mechanics.chain import stretches
@@ -18,28 +17,9 @@ from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.mechanics.robot import Link, Tube
 from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames
 from elastocal.plant.campaigns import usual_force_N
-from elastocal.plant.multibody import machine_of
-from elastocal.plant.random_numbers import stream
-from elastocal.plant.statics import Loading, equilibrium, generalized_forces, places
-from elastocal.plant.structure import Compensator, Mass, Structure, TaperedTube
-from elastocal.plant.weights import declared_masses, gravity_torque, on_stretches, true_masses
-
-STATES = 100
-
-
-def angles_and_wrenches(arm, force=1000.0, seed=0):
-    rng = np.random.default_rng(seed)
-    angles = rng.uniform(*arm.limits.T, (STATES, arm.joints))
-    push = rng.standard_normal((STATES, 3))
-    push *= force / np.linalg.norm(push, axis=1, keepdims=True)
-    return angles, np.hstack([push, np.cross([0.0, 0.5, 0.0], push)])
-
-
-def at_rest(arm, angles, wrench, structure=None, compliance=None):
-    compliance = arm.compliance if compliance is None else compliance
-    machine = machine_of(arm, structure or Structure(), compliance)
-    loading = Loading(angles, wrench, np.zeros((len(angles), arm.joints + 1)))
-    return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
+from elastocal.plant.statics import generalized_forces
+from elastocal.plant.structure import Structure, TaperedTube
+from elastocal.plant.weights import declared_masses, on_stretches
 
 
 def deflections(arm, angles, wrench, **more):
@@ -53,10 +33,6 @@ def deflections(arm, angles, wrench, **more):
     return np.array(
         [pose_differences(bent.position[:, p], bent.rotation[:, p], position[:, p], rotation[:, p]) for p in points]
     )
-
-
-def loading_of(angles):
-    return Loading(angles, np.zeros((len(angles), 6)), np.zeros((len(angles), angles.shape[1] + 1)))
 
 
 def linear_deflections(chain, coordinates, wrench, compliance):
@@ -162,70 +138,6 @@ def test_base_springs_and_bearing_tilt_deflect_as_springs_of_the_chain():
         assert np.abs(off).max() < 3e-9
 
 
-def test_weight_turns_the_joints_as_pinocchio_says(arm):
-    masses = (
-        Mass(1, 300.0, 0.4),
-        Mass(2, 250.0, 0.3, (0.05, 0.02, -0.04)),
-        Mass(2, 90.0, 0.9),
-        Mass(3, 150.0, 0.6, (0.0, 0.0, 0.1)),
-        Mass(arm.joints, 30.0, 0.5),
-    )
-    load = Mass(arm.joints, 120.0, 1.0, (0.1, -0.05, 0.15))
-    machine = machine_of(arm, Structure(masses=masses, payload=load))
-    angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
-    model, parent = pin.Model(), 0
-    for number, axis in enumerate(arm.axes):
-        place = pin.SE3(arm.stretches[number].rotation, arm.stretches[number].vector_m)
-        parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(axis), place, f"q{number}")
-        stretch = arm.stretches[number + 1]
-        for mass in masses:
-            if mass.stretch == number + 1:
-                centre = mass.along * stretch.vector_m + np.array(mass.aside_m)
-                model.appendBodyToJoint(parent, pin.Inertia(mass.mass_kg, centre, np.eye(3)), pin.SE3.Identity())
-        if number == arm.joints - 1:
-            centre = stretch.vector_m + stretch.rotation @ np.array(load.aside_m)
-            model.appendBodyToJoint(parent, pin.Inertia(load.mass_kg, centre, np.eye(3)), pin.SE3.Identity())
-    model.gravity.linear = np.array([0.0, 0.0, -9.80665])
-    data = model.createData()
-    wanted = -np.array([pin.computeGeneralizedGravity(model, data, row) for row in angles])
-    np.testing.assert_allclose(found, wanted, atol=1e-9 * np.abs(wanted).max())
-
-
-@pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.80665), (3.0, -9.0, 2.0)])
-def test_weight_by_levers_is_what_mujocos_model_has_whichever_way_gravity_pulls(arm, gravity):
-    masses = on_stretches(true_masses(declared_masses(arm), stream(1, "test")), arm)
-    machine = machine_of(arm, Structure(masses=masses, gravity_m_s2=gravity))
-    angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = gravity_torque(arm, masses, gravity, angles)
-    data = mujoco.MjData(machine.model)
-    for row, torque in zip(coordinates[:20], found[:20], strict=True):
-        data.qpos[:] = row
-        mujoco.mj_forward(machine.model, data)
-        np.testing.assert_allclose(torque, -data.qfrc_bias[machine.gear], atol=1e-9 * np.abs(found).max())
-
-
-def test_declared_centres_stand_in_the_frame_that_turns_with_their_joint(arm):
-    """A target put there by a fixed chain of its own moves as the model's centre of mass does."""
-    declared = declared_masses(arm)
-    machine = machine_of(arm, Structure(masses=on_stretches(declared, arm)))
-    angles, _ = angles_and_wrenches(arm)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    data = mujoco.MjData(machine.model)
-    origin, rotation = link_frames(arm, angles)
-    for state in range(10):
-        data.qpos[:] = coordinates[state]
-        mujoco.mj_kinematics(machine.model, data)
-        for mass in declared:
-            wanted = origin[state, mass.link] + rotation[state, mass.link] @ mass.centre_m
-            np.testing.assert_allclose(data.xipos[machine.links[mass.link]], wanted, atol=1e-9)
-
-
 def test_base_and_links_yield_under_the_arms_own_weight(arm):
     """Without a load and with stiff gears, what sags is the foot under the moment of all weights."""
     masses = on_stretches(declared_masses(arm), arm)
@@ -243,50 +155,6 @@ def test_base_and_links_yield_under_the_arms_own_weight(arm):
     np.testing.assert_allclose(moved, np.cross(turn, still), atol=2e-3 * np.abs(moved).max())
 
 
-def test_stretches_that_grow_each_by_its_own_move_targets_as_longer_links_do(arm):
-    angles, wrench = angles_and_wrenches(arm)
-    growth = np.linspace(2e-4, -1e-4, arm.joints + 1)
-    machine = machine_of(arm, Structure())
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = places(machine, coordinates, np.broadcast_to(growth, (STATES, arm.joints + 1))).position[:, -1]
-    longer = tuple(
-        replace(s, vector_m=s.vector_m * (1 + g), points=tuple(replace(p, position_m=p.position_m * (1 + g)) for p in s.points))
-        for s, g in zip(arm.stretches, growth, strict=True)
-    )
-    wanted = at_rest(replace(arm, stretches=longer), angles, 0.0 * wrench)[1].position[:, -1]
-    np.testing.assert_allclose(found, wanted, atol=1e-12)
-
-
-def everything(arm):
-    tubes = {k: TaperedTube(2e7, 1.5e7, 2e9, 4e8, 0.2) for k in (2, 3)}
-    return Structure(
-        base=(1e-8, 1e-8, 5e-9, 5e-8, 5e-8, 1e-8),
-        flange=(1e-8, 2e-8, 1e-8, 2e-7, 1e-7, 3e-7),
-        tilt={1: (1e-7, 1e-7), 4: (2e-7, 2e-7)},
-        tubes=tubes,
-        masses=(Mass(2, 300.0), Mass(3, 200.0, 0.4, (0.0, 0.0, 0.1))),
-        payload=Mass(arm.joints, 100.0, 1.0, (0.1, 0.0, 0.1)),
-        compensator=Compensator((-0.3, 0.0, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3),
-    )
-
-
-def test_an_arm_with_everything_is_in_equilibrium_by_mujocos_inverse_dynamics(arm):
-    """It takes the springs and the compensator from the model's own stiffnesses and tendon, none of which the solver uses."""
-    angles, wrench = angles_and_wrenches(arm)
-    machine, rest = at_rest(arm, angles, wrench, structure=everything(arm))
-    model, data = machine.model, mujoco.MjData(machine.model)
-    site = machine.sites[machine.flange]
-    free = np.setdiff1d(np.arange(model.nv), machine.drive)
-    for row, push in zip(rest.coordinates[:20], wrench[:20], strict=True):
-        data.qpos[:], data.qvel[:], data.qacc[:] = row, 0.0, 0.0
-        mujoco.mj_inverse(model, data)
-        force = np.zeros(model.nv)
-        mujoco.mj_applyFT(model, data, push[:3], push[3:], data.site_xpos[site], model.site_bodyid[site], force)
-        left = (data.qfrc_inverse - force)[free]
-        assert np.abs(left).max() < 1e-9 * np.abs(force).max()
-
-
 def test_a_state_takes_less_than_a_millisecond(arm):
     angles, wrench = angles_and_wrenches(arm)
     best = np.inf
@@ -295,26 +163,3 @@ def test_a_state_takes_less_than_a_millisecond(arm):
         at_rest(arm, angles, wrench)
         best = min(best, time.process_time() - start)
     assert best / STATES < 1e-3
-
-
-def test_a_compensator_pulls_by_the_derivative_of_its_energy(arm):
-    spring = Compensator((-0.3, 0.1, -0.25), (0.2, 0.0, 0.05), 1.5e5, 0.3)
-    machine = machine_of(arm, Structure(compensator=spring))
-    angles, _ = angles_and_wrenches(arm)
-    before, sense = arm.stretches[1], arm.axes[1]
-
-    def energy(turn):
-        rotation = np.array([pin.exp3(q * sense) for q in turn])
-        length = np.linalg.norm(
-            before.rotation @ rotation @ np.array(spring.crank_m) - before.rotation @ spring.anchor_m, axis=1
-        )
-        return 0.5 * spring.stiffness_N_per_m * (length - spring.free_length_m) ** 2
-
-    # The anchor is stated in the frame before the shoulder's fixed rotation; none of these arms has one.
-    step = 1e-5
-    wanted = -(energy(angles[:, 1] + step) - energy(angles[:, 1] - step)) / (2 * step)
-    coordinates = np.zeros((STATES, machine.model.nq))
-    coordinates[:, machine.drive] = angles
-    found = generalized_forces(machine, coordinates, loading_of(angles))[0][:, machine.gear]
-    np.testing.assert_allclose(found[:, 1], wanted, atol=1e-4)
-    assert np.abs(np.delete(found, 1, axis=1)).max() < 1e-9

@@ -1,17 +1,13 @@
-"""The tracker's dynamic mode: a smooth path within the limits, deflections as at rest, and a folder that the analysis reads."""
+"""The tracker's dynamic mode: a smooth path within the limits, and deflections as at rest."""
 
 from dataclasses import replace
 
 import numpy as np
-from analysed_robots import ROBOTS
 
-from elastocal.blind.folders import write_dynamic_campaign
-from elastocal.campaigns.reading import read_campaign
 from elastocal.plant.defects import Defect, with_defects
 from elastocal.plant.dynamic import _unloaded, dynamic_table, moving_angles
 from elastocal.plant.physical_robot import seen_poses
 from elastocal.plant.tracker import Tracker
-from elastocal.plant.weights import declared_masses
 
 SILENT = Tracker(sigma_m=0.0, sigma_rad=0.0)
 
@@ -39,11 +35,3 @@ def test_measurements_are_those_of_the_arm_at_rest_at_each_angle(fanuc_specimen)
     weightless = replace(robot, structure=replace(robot.structure, masses=()))
     still = seen_poses(weightless, _unloaded(angle[some], table["time_s"][some], 4))[0][:, -1]
     assert np.abs(still - exact).max() > 1e-3
-
-
-def test_the_analysis_reads_the_folder(tmp_path, fanuc_specimen):
-    declared = declared_masses(fanuc_specimen.arm)
-    write_dynamic_campaign(tmp_path / "c", "c", ROBOTS / "fanuc.yaml", fanuc_specimen, 2000, 4, declared)
-    campaign = read_campaign(tmp_path / "c", ROBOTS)
-    assert len(campaign.measurements) == 2000 and np.unique(campaign.measurements.pose).size == 2000
-    assert campaign.compliance == "nominal" and len(campaign.robot.masses) == 7

@@ -1,12 +1,9 @@
 """Tables and the comparison with the paper, against hand calculations."""
 
-import json
-
 import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.io.data_frames import write_csv, write_latex, write_markdown
 from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.tables import (
     deviation_ratio,
@@ -169,23 +166,3 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
     assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
     assert table.interpretation[3] == "R7, R10: joints of the first stage"
     assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
-
-
-def test_tables_for_people_escape_what_latex_would_take_for_commands(tmp_path):
-    frame = pd.DataFrame({"k_sigma_percent": ["1.0 ± 0.1"], "µm": ["5 %"]})
-    write_latex(tmp_path / "t.tex", frame)
-    write_markdown(tmp_path / "t.md", frame)
-    write_csv(tmp_path / "t.csv", pd.DataFrame({"x": [0.1, np.inf]}))
-    text = (tmp_path / "t.tex").read_text(encoding="utf-8")
-    assert r"k\_sigma\_percent" in text and r"$\pm$" in text and r"5 \%" in text and r"\textmu{}m" in text
-    assert "| 1.0 ± 0.1" in (tmp_path / "t.md").read_text(encoding="utf-8")
-    assert (tmp_path / "t.csv").read_text(encoding="utf-8") == "x\n0.1\ninf\n"
-    assert not list(tmp_path.glob("*.partial"))
-
-
-def test_facts_of_the_report_are_json_without_nan(tmp_path):
-    from elastocal.report.pages import write_report
-
-    with pytest.raises(ValueError, match="JSON"):
-        write_report(tmp_path / "study.pdf", {"x": float("nan")}, {}, [])
-    assert json.dumps([], allow_nan=False) == "[]" and not list(tmp_path.iterdir())

@@ -1,0 +1,189 @@
+"""What the folder of a blind campaign holds, what it must not hold, and the sealed record beside it."""
+
+import hashlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+from analysed_robots import ROBOTS
+
+from elastocal.blind.folders import campaign_document, robot_document, write_blind_campaign, write_dynamic_campaign, write_truth
+from elastocal.campaigns.holdout import split
+from elastocal.campaigns.reading import read_campaign
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.campaigns import Design, schedule_of
+from elastocal.plant.defects import Defect, truth_of, with_defects
+from elastocal.plant.physical_robot import specimen
+from elastocal.plant.tracker import Tracker
+from elastocal.plant.weights import declared_masses
+
+FILES = ["campaign.yaml", "measurements.parquet", "robot.yaml"]
+
+
+@pytest.fixture(scope="module")
+def fanuc_specimen():
+    return specimen(arm_from_file(ROBOTS / "fanuc.yaml"), 4)
+
+
+@pytest.fixture(scope="module")
+def small():
+    """A short campaign."""
+    return Design(poses=8, held_out=2, repeated_poses=3, repeats=2)
+
+
+def made(folder, robot, design, seed=2, **more):
+    return write_blind_campaign(
+        folder, "case0", ROBOTS / "fanuc.yaml", robot, design, schedule_of(robot.arm, design, seed), **more
+    )
+
+
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+def test_the_analysis_reads_the_folder_and_holds_out_the_designed_poses(tmp_path, fanuc_specimen, small, kind):
+    made(tmp_path / "case0", fanuc_specimen, small, kind=kind)
+    campaign = read_campaign(tmp_path / "case0", ROBOTS)
+    training, held_out = split(campaign)
+    schedule = schedule_of(fanuc_specimen.arm, small, 2)
+    assert set(training.pose) == set(schedule.pose[schedule.training])
+    assert set(held_out.pose) == set(schedule.pose[~schedule.training])
+    assert len(campaign.measurements.pose) == 4 * len(schedule.pose)
+
+
+@pytest.mark.parametrize("name", ["kuka", "fanuc", "abb", "fanuc_cpa"])
+def test_angles_stand_in_the_folder_as_the_controller_shows_them(tmp_path, small, name):
+    robot = specimen(arm_from_file(ROBOTS / f"{name}.yaml"), 1)
+    write_blind_campaign(tmp_path / "c", "c", ROBOTS / f"{name}.yaml", robot, small, schedule_of(robot.arm, small, 2))
+    measurements = read_campaign(tmp_path / "c", ROBOTS).measurements
+    np.testing.assert_allclose(measurements.joint_angles[::4], schedule_of(robot.arm, small, 2).angle, atol=1e-12)
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_other_measurements(tmp_path, fanuc_specimen, small):
+    for folder, seed in (("a", 2), ("b", 2), ("c", 3)):
+        made(tmp_path / folder, fanuc_specimen, small, seed)
+    bytes_of = [(tmp_path / folder / "measurements.parquet").read_bytes() for folder in "abc"]
+    assert bytes_of[0] == bytes_of[1]
+    assert bytes_of[0] != bytes_of[2]
+
+
+def test_covariates_may_be_left_out_and_declared_noise_may_be_wrong(tmp_path, fanuc_specimen, small):
+    design = replace(
+        small,
+        covariates=("time",),
+        declared_noise=(3e-5, 3e-5),
+        declared=("joint_offset",),
+        points=("6DoF",),
+        measured="position",
+    )
+    made(tmp_path / "case0", fanuc_specimen, design)
+    campaign = read_campaign(tmp_path / "case0", ROBOTS)
+    assert campaign.noise == {"position_m": 3e-5, "orientation_rad": 3e-5}
+    assert campaign.declared == ("joint_offset",)
+    assert campaign.measurements.approach is None
+    assert campaign.measurements.temperature_c is None
+    assert campaign.measurements.time_s is not None
+    assert campaign.measurements.rotation_vector is None
+    assert [target.point for target in campaign.targets] == ["6DoF"]
+
+
+def test_outliers_are_listed_in_the_sealed_record_and_nowhere_else(tmp_path, fanuc_specimen, small):
+    robot = replace(fanuc_specimen, tracker=Tracker(outliers=0.05, outlier_sigmas=50.0))
+    record = made(tmp_path / "bad", robot, small)
+    made(tmp_path / "good", fanuc_specimen, small)
+    bad, good = (read_campaign(tmp_path / folder, ROBOTS) for folder in ("bad", "good"))
+    off = np.abs(bad.measurements.position - good.measurements.position).max(axis=1) > 0
+    names = [target.name for target in bad.targets]
+    found = {(int(row) // 4, names[bad.measurements.target[row]]) for row in np.flatnonzero(off)}
+    assert found == {tuple(entry) for entry in record["outliers"]}
+    assert found
+
+
+def test_the_folder_is_the_same_with_and_without_a_defect_but_for_the_measurements(tmp_path, fanuc_specimen, small):
+    defect = Defect("lost_motion", (2,), 1e-4, 1)
+    made(tmp_path / "good", fanuc_specimen, small)
+    made(tmp_path / "bad", with_defects(fanuc_specimen, [defect]), small)
+    assert sorted(path.name for path in (tmp_path / "bad").iterdir()) == FILES
+    assert (tmp_path / "good/campaign.yaml").read_bytes() == (tmp_path / "bad/campaign.yaml").read_bytes()
+    content = b"".join(path.read_bytes() for path in (tmp_path / "bad").iterdir())
+    for word in (b"lost_motion", b"defect", b"truth", b"seed"):
+        assert word not in content
+
+
+def test_the_campaigns_robot_file_has_the_declared_weights_and_none_where_none_are_declared(tmp_path, fanuc_specimen, small):
+    declared = declared_masses(fanuc_specimen.arm)
+    record = made(tmp_path / "declared", fanuc_specimen, small, declared=declared)
+    made(tmp_path / "hidden", fanuc_specimen, small)
+    given, hidden = (yaml.safe_load((tmp_path / name / "robot.yaml").read_text()) for name in ("declared", "hidden"))
+    assert [(m["link"], m["mass_kg"]) for m in given["masses"]] == [(m.link, m.mass_kg) for m in declared]
+    assert "masses" not in hidden and hidden == {key: value for key, value in given.items() if key != "masses"}
+    assert given["chain"] == yaml.safe_load((ROBOTS / "fanuc.yaml").read_text())["chain"]
+    off = [abs(m["mass_kg"] / d.mass_kg - 1) for m, d in zip(record["masses"], declared, strict=True)]
+    assert min(off) > 0 and max(off) < 0.31
+
+
+def test_the_record_is_sealed_outside_of_the_folder_by_its_hash(tmp_path, fanuc_specimen):
+    record = {"defects": [truth_of(fanuc_specimen, Defect("lost_motion", (2,), 1e-4, 1))]}
+    sealed = tmp_path / "sealed" / "case0.json"
+    digest = write_truth(sealed, record, tmp_path / "blind" / "case0")
+    assert digest == hashlib.sha256(sealed.read_bytes()).hexdigest()
+    assert json.loads(sealed.read_text()) == record
+    with pytest.raises(ValueError, match="must not lie"):
+        write_truth(tmp_path / "blind" / "case0" / "record.json", record, tmp_path / "blind" / "case0")
+
+
+def test_the_analysis_reads_the_folder_of_a_moving_arm(tmp_path, fanuc_specimen):
+    declared = declared_masses(fanuc_specimen.arm)
+    write_dynamic_campaign(tmp_path / "c", "c", ROBOTS / "fanuc.yaml", fanuc_specimen, 2000, 4, declared)
+    campaign = read_campaign(tmp_path / "c", ROBOTS)
+    assert len(campaign.measurements) == 2000 and np.unique(campaign.measurements.pose).size == 2000
+    assert campaign.compliance == "nominal" and len(campaign.robot.masses) == 7
+
+
+@pytest.mark.parametrize("record", [{"rms": float("nan")}, {"rms": float("inf")}])
+def test_a_record_with_a_value_that_is_not_a_number_is_refused_and_leaves_no_file(tmp_path, record):
+    with pytest.raises(ValueError, match="JSON compliant"):
+        write_truth(tmp_path / "sealed" / "case0.json", record, tmp_path / "blind")
+    assert not list((tmp_path / "sealed").glob("*"))
+
+
+def test_a_record_is_refused_anywhere_inside_the_campaigns_folder_however_the_path_is_written(tmp_path):
+    folder = tmp_path / "blind" / "case0"
+    for path in (folder / "deep" / "case0.json", folder / ".." / "case0" / "case0.json"):
+        with pytest.raises(ValueError, match="must not lie"):
+            write_truth(path, {}, folder)
+    # A name that only begins alike is another folder.
+    assert write_truth(tmp_path / "blind" / "case00" / "case0.json", {}, folder)
+
+
+def test_equal_records_have_equal_hashes_whatever_the_order_of_their_keys(tmp_path):
+    one = write_truth(tmp_path / "a.json", {"seed": 1, "defects": []}, tmp_path / "blind")
+    other = write_truth(tmp_path / "b.json", {"defects": [], "seed": 1}, tmp_path / "blind")
+    assert one == other != write_truth(tmp_path / "c.json", {"defects": [], "seed": 2}, tmp_path / "blind")
+
+
+def test_the_last_poses_are_held_out_and_each_measuring_point_has_a_target(fanuc_specimen, small):
+    document = campaign_document("case0", fanuc_specimen.arm, small)
+    assert document["holdout"] == {"poses": [6, 7]}
+    assert list(document["targets"]) == ["2DoF", "3DoF", "4DoF", "6DoF"]
+    assert "noise" not in document
+    flange = campaign_document("case0", fanuc_specimen.arm, replace(small, points=("flange",)))
+    assert flange["targets"] == {"6DoF": {"point": "6DoF", "offset_m": [0, 0, 0]}}
+
+
+def test_only_a_compensated_arm_has_a_compensator_in_its_robot_file_and_gravity_is_the_structures(fanuc_specimen):
+    bare = {"name": "x", "masses": [1], "gravity_m_s2": [0, 0, 1], "payload_kg": 1, "compensator": {"joint": 3, "kind": "gas"}}
+    arm = replace(fanuc_specimen.arm, rated_kg=165.04)
+    document = robot_document(bare, arm, (), (0.0, -9.8, 0.0))
+    assert document["gravity_m_s2"] == [0.0, -9.8, 0.0] and document["payload_kg"] == 165.0
+    assert document["compensator"] == {"joint": 3, "kind": "gas"} and "masses" not in document
+    assert robot_document({"name": "x"}, arm, (), (0.0, 0.0, 0.0))["compensator"] == {"joint": 2, "kind": "spring"}
+    assert "compensator" not in robot_document(bare, replace(arm, compensated=False), (), (0.0, 0.0, 0.0))
+
+
+def test_the_sealed_record_has_the_specimens_own_compliances_and_noise(tmp_path, fanuc_specimen, small):
+    robot = replace(fanuc_specimen, tracker=Tracker(sigma_m=2e-5, sigma_m_per_m=5e-6, sigma_rad=3e-5))
+    record = made(tmp_path / "c", robot, small)
+    np.testing.assert_allclose(record["compliance_urad_per_Nm"], 1e6 * robot.compliance)
+    assert np.abs(np.array(record["compliance_urad_per_Nm"]) / [1.23, 0.37, 0.46, 2.68, 2.70, 2.72] - 1).min() > 1e-4
+    assert record["noise"] == {"sigma_m": 2e-5, "sigma_m_per_m": 5e-6, "sigma_rad": 3e-5}
+    assert record["measurements"] == len(read_campaign(tmp_path / "c", ROBOTS).measurements)

@@ -1,0 +1,28 @@
+"""Arms of the plant at random angles under random forces, and where they come to rest."""
+
+import numpy as np
+
+from elastocal.plant.multibody import machine_of
+from elastocal.plant.statics import Loading, equilibrium
+from elastocal.plant.structure import Structure
+
+STATES = 100
+
+
+def angles_and_wrenches(arm, force=1000.0, seed=0):
+    rng = np.random.default_rng(seed)
+    angles = rng.uniform(*arm.limits.T, (STATES, arm.joints))
+    push = rng.standard_normal((STATES, 3))
+    push *= force / np.linalg.norm(push, axis=1, keepdims=True)
+    return angles, np.hstack([push, np.cross([0.0, 0.5, 0.0], push)])
+
+
+def at_rest(arm, angles, wrench, structure=None, compliance=None):
+    compliance = arm.compliance if compliance is None else compliance
+    machine = machine_of(arm, structure or Structure(), compliance)
+    loading = Loading(angles, wrench, np.zeros((len(angles), arm.joints + 1)))
+    return machine, equilibrium(machine, loading, lambda torque, unloaded: compliance * torque)
+
+
+def loading_of(angles):
+    return Loading(angles, np.zeros((len(angles), 6)), np.zeros((len(angles), angles.shape[1] + 1)))
