@@ -1,0 +1,76 @@
+"""Blocks of the study's tables, made by its own steps from random experiments, and regressors by pinocchio to judge them by."""
+
+import numpy as np
+from support import PinocchioPoint, without_tool
+
+from elastocal.study.simulation import Loading
+from elastocal.study.steps.design import design_blocks
+from elastocal.study.steps.evaluate import evaluated, judge_from
+from elastocal.study.steps.identify import identified_blocks, paired_blocks
+from elastocal.study.steps.measure import measured_blocks
+from elastocal.study.steps.simulate import experiment_blocks, ideal_blocks
+from elastocal.study.steps.weights import weight_blocks
+
+PAPER = Loading(1000.0, (0.0, 0.5, 0.0), "base", "full_turn")
+OFFSET = (0.1, 0.05, 0.2)
+AT = ("end_effector", "measuring_point")
+CONFIGURATIONS_OF_THE_TEST = 30
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+def experiments_of(robot, sets=5, configurations=4, purpose="identification", key="kuka"):
+    return list(experiment_blocks(robot.chain, robot.joint_limits, key, 1, PAPER, purpose, sets, configurations))
+
+
+def as_read(blocks):
+    """Blocks as a table gives them back: the name of the point in every row."""
+    for block in blocks:
+        yield block | {"point": np.full(len(block["data_set"]), block["point"], dtype=object)}
+
+
+def deflections_of(robot, experiments, noise=0.0, at="end_effector", key="kuka"):
+    blocks = as_read(ideal_blocks(experiments, robot, at))
+    if noise:
+        blocks = as_read(measured_blocks(blocks, key, 1, noise))
+    found = {point.name: [] for point in robot.chain.points}
+    for block in blocks:
+        found[block["point"][0]].append(block)
+    return found
+
+
+def identified(robot, strategy, experiments, deflections, rows=6, at="end_effector", start=None):
+    needed = {name: deflections[name] for name in strategy.points}
+    designs = design_blocks(experiments, robot.chain, strategy, rows, at)
+    blocks = identified_blocks(paired_blocks(experiments, needed), designs, robot.chain, strategy, rows, at, start)
+    return joined(list(blocks))
+
+
+def joined(blocks):
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def compliances(table, length):
+    """(sets, 6) of one length."""
+    return np.column_stack([table[f"c{j}"] for j in range(1, 7)])[table["length"] == length]
+
+
+def judge(robot, at="end_effector"):
+    experiments = experiments_of(robot, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
+    return judge_from(robot, experiments[0], deflections_of(robot, experiments, at=at)[robot.chain.end_effector.name][0], at)
+
+
+def evaluated_in_one_block(table, scores, first_stage_joints, method, replicates, lengths):
+    sets = int(table["data_set"].max()) + 1
+    *counts, tests = weight_blocks("kuka", 1, sets, CONFIGURATIONS_OF_THE_TEST, replicates)
+    return evaluated([table], counts, tests, scores, first_stage_joints, method, "averaged_model", lengths)
+
+
+def pinocchio_regressors(chain, block, name, at="end_effector", rows=6):
+    """Columns J_j (J^T w)_j of equation 10 for each row of a block of experiments, ndarray (R, rows, n)."""
+    angles = np.column_stack([block[f"q{j + 1}"] for j in range(chain.coordinates)])
+    wrench = np.column_stack([block[component] for component in WRENCH])
+    loaded = without_tool(chain.end_effector) if at == "end_effector" else chain.point(name)
+    seen, pushed = (PinocchioPoint(chain, point) for point in (chain.point(name), loaded))
+    jacobian = np.array([seen.pose_and_jacobian(q)[2] for q in angles])
+    torques = np.array([pushed.pose_and_jacobian(q)[2].T @ force for q, force in zip(angles, wrench, strict=True)])
+    return (jacobian * torques[:, None])[:, :rows]

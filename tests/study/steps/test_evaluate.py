@@ -1,0 +1,111 @@
+"""Metrics, replicates and accuracy of one strategy from its identified compliances."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from made_study_blocks import (
+    CONFIGURATIONS_OF_THE_TEST,
+    OFFSET,
+    deflections_of,
+    evaluated_in_one_block,
+    experiments_of,
+    identified,
+    judge,
+)
+
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.steps.evaluate import evaluated
+from elastocal.study.steps.weights import weight_blocks
+
+
+def same_estimates(robot, factors, sets=12):
+    """The identified table of data sets that all give the same compliances: this factor of the nominal ones at each length."""
+    lengths = len(factors)
+    table = {"data_set": np.repeat(np.arange(sets), lengths), "length": np.tile(np.arange(1, lengths + 1), sets)}
+    return table | {f"c{j + 1}": np.tile(c * np.array(factors), sets) for j, c in enumerate(robot.compliance)}
+
+
+def test_evaluation_does_not_depend_on_blocks(kuka, strategies):
+    experiments = experiments_of(kuka, sets=12)
+    table = identified(kuka, strategies["3+6DoF-comb"], experiments, deflections_of(kuka, experiments, 5e-5))
+
+    counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
+
+    def cut(columns, rows, edges):
+        return [{n: columns[n][rows * a : rows * b] for n in columns if n != "members"} for a, b in pairwise(edges)]
+
+    scores = judge(kuka)
+    whole, parts = (
+        evaluated(cut(table, 4, c), cut(counts, 10, c), tests, scores, (0,), "stiffness", "averaged_model", [2, 4])
+        for c in ((0, 12), (0, 1, 7, 12))
+    )
+    for one, other in zip(whole, parts, strict=True):
+        assert set(one) == set(other)
+        for name in one:
+            np.testing.assert_allclose(other[name], one[name], rtol=1e-8, atol=1e-12, err_msg=name)
+
+
+def test_exact_estimates_of_a_target_off_the_flange_have_no_error(kuka):
+    moved = with_target_offset(kuka, OFFSET)
+    table = {"data_set": np.arange(12), "length": np.ones(12)}
+    table |= {f"c{j + 1}": np.full(12, c) for j, c in enumerate(kuka.compliance)}
+    found = evaluated_in_one_block(table, judge(moved), (0,), "compliance", 10, [1])
+    # Roots of rounding.
+    np.testing.assert_allclose(found[0]["deviation"], 0, atol=1e-9)
+
+
+def test_metrics_of_compliances_that_are_all_too_large_by_a_quarter(kuka):
+    metrics, replicates, accuracy = evaluated_in_one_block(
+        same_estimates(kuka, (2.0, 1.25)), judge(kuka), (0, 1), "stiffness", 10, [2]
+    )
+    # k / k0 - 1 = 1 / 1.25 - 1 = -20 % in each of six joints, of which two are of the first stage; twice as soft, -50 %.
+    assert metrics["length"].tolist() == [1, 2]
+    for joint in range(1, 7):
+        np.testing.assert_allclose(metrics[f"delta_k_{joint}"], [-50.0, -20.0], rtol=1e-12)
+        ratio = metrics[f"compliance_{joint}"] / kuka.compliance[joint - 1]
+        np.testing.assert_allclose(ratio, [2.0, 1.25], rtol=1e-12)
+        np.testing.assert_allclose(accuracy[f"relative_error_{joint}"], [25.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics["k_sigma"], [-300.0, -120.0], rtol=1e-12)
+    np.testing.assert_allclose(metrics["k_sigma_first_stage"], [-100.0, -40.0], rtol=1e-12)
+    # All data sets are alike: which of them a replicate draws makes no difference.
+    np.testing.assert_allclose(metrics["k_sigma_std_error"], 0.0, atol=1e-10)
+    assert metrics["trustworthy"].all() and not metrics["nonpositive_share"].any()
+    assert replicates["replicate"].tolist() == np.repeat(range(1, 11), 2).tolist()
+    np.testing.assert_allclose(replicates["k_sigma"], np.tile([-300.0, -120.0], 10), rtol=1e-12)
+
+
+def test_a_quarter_too_large_leaves_about_a_quarter_of_the_deflection_and_twice_as_large_all_of_it(kuka):
+    scores = judge(kuka)
+    metrics, _, accuracy = evaluated_in_one_block(same_estimates(kuka, (2.0, 1.25)), scores, (0,), "stiffness", 10, [1, 2])
+    # The deflection is linear in the compliances to second order in turns of some milliradians.
+    np.testing.assert_allclose(metrics["deviation"] / metrics["initial_deviation"], [1.0, 0.25], rtol=0.01)
+    np.testing.assert_allclose(accuracy["mean"], metrics["deviation"], rtol=1e-9)
+    np.testing.assert_allclose(accuracy["max"] / scores.initial_errors.max(), [1.0, 0.25], rtol=0.02)
+
+
+def test_accuracy_is_of_the_lengths_asked_for_and_of_no_others(kuka):
+    table = same_estimates(kuka, (2.0, 1.5, 1.25, 1.1))
+    accuracy = evaluated_in_one_block(table, judge(kuka), (0,), "compliance", 10, [4, 2])[2]
+    assert accuracy["length"].tolist() == [4, 2]
+    np.testing.assert_allclose(accuracy["relative_error_3"], [10.0, 50.0], rtol=1e-9)
+
+
+def test_one_compliance_that_is_not_positive_makes_a_length_untrustworthy(kuka):
+    table = same_estimates(kuka, (1.0, 1.0), sets=10)
+    table["c5"][4] *= -1.0
+    metrics = evaluated_in_one_block(table, judge(kuka), (0,), "stiffness", 10, [1])[0]
+    np.testing.assert_allclose(metrics["nonpositive_share"], [0.1, 0.0])
+    assert metrics["trustworthy"].tolist() == [False, True]
+
+
+def test_initial_errors_are_the_displacements_of_the_end_effector(kuka):
+    experiments = experiments_of(kuka, 1, CONFIGURATIONS_OF_THE_TEST, purpose="test")
+    block = deflections_of(kuka, experiments)["6DoF"][0]
+    np.testing.assert_allclose(judge(kuka).initial_errors, np.sqrt(block["dx"] ** 2 + block["dy"] ** 2 + block["dz"] ** 2))
+
+
+def test_weights_with_another_number_of_blocks_are_not_used(kuka):
+    *counts, tests = weight_blocks("kuka", 1, 12, CONFIGURATIONS_OF_THE_TEST, 10)
+    with pytest.raises(ValueError, match="zip"):
+        evaluated([], counts, tests, judge(kuka), (0,), "stiffness", "averaged_model", [1])

@@ -1,0 +1,109 @@
+"""Compliances of one strategy for every prefix of every data set."""
+
+import numpy as np
+import pytest
+from made_study_blocks import (
+    AT,
+    OFFSET,
+    compliances,
+    deflections_of,
+    experiments_of,
+    identified,
+    pinocchio_regressors,
+)
+
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.steps.columns import to_deflections
+from elastocal.study.steps.design import design_blocks
+from elastocal.study.steps.identify import identified_blocks, paired_blocks
+
+
+@pytest.mark.parametrize("at", AT)
+@pytest.mark.parametrize("name", ["3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF"])
+def test_exact_data_give_the_true_compliances(robot, strategies, name, at):
+    experiments = experiments_of(robot)
+    deflections = deflections_of(robot, experiments, at=at)
+    for start, relative in ((None, 0.05), (1e-6, 1e-8)):
+        table = identified(robot, strategies[name], experiments, deflections, at=at, start=start)
+        found = compliances(table, 4)
+        assert found.shape == (5, 6)
+        np.testing.assert_allclose(found, np.tile(robot.compliance, (5, 1)), rtol=relative)
+
+
+@pytest.mark.parametrize("at", AT)
+@pytest.mark.parametrize("rows", [3, 6])
+def test_exact_data_of_a_target_off_the_flange_give_the_true_compliances(kuka, strategies, rows, at):
+    # Interpretations R5 and R6 together: under "end_effector" the wrench stays where it is stated, whatever target is measured.
+    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka)
+    deflections = deflections_of(moved, experiments, at=at)
+    table = identified(moved, strategies["6DoF"], experiments, deflections, rows, at, start=1e-6)
+    np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["6DoF", "3+6DoF-comb", "4-6DoF-after-3DoF", "5-6DoF-after-4DoF"])
+def test_gauss_newton_gets_through_positions_that_are_too_few_to_tell_the_wrist_apart(kuka, strategies, name):
+    # One position of the end-effector has measurements enough for joints 4-6, but they meet in one point.
+    loads, moved = experiments_of(kuka), with_target_offset(kuka, OFFSET)
+    deflections = deflections_of(moved, loads, at="measuring_point")
+    table = identified(moved, strategies[name], loads, deflections, 3, "measuring_point", start=1e-6)
+    np.testing.assert_allclose(compliances(table, 4), np.tile(kuka.compliance, (5, 1)), rtol=1e-6)
+
+
+def test_identified_table_names_the_right_set_length_and_joint_pair(kuka, strategies):
+    experiments = experiments_of(kuka)
+    table = identified(kuka, strategies["6DoF"], experiments, deflections_of(kuka, experiments, 2e-4))
+    assert table["data_set"].tolist() == np.repeat(range(5), 4).tolist()
+    assert table["length"].tolist() == [1, 2, 3, 4] * 5
+
+
+@pytest.mark.parametrize("rows", [3, 6])
+def test_estimates_of_every_prefix_are_numpy_least_squares_of_its_measurements(kuka, strategies, rows):
+    moved, experiments = with_target_offset(kuka, OFFSET), experiments_of(kuka, sets=3)
+    deflections = deflections_of(moved, experiments, noise=2e-4)
+    table = identified(moved, strategies["3+6DoF-comb"], experiments, deflections, rows)
+    regressors = {name: pinocchio_regressors(moved.chain, experiments[0], name, rows=rows) for name in ("3DoF", "6DoF")}
+    matrices = {name: matrix.reshape(3, 4, rows, 6) for name, matrix in regressors.items()}
+    measured = {name: to_deflections(deflections[name][0])[..., :rows] for name in matrices}
+    for length in (3, 4):
+        for number, found in enumerate(compliances(table, length)):
+            matrix = np.concatenate([matrices[name][number, :length].reshape(-1, 6) for name in matrices])
+            seen = np.concatenate([measured[name][number, :length].ravel() for name in matrices])
+            np.testing.assert_allclose(found, np.linalg.lstsq(matrix, seen, rcond=None)[0], rtol=1e-7)
+
+
+@pytest.mark.parametrize("start", [None, 1e-6])
+def test_nothing_is_identified_where_the_design_is_empty_and_everything_elsewhere(kuka, strategies, start):
+    experiments = experiments_of(kuka, sets=2)
+    deflections = deflections_of(kuka, experiments)
+    (design,) = design_blocks(experiments, kuka.chain, strategies["6DoF"], 6, "end_effector")
+    empty = np.array([True, False, False, False, True, False, True, False])
+    design["condition"] = np.where(empty, np.nan, design["condition"])
+    blocks = paired_blocks(experiments, {"6DoF": deflections["6DoF"]})
+    (table,) = identified_blocks(blocks, [design], kuka.chain, strategies["6DoF"], 6, "end_effector", start)
+    for joint in range(1, 7):
+        np.testing.assert_array_equal(np.isnan(table[f"c{joint}"]), empty)
+
+
+def test_the_deflections_of_each_point_stand_beside_the_experiments_of_their_block():
+    experiments = [{"data_set": np.array([n])} for n in (0, 1)]
+    deflections = {name: [{"dx": np.array([10.0 * n + k])} for n in (0, 1)] for k, name in enumerate(("A", "B"))}
+    found = list(paired_blocks(experiments, deflections))
+    assert [block["data_set"][0] for block, _ in found] == [0, 1]
+    assert [{name: part["dx"][0] for name, part in seen.items()} for _, seen in found] == [
+        {"A": 0.0, "B": 1.0},
+        {"A": 10.0, "B": 11.0},
+    ]
+
+
+def test_tables_with_another_number_of_blocks_are_not_paired():
+    one, two = [{}], [{}, {}]
+    for experiments, seen in ((one, {"A": two}), (two, {"A": two, "B": one})):
+        with pytest.raises(ValueError, match="zip"):
+            list(paired_blocks(experiments, seen))
+
+
+def test_designs_with_another_number_of_blocks_are_not_used(kuka, strategies):
+    experiments = experiments_of(kuka, sets=1)
+    blocks = paired_blocks(experiments, {"6DoF": deflections_of(kuka, experiments)["6DoF"]})
+    with pytest.raises(ValueError, match="zip"):
+        list(identified_blocks(blocks, [], kuka.chain, strategies["6DoF"], 6, "end_effector"))

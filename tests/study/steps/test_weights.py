@@ -1,0 +1,54 @@
+"""The weights table: how often each data set and each test configuration counts in each bootstrap replicate."""
+
+import numpy as np
+import pytest
+
+from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
+from elastocal.study.steps import weights
+from elastocal.study.steps.weights import DATA_SETS, TESTS, to_weights, weight_blocks
+
+
+def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
+    for size in (500, 5, 2):
+        monkeypatch.setattr(weights, "SETS_PER_BLOCK", size)
+        *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
+        assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
+        np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
+        np.testing.assert_array_equal(to_weights(tests), bootstrap_test_weights(1, "kuka", 7, 4))
+
+
+def test_the_weights_table_names_the_right_member_and_replicate():
+    (sets, tests) = weight_blocks("kuka", 1, 5, 7, 4)
+    for block, drawn in ((sets, bootstrap_weights(1, "kuka", range(5), 4)), (tests, bootstrap_test_weights(1, "kuka", 7, 4))):
+        np.testing.assert_array_equal(block["count"], drawn[block["replicate"], block["number"]])
+
+
+def test_weights_of_a_table_written_by_hand():
+    columns = {
+        "number": np.array([4, 4, 4, 5, 5, 5]),
+        "replicate": np.array([1, 2, 3, 1, 2, 3]),
+        "count": np.array([0, 2, 1, 3, 0, 1]),
+    }
+    # Replicate 0 has every member once, the others their counts.
+    assert to_weights(columns).tolist() == [[1, 1], [0, 3], [2, 0], [1, 1]]
+
+
+@pytest.mark.parametrize("size", [500, 3])
+def test_every_member_has_a_row_in_every_replicate(monkeypatch, size):
+    monkeypatch.setattr(weights, "SETS_PER_BLOCK", size)
+    blocks = list(weight_blocks("kuka", 1, 7, 4, 2))
+    sets, tests = ([block for block in blocks if block["members"] == members] for members in (DATA_SETS, TESTS))
+    for found, count in ((sets, 7), (tests, 4)):
+        assert np.concatenate([block["number"] for block in found]).tolist() == np.repeat(range(count), 2).tolist()
+        assert np.concatenate([block["replicate"] for block in found]).tolist() == [1, 2] * count
+
+
+def test_data_sets_count_once_on_average_and_independently_of_the_tests():
+    sets, tests = (to_weights(block)[1:] for block in weight_blocks("kuka", 1, 400, 400, 50))
+    # 20 000 Poisson counts of mean and variance one: five standard errors, a level of 1e-6 for each of two means and variances;
+    # a mean or variance off by 8 % is seen with power above 0.99.
+    for counts in (sets, tests):
+        assert abs(counts.mean() - 1) < 5 / np.sqrt(counts.size)
+        assert abs(counts.var() - 1) < 5 * np.sqrt(3 / counts.size)
+    # Uncorrelated: at a level of 1e-6.
+    assert abs(np.corrcoef(sets.ravel(), tests.ravel())[0, 1]) < 5 / np.sqrt(sets.size)
