@@ -1,10 +1,10 @@
-"""Tables and the comparison with the paper, against hand calculations."""
+"""Tables, against hand calculations."""
 
 import numpy as np
 import pandas as pd
 import pytest
+from made_study_tables import metrics_of, replicates_of
 
-from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.tables import (
     deviation_ratio,
     per_dataset_table,
@@ -15,25 +15,6 @@ from elastocal.study.tables import (
     with_errors_merged,
     worded,
 )
-
-LENGTHS = np.arange(1, 101)
-
-
-def metrics_of(strategy, bias=100.0, robot="arm"):
-    """Metrics whose k_sigma and deviation fall as bias / length: percent and µm."""
-    frame = pd.DataFrame({"robot": robot, "noise_um": 200.0, "strategy": strategy, "length": LENGTHS})
-    for name, scale in (("k_sigma", 1.0), ("k_sigma_first_stage", 0.5), ("deviation", 1e-6)):
-        frame[name], frame[f"{name}_std_error"] = scale * bias / LENGTHS, scale
-    frame["initial_deviation"], frame["initial_deviation_std_error"] = 1e-3, 1e-5
-    return frame
-
-
-def replicates_of(strategy, bias=100.0, robot="arm", spread=(-0.1, 0.0, 0.1)):
-    parts = []
-    for number, relative in enumerate(spread, 1):
-        frame = metrics_of(strategy, bias * (1 + relative), robot)
-        parts.append(frame.assign(replicate=number))
-    return pd.concat(parts, ignore_index=True)
 
 
 def test_lengths_of_table4_are_those_at_which_a_bias_that_falls_as_one_over_the_length_meets_the_limits():
@@ -129,40 +110,3 @@ def test_solver_summary_pairs_the_strategies_that_are_the_same_estimator():
 )
 def test_values_are_worded_with_two_digits_of_their_error(value, error, text):
     assert worded(value, error) == text
-
-
-def ours(metrics, replicates):
-    columns = {"robot": ["arm"], "mean_mm": [1.0], "mean_mm_std_error": [0.1]}
-    staged = table4(metrics, replicates, ["arm"], ["A"], 200.0, 20, 1.0, 2.0)
-    empty = pd.DataFrame({"strategy": [], "residual_mean_um": [], "share_compensated_percent": []})
-    tables = {
-        "table1": pd.DataFrame({"robot": ["arm"], "c1": [0.54]}),
-        "table2": pd.DataFrame(columns),
-        "table3": pd.DataFrame({"robot": ["arm"], "c1": [0.53], "c1_std_error": [0.01]}),
-        "table4": staged,
-        "extended": empty,
-    }
-    return OurResults(tables, metrics, replicates, 200.0, 20)
-
-
-def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference():
-    reference = pd.DataFrame(
-        [
-            ("1", "arm", "", "c1", "um_per_N", 0.54),
-            ("2", "arm", "", "deviation_mean", "mm", 0.8),
-            ("3", "arm", "6DoF", "c1", "um_per_N", 0.54),
-            ("4", "arm", "A", "k_sigma_20", "percent", 1.5),
-            ("4", "arm", "A", "dev_20", "um", 1.0),
-            ("4", "other", "A", "dev_20", "um", 1.0),
-            ("text", "arm", "", "residual_deviation_upper_bound", "um", 366.0),
-        ],
-        columns=["table", "robot", "strategy", "quantity", "unit", "value"],
-    )
-    table = comparison_table(reference, ours(metrics_of("A", 40.0), replicates_of("A", 40.0)))
-    assert (
-        table[["table", "robot", "strategy", "quantity", "unit", "paper"]].to_numpy().tolist() == reference.to_numpy().tolist()
-    )
-    assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
-    assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
-    assert table.interpretation[3] == "R7, R10: joints of the first stage"
-    assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()

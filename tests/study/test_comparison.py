@@ -1,0 +1,142 @@
+"""The paper's printed figures beside ours, against hand calculations."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_study_tables import metrics_of, replicates_of
+
+from elastocal.study.comparison import OurResults, comparison_table
+from elastocal.study.tables import table4
+
+PRINTED = ["table", "robot", "strategy", "quantity", "unit", "value"]
+
+
+def ours(metrics, replicates):
+    columns = {"robot": ["arm"], "mean_mm": [1.0], "mean_mm_std_error": [0.1]}
+    staged = table4(metrics, replicates, ["arm"], ["A"], 200.0, 20, 1.0, 2.0)
+    empty = pd.DataFrame({"strategy": [], "residual_mean_um": [], "share_compensated_percent": []})
+    tables = {
+        "table1": pd.DataFrame({"robot": ["arm"], "c1": [0.54]}),
+        "table2": pd.DataFrame(columns),
+        "table3": pd.DataFrame({"robot": ["arm"], "c1": [0.53], "c1_std_error": [0.01]}),
+        "table4": staged,
+        "extended": empty,
+    }
+    return OurResults(tables, metrics, replicates, 200.0, 20)
+
+
+def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference():
+    reference = pd.DataFrame(
+        [
+            ("1", "arm", "", "c1", "um_per_N", 0.54),
+            ("2", "arm", "", "deviation_mean", "mm", 0.8),
+            ("3", "arm", "6DoF", "c1", "um_per_N", 0.54),
+            ("4", "arm", "A", "k_sigma_20", "percent", 1.5),
+            ("4", "arm", "A", "dev_20", "um", 1.0),
+            ("4", "other", "A", "dev_20", "um", 1.0),
+            ("text", "arm", "", "residual_deviation_upper_bound", "um", 366.0),
+        ],
+        columns=["table", "robot", "strategy", "quantity", "unit", "value"],
+    )
+    table = comparison_table(reference, ours(metrics_of("A", 40.0), replicates_of("A", 40.0)))
+    assert (
+        table[["table", "robot", "strategy", "quantity", "unit", "paper"]].to_numpy().tolist() == reference.to_numpy().tolist()
+    )
+    assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
+    assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
+    assert table.interpretation[3] == "R7, R10: joints of the first stage"
+    assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
+
+
+def compared(results, *printed):
+    return comparison_table(pd.DataFrame([printed], columns=PRINTED), results).iloc[0]
+
+
+@pytest.fixture
+def results():
+    return ours(metrics_of("A", 40.0), replicates_of("A", 40.0))
+
+
+def with_extended(results):
+    extended = {
+        "strategy": ["3+6DoF comb", "6DoF", "6DoF after 3DoF"],
+        "residual_mean_um": [310.0, 350.0, 290.0],
+        "residual_mean_um_std_error": [1.0, 4.0, 2.0],
+        "share_compensated_percent": [91.0, 90.0, 92.0],
+        "share_compensated_percent_std_error": [0.1, 0.5, 0.2],
+    }
+    return replace(results, tables=results.tables | {"extended": pd.DataFrame(extended)})
+
+
+def test_an_input_of_the_study_is_shown_and_not_scored(results):
+    row = compared(results, "1", "arm", "", "c1", "um_per_N", 0.6)
+    assert (row.paper, row.ours, row.interpretation) == (0.6, 0.54, "R1: an input")
+    assert np.isnan(row.z)
+
+
+@pytest.mark.parametrize(
+    ("robot", "quantity", "words"),
+    [
+        ("kuka_extended", "deviation_mean", "R11: the tube was chosen for it"),
+        ("kuka_extended", "deviation_std", "R3"),
+        ("kuka", "deviation_mean", "R3"),
+    ],
+)
+def test_only_the_figure_that_the_tube_was_chosen_for_says_so(results, robot, quantity, words):
+    columns = {"robot": [robot], "mean_mm": [1.0], "mean_mm_std_error": [0.1], "std_mm": [0.5], "std_mm_std_error": [0.2]}
+    results = replace(results, tables=results.tables | {"table2": pd.DataFrame(columns)})
+    row = compared(results, "2", robot, "", quantity, "mm", 0.7)
+    assert row.interpretation == words
+    assert row.z == pytest.approx(3.0 if quantity == "deviation_mean" else -1.0)
+
+
+def test_k_sigma_of_a_strategy_without_a_first_stage_is_that_of_all_joints(results):
+    table = results.tables["table4"].copy()
+    for suffix in ("", "_std_error"):
+        table[f"k_sigma_20_percent_first_stage{suffix}"] = table[f"k_sigma_20_percent{suffix}"]
+    row = compared(replace(results, tables=results.tables | {"table4": table}), "4", "arm", "A", "k_sigma_20", "percent", 1.0)
+    assert (row.ours, row.interpretation) == (pytest.approx(2.0), "R7")
+
+
+def test_the_bound_of_the_residual_stands_beside_the_largest_of_all_strategies(results):
+    row = compared(with_extended(results), "text", "", "", "residual_deviation_upper_bound", "um", 366.0)
+    assert (row.ours, row.mc_std, row.z) == (350.0, 4.0, -4.0)
+
+
+def test_the_share_with_elastic_links_is_that_of_the_whole_pose(results):
+    row = compared(with_extended(results), "text", "", "", "share_compensated_with_link_elasticity", "percent", 91.0)
+    assert (row.ours, row.mc_std, row.z, row.interpretation) == (90.0, 0.5, -2.0, "R11, strategy 6DoF")
+
+
+def test_the_share_with_elastic_joints_alone_is_one_less_what_is_left_of_the_deflection(results):
+    results = replace(
+        results, metrics=metrics_of("6DoF", 400.0, "kuka"), replicates=replicates_of("6DoF", 400.0, "kuka", (-0.1, 0.0, 0.1))
+    )
+    row = compared(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
+    # 400 / 20 = 20 um of 1 mm; replicates of 18, 20 and 22 um.
+    assert (row.ours, row.mc_std, row.z) == (pytest.approx(98.0), pytest.approx(0.2), pytest.approx(2.0))
+
+
+def test_the_smallest_ratio_is_of_the_robot_that_gains_least_from_its_best_strategy(results):
+    biases = {("arm", "6DoF"): 40.0, ("arm", "A"): 20.0, ("arm", "B"): 30.0}
+    biases |= {("other", "6DoF"): 40.0, ("other", "A"): 36.0, ("other", "B"): 25.0}
+    metrics = pd.concat([metrics_of(strategy, bias, robot) for (robot, strategy), bias in biases.items()])
+    spreads = {name: (0.1, 0.0, -0.1) if name[1] == "B" else (-0.1, 0.0, 0.1) for name in biases}
+    replicates = pd.concat(
+        [replicates_of(strategy, bias, robot, spreads[robot, strategy]) for (robot, strategy), bias in biases.items()]
+    )
+    table = table4(metrics, replicates, ["arm", "other"], ["6DoF", "A", "B"], 200.0, 20, 1.0, 2.0)
+    results = OurResults(results.tables | {"table4": table}, metrics, replicates, 200.0, 20)
+    row = compared(results, "text", "", "", "best_over_6DoF_dev_ratio_min", "", 1.5)
+    # 40 / 20 for the arm by A, 40 / 25 for the other one by B.
+    assert row.ours == pytest.approx(1.6)
+    assert row.mc_std == pytest.approx(np.std([1.6 * 0.9 / 1.1, 1.6, 1.6 * 1.1 / 0.9], ddof=1))
+
+
+def test_a_robot_that_was_not_studied_has_an_empty_row_and_no_score(results):
+    row = compared(results, "3", "nobody", "6DoF", "c1", "um_per_N", 0.5)
+    assert row.paper == 0.5 and np.isnan([row.ours, row.mc_std, row.z]).all()
+    share = compared(results, "text", "", "", "share_compensated_joint_elasticity_only", "percent", 97.6)
+    assert np.isnan([share.ours, share.z]).all()
