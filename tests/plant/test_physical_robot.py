@@ -3,10 +3,16 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from elastocal.plant.campaigns import schedule_of
-from elastocal.plant.physical_robot import Warmth, seen_poses
-from elastocal.plant.tracker import rotation_vector
+from elastocal.plant.drives import WrongRatio, ZeroOffset
+from elastocal.plant.gears import Asymmetric
+from elastocal.plant.load_cell import LoadCell
+from elastocal.plant.multibody import machine_of
+from elastocal.plant.physical_robot import Warmth, at_rest, driven, seen_poses, specimen
+from elastocal.plant.tracker import EccentricNest, rotation_vector
+from elastocal.plant.weights import declared_masses, on_stretches
 
 
 def test_castings_warm_up_behind_the_thermometer_and_reach_it():
@@ -28,3 +34,102 @@ def test_links_grow_in_proportion_to_their_castings_warmth(weightless, small):
     share = 1e-5 * (weightless.warmth.of_castings(schedule.time_s) - 20.0)
     np.testing.assert_allclose(grown[0][unloaded], (nominal[0] * (1 + share)[:, None, None])[unloaded], atol=1e-12)
     assert np.abs(rotation_vector(grown[1] @ np.swapaxes(nominal[1], -1, -2))[unloaded]).max() < 1e-12
+
+
+def test_gears_of_a_series_differ_by_no_more_than_their_spread_and_each_by_its_own(fanuc_arm):
+    shares = np.array([specimen(fanuc_arm, seed, 0.1, weighs=False).compliance for seed in range(200)]) / fanuc_arm.compliance
+    assert (np.abs(shares - 1.0) <= 0.1).all()
+    # Even over the spread: 200 draws miss an end by a tenth of the range in one of 1e9 cases, a mean by four standard errors.
+    assert (np.ptp(shares, axis=0) > 0.18).all()
+    np.testing.assert_allclose(shares.mean(axis=0), 1.0, atol=4 * 0.1 / np.sqrt(3 * 200))
+    assert np.abs(np.corrcoef(shares.T) - np.eye(6)).max() < 4 / np.sqrt(200)
+
+
+def test_a_specimen_follows_from_its_seed_and_its_weights_change_no_gear(fanuc_arm):
+    heavy, light, off = (specimen(fanuc_arm, 7, **more) for more in ({}, {"weighs": False}, {"off_line_m": 0.03}))
+    np.testing.assert_array_equal(heavy.compliance, light.compliance)
+    np.testing.assert_array_equal(heavy.compliance, off.compliance)
+    assert heavy.structure == specimen(fanuc_arm, 7).structure != specimen(fanuc_arm, 8).structure
+    assert light.structure.masses == ()
+    assert [mass.mass_kg for mass in heavy.structure.masses] == [mass.mass_kg for mass in off.structure.masses]
+    assert [mass.aside_m for mass in heavy.structure.masses] != [mass.aside_m for mass in off.structure.masses]
+
+
+def test_weights_of_a_specimen_lie_about_the_declared_ones_within_three_deviations(fanuc_arm):
+    declared = on_stretches(declared_masses(fanuc_arm), fanuc_arm)
+    for seed in range(20):
+        shares = [m.mass_kg / d.mass_kg for m, d in zip(specimen(fanuc_arm, seed).structure.masses, declared, strict=True)]
+        assert 0.7 <= min(shares) < 1.0 < max(shares) <= 1.3
+
+
+def test_the_shown_moment_is_that_of_the_force_at_its_lever(schedule):
+    one = replace(schedule, force=np.array([[0.0, 0.0, -10.0]]), lever=np.array([[0.5, 0.2, 0.0]]))
+    np.testing.assert_allclose(one.shown_wrench, [[0.0, 0.0, -10.0, -2.0, 5.0, 0.0]])
+
+
+def test_errors_of_all_drives_add_to_the_commanded_angles(weightless, schedule):
+    robot = replace(weightless, drives=(ZeroOffset(1, 2e-4), ZeroOffset(1, 3e-4), WrongRatio(3, 0, 1e-3)))
+    drive, growth, warm, offsets = driven(robot, schedule, machine_of(robot.arm, robot.structure))
+    error = drive - schedule.angle
+    np.testing.assert_allclose(error[:, 1], 5e-4, atol=1e-15)
+    np.testing.assert_allclose(error[:, 3], 1e-3 * schedule.angle[:, 0], atol=1e-15)
+    assert not np.delete(error, [1, 3], axis=1).any() and not growth.any() and not offsets
+    np.testing.assert_allclose(warm, robot.warmth.of_castings(schedule.time_s))
+
+
+def test_expansion_changes_evenly_from_the_column_to_the_flange(weightless, schedule):
+    robot = replace(weightless, expansion_per_K=1e-5, gradient_per_K=(2e-6, -4e-6), warmth=Warmth(10.0, 1.0, 0.5))
+    late = replace(schedule, time_s=schedule.time_s + 1e6)
+    growth = driven(robot, late, machine_of(robot.arm, robot.structure))[1]
+    np.testing.assert_allclose(growth, np.tile(10 * np.linspace(1.2e-5, 0.6e-5, 7), (len(late.pose), 1)), rtol=1e-9)
+
+
+def test_offsets_of_one_spring_add_up_and_keep_their_place(weightless, schedule):
+    structure = replace(weightless.structure, base=(0.0, 0.0, 1e-12, 0.0, 0.0, 0.0))
+    laws = tuple(("base_z", lambda visits, size=size: size * visits.pose) for size in (1e-5, 2e-5))
+    robot = replace(weightless, structure=structure, offsets=laws)
+    machine = machine_of(robot.arm, structure)
+    offsets = driven(robot, schedule, machine)[3]
+    assert list(offsets) == [machine.springs["base_z"]]
+    lifted = seen_poses(robot, schedule)[0] - seen_poses(replace(robot, offsets=()), schedule)[0]
+    np.testing.assert_allclose(lifted, (3e-5 * schedule.pose)[:, None, None] * [[[0.0, 0.0, 1.0]] * 4], atol=1e-12)
+
+
+def test_gears_come_to_rest_by_their_linear_springs_and_their_other_laws_together(fanuc_specimen, schedule):
+    machine, rest = at_rest(replace(fanuc_specimen, gears=(Asymmetric(1, 1e-11),)), schedule)
+    torque = rest.torque[:, machine.gear]
+    wanted = fanuc_specimen.compliance * torque
+    wanted[:, 1] += 1e-11 * torque[:, 1] ** 2
+    np.testing.assert_allclose(rest.coordinates[:, machine.gear], wanted, atol=1e-13)
+    assert np.abs(1e-11 * torque[:, 1] ** 2).max() > 1e-6
+
+
+def test_a_cells_bias_fixed_in_the_flange_pulls_along_the_axes_of_the_unloaded_flange(weightless, schedule):
+    bias, loaded = np.array([4.0, -3.0, 2.0]), schedule.force.any(axis=1)
+    robot = replace(weightless, cell=LoadCell(bias_N=tuple(bias), in_flange=("bias",)))
+    unloaded = replace(schedule, force=0.0 * schedule.force)
+    facing = seen_poses(weightless, unloaded)[1][:, -1]
+    # The display shows so much that the flange feels as much less.
+    less = replace(schedule, force=schedule.force - loaded[:, None] * (facing @ bias))
+    found, wanted = (seen_poses(one, done)[0] for one, done in ((robot, schedule), (weightless, less)))
+    np.testing.assert_allclose(found, wanted, atol=1e-12)
+    assert np.abs(found - seen_poses(weightless, schedule)[0]).max() > 1e-6
+
+
+def test_a_nest_off_centre_moves_the_flanges_target_alone(fanuc_specimen, schedule):
+    moved = seen_poses(replace(fanuc_specimen, nest=EccentricNest(5e-5)), schedule)[0] - seen_poses(fanuc_specimen, schedule)[0]
+    assert not moved[:, :-1].any()
+    np.testing.assert_allclose(np.linalg.norm(moved[:, -1], axis=1), 5e-5, rtol=1e-9)
+
+
+def test_an_equilibrium_to_begin_with_changes_no_pose(fanuc_specimen, schedule):
+    softer = replace(fanuc_specimen, compliance=1.01 * fanuc_specimen.compliance)
+    start = at_rest(fanuc_specimen, schedule)[1]
+    for found, wanted in zip(seen_poses(softer, schedule, start), seen_poses(softer, schedule), strict=True):
+        np.testing.assert_allclose(found, wanted, atol=1e-12)
+
+
+@pytest.mark.parametrize("rise", [-5.0, 0.0, 12.0])
+def test_the_thermometer_rises_from_twenty_degrees_with_its_own_time_constant(rise):
+    warmth = Warmth(rise, 1000.0, 100.0)
+    np.testing.assert_allclose(warmth.shown(np.array([0.0, 1000.0, 1e6])), 20 + rise * np.array([0.0, 1 - np.exp(-1), 1.0]))

@@ -7,6 +7,7 @@ import pytest
 
 from elastocal.plant.defects import KINDS, Defect, drawn_defect, with_defects
 from elastocal.plant.sizing import Yardstick, size_for
+from elastocal.plant.tracker import Move
 from elastocal.plant.weights import declared_masses, on_stretches
 
 
@@ -74,3 +75,82 @@ def test_a_defect_that_these_poses_do_not_show_adds_no_direction_to_the_angle(ya
     )
     assert yardstick.angle_deg(wave, [fanuc_specimen]) == 90.0
     assert yardstick.angle_deg(wave, [fanuc_specimen, runout]) == yardstick.angle_deg(wave, [runout]) < 90.0
+
+
+def shifted(robot, *shift, turn=(0.0, 0.0, 0.0)):
+    """All that the tracker reads is moved as one body."""
+    return replace(robot, tracker=replace(robot.tracker, move=Move(-1.0, shift, turn)))
+
+
+def test_a_shift_of_all_measurements_has_its_length_and_the_non_centrality_of_its_count(weightless, schedule):
+    signal = Yardstick(weightless, schedule).signal(shifted(weightless, 3e-5, 0.0, -4e-5))
+    assert (signal.rms_m, signal.rms_rad) == (pytest.approx(5e-5), pytest.approx(0.0, abs=1e-12))
+    # Four targets in each state that is not held out; sigma is 60 um.
+    assert signal.raw == pytest.approx(4 * schedule.training.sum() * (5 / 6) ** 2)
+
+
+def test_measurements_that_are_not_read_or_held_out_do_not_count(weightless, schedule):
+    bad = shifted(weightless, 6e-5, 0.0, 0.0, turn=(0.0, 0.0, 6e-5))
+    one = Yardstick(weightless, schedule, targets=[3], orientation=False)
+    assert one.change(bad).shape == (len(schedule.pose), 1, 3)
+    both = Yardstick(weightless, schedule, targets=[3])
+    assert both.signal(bad).raw - one.signal(bad).raw == pytest.approx(schedule.training.sum())
+    none_held_out = Yardstick(weightless, replace(schedule, training=schedule.training | True), targets=[3])
+    extra = np.sum(none_held_out.change(bad)[~schedule.training] ** 2)
+    assert none_held_out.signal(bad).raw - both.signal(bad).raw == pytest.approx(extra) != 0
+
+
+def test_a_tracker_farther_away_makes_the_same_shift_weigh_less(weightless, schedule):
+    tracker = replace(weightless.tracker, sigma_m=0.0, sigma_m_per_m=1e-5)
+    robot = replace(weightless, tracker=tracker)
+    yardstick = Yardstick(robot, schedule, targets=[0], orientation=False)
+    change = yardstick.change(shifted(robot, 1e-4, 0.0, 0.0))[:, 0, 0]
+    distance = np.linalg.norm(yardstick.poses[0][:, 0] - np.array(tracker.stand_m), axis=-1)
+    np.testing.assert_allclose(change, 10.0 / distance)
+
+
+def test_a_free_frame_absorbs_any_motion_as_one_body_and_a_known_one_does_not(weightless, schedule):
+    bad = shifted(weightless, 1e-4, -2e-4, 5e-5, turn=(2e-5, 1e-5, -3e-5))
+    free, known = (Yardstick(weightless, schedule, free_frame=free).signal(bad) for free in (True, False))
+    assert free.raw == pytest.approx(known.raw)
+    # To second order of a turn of 40 urad at some metres.
+    assert free.retained < 1e-6 * free.raw
+    assert known.retained > 0.5 * known.raw
+
+
+def test_softer_gears_are_absorbed_to_second_order(fanuc_specimen, schedule):
+    softer = replace(fanuc_specimen, compliance=fanuc_specimen.compliance * [1.01, 0.99, 1.02, 1.0, 1.01, 0.98])
+    signal = Yardstick(fanuc_specimen, schedule).signal(softer)
+    assert signal.raw > 1.0 and signal.retained < 1e-4 * signal.raw
+
+
+def test_what_is_left_has_the_length_of_the_retained_signal(yardstick, fanuc_specimen):
+    bad = with_defects(fanuc_specimen, [Defect("lost_motion", (2,), 1e-4, 1)])
+    assert np.linalg.norm(yardstick.left(bad)) ** 2 == pytest.approx(yardstick.signal(bad).retained)
+
+
+def test_a_defect_is_at_no_angle_to_itself_and_within_the_span_of_two(yardstick, fanuc_specimen):
+    first, second = (Defect("joint_offset", (joint,), 1e-5, 1) for joint in (1, 2))
+    one, other, both, twice = (
+        with_defects(fanuc_specimen, defects) for defects in ([first], [second], [first, second], [replace(first, size=2e-5)])
+    )
+    assert yardstick.angle_deg(one, [twice]) < 0.1
+    assert yardstick.angle_deg(both, [one, other]) < 0.1
+    a, b = (yardstick.left(robot) / np.linalg.norm(yardstick.left(robot)) for robot in (both, one))
+    alone = yardstick.angle_deg(both, [one])
+    assert alone > 1.0 and np.cos(np.radians(alone)) == pytest.approx(abs(a @ b))
+
+
+def test_no_size_beyond_the_largest_is_tried(weightless, schedule):
+    yardstick, tried = Yardstick(weightless, schedule), []
+
+    def robot_of_size(size):
+        tried.append(size)
+        return shifted(weightless, size, 0.0, 0.0)
+
+    with pytest.raises(ValueError, match=r"^no size found for a raw non-centrality of 1e\+06: .* raw at 0\.0001$"):
+        size_for(yardstick, robot_of_size, 1e-5, 1e6, "raw", 1e-4)
+    assert max(tried) == 1e-4
+    # (size / sigma)^2 of each target in each state that is not held out.
+    size = size_for(yardstick, robot_of_size, 1e-5, 400.0, "raw")[0]
+    assert size == pytest.approx(6e-5 * np.sqrt(400.0 / 4 / schedule.training.sum()), rel=6e-3)

@@ -1,15 +1,27 @@
 """What links weigh: as declared, by rule, as drawn, and the torques that follow."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
+from analysed_robots import ROBOTS
 from arms_at_rest import STATES, angles_and_wrenches
 
-from elastocal.plant.arm import link_frames
+from elastocal.plant.arm import LinkMass, arm_from_document, arm_from_file, link_frames
 from elastocal.plant.multibody import machine_of
 from elastocal.plant.random_numbers import stream
-from elastocal.plant.structure import Structure
-from elastocal.plant.weights import declared_masses, gravity_torque, on_stretches, true_masses
+from elastocal.plant.structure import Mass, Structure
+from elastocal.plant.weights import (
+    allowed_centre_std_m,
+    centre_std_m,
+    declared_masses,
+    gravity_torque,
+    off_the_line,
+    on_stretches,
+    true_masses,
+    usual_gravity_torque,
+)
 
 
 @pytest.mark.parametrize("gravity", [(0.0, 0.0, -9.80665), (3.0, -9.0, 2.0)])
@@ -42,3 +54,103 @@ def test_declared_centres_stand_in_the_frame_that_turns_with_their_joint(arm):
         for mass in declared:
             wanted = origin[state, mass.link] + rotation[state, mass.link] @ mass.centre_m
             np.testing.assert_allclose(data.xipos[machine.links[mass.link]], wanted, atol=1e-9)
+
+
+def arm_of(chain="Tz(0.4) Ry(q1) Tx(2) Ry(q2) [elbow] Tx(1) [hand]", joints=2, **more):
+    compliance, limits = [1.0] * joints, [[-180, 180]] * joints
+    document = {"name": "t", "chain": chain, "compliance_urad_per_Nm": compliance, "joint_limits_deg": limits}
+    return arm_from_document(document | more)
+
+
+def test_weights_of_the_file_are_taken_as_they_stand():
+    entries = [{"link": 1, "mass_kg": 12, "centre_m": [0.5, 0, 0], "relative_std": 0.03}]
+    assert declared_masses(arm_of(masses=entries)) == (LinkMass(1, 12.0, (0.5, 0.0, 0.0), 0.03),)
+
+
+def test_where_the_file_has_none_each_link_behind_the_carousel_weighs_half_of_the_one_before():
+    guessed = declared_masses(arm_from_file(ROBOTS / "kuka.yaml"))
+    mass, total = np.array([m.mass_kg for m in guessed]), sum(m.mass_kg for m in guessed)
+    assert [m.link for m in guessed] == list(range(7)) and {m.relative_std for m in guessed} == {0.1}
+    np.testing.assert_allclose(mass[3:] / mass[2:-1], 0.5, rtol=5e-3)
+    np.testing.assert_allclose(mass[:2] / total, [0.18, 0.27], rtol=1e-3)
+
+
+@pytest.mark.parametrize("name, kilograms", [("abb", 1280), ("gp180", 991), ("ur10", 28.9)])
+def test_the_guessed_mass_of_an_arm_is_no_more_than_half_off_its_data_sheet(name, kilograms):
+    arm = replace(arm_from_file(ROBOTS / f"{name}.yaml"), masses=())
+    assert sum(m.mass_kg for m in declared_masses(arm)) == pytest.approx(kilograms, rel=0.5)
+
+
+def test_a_guessed_centre_is_before_the_middle_of_its_link_and_beside_it():
+    # Of a reach of three metres.
+    np.testing.assert_allclose(
+        [m.centre_m for m in declared_masses(arm_of())], [[0, 0.03, 0.18], [0.9, 0.03, 0], [0.45, 0.03, 0]]
+    )
+
+
+@pytest.mark.parametrize(
+    "centre, std, allowed", [((0.0, 0.3, 0.4), 0.01, 0.01), ((0.0, 0.0, 0.0), 0.002, 0.006), ((0.2, 0.0, 0.0), 0.004, 0.006)]
+)
+def test_a_centre_is_known_as_a_share_of_its_distance_and_no_better_than_a_short_lever(centre, std, allowed):
+    mass = LinkMass(1, 10.0, centre, 0.02)
+    assert centre_std_m(mass) == pytest.approx(std)
+    assert allowed_centre_std_m(mass, 3.0) == pytest.approx(allowed)
+
+
+def test_masses_of_specimens_scatter_about_the_declared_ones_as_these_are_known():
+    declared = (LinkMass(1, 50.0, (0.3, 0.0, 0.4), 0.1),) * 2000
+    drawn = true_masses(declared, np.random.default_rng(2))
+    off = np.column_stack([[m.mass_kg / 50.0 - 1.0 for m in drawn], np.array([m.centre_m for m in drawn]) - (0.3, 0.0, 0.4)])
+    off /= [0.1, 0.05, 0.05, 0.05]
+    # Four standard errors of 2000 normal draws: a right generator fails four means and four deviations once in 2,000 seeds.
+    np.testing.assert_allclose(off.mean(axis=0), 0.0, atol=4 / np.sqrt(2000))
+    np.testing.assert_allclose(off.std(axis=0), 1.0, atol=4 / np.sqrt(4000))
+    assert np.abs(off).max() <= 3.0 + 1e-9
+    assert np.abs(np.corrcoef(off.T) - np.eye(4)).max() < 4 / np.sqrt(2000)
+
+
+def test_centres_off_the_line_move_across_it_alone_and_weights_stay():
+    arm, largest = arm_of(), 0.02
+    masses = (LinkMass(0, 9.0, (0.0, 0.0, 0.1), 0.1), LinkMass(1, 8.0, (0.5, 0.0, 0.0), 0.1)) * 100
+    moved = off_the_line(masses, arm, largest, np.random.default_rng(4))
+    shift = np.array([m.centre_m for m in moved]) - np.array([m.centre_m for m in masses])
+    assert [(m.link, m.mass_kg) for m in moved] == [(m.link, m.mass_kg) for m in masses]
+    for link, along, across in ((0, [2], [0, 1]), (1, [0], [1, 2])):
+        mine = shift[link::2]
+        np.testing.assert_allclose(mine[:, along], 0.0, atol=1e-15)
+        assert (np.abs(mine[:, across]) <= largest).all() and (np.abs(mine[:, across]).max(axis=0) > 0.8 * largest).all()
+
+
+def test_a_centre_at_a_joint_without_a_link_may_move_anywhere():
+    arm = arm_of("Tz(0.4) Ry(q1) Rz(q2) Tx(1) [hand]")
+    moved = off_the_line((LinkMass(1, 8.0, (0.0, 0.0, 0.0), 0.1),), arm, 0.02, np.random.default_rng(4))
+    assert all(0 < abs(part) <= 0.02 for part in moved[0].centre_m)
+
+
+@pytest.mark.parametrize("centre, along", [((0.5, 0.1, -0.2), 0.25), ((-0.3, 0.0, 0.1), 0.0), ((2.5, 0.0, 0.1), 1.0)])
+def test_a_weight_stands_on_its_stretch_and_aside_of_it_where_its_centre_is(centre, along):
+    arm = arm_of()
+    (mass,) = on_stretches((LinkMass(1, 8.0, centre, 0.1),), arm)
+    assert (mass.stretch, mass.mass_kg, mass.along) == (1, 8.0, pytest.approx(along))
+    np.testing.assert_allclose(mass.along * arm.stretches[1].vector_m + mass.aside_m, centre, atol=1e-15)
+    if 0 < along < 1:
+        assert mass.aside_m[0] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_weight_turns_each_joint_by_mass_gravity_and_horizontal_lever():
+    arm, masses = arm_of(), (Mass(0, 99.0, 0.5), Mass(1, 10.0, 0.5), Mass(2, 4.0, 1.0))
+    angles = np.array([[0.0, 0.0], [0.3, 0.9], [-1.2, 0.4]])
+    upper, fore = np.cos(angles[:, 0]), np.cos(angles.sum(axis=1))
+    # A positive turn about y lowers what lies forwards.
+    shoulder = 9.8 * (10.0 * upper + 4.0 * (2.0 * upper + fore))
+    found = gravity_torque(arm, masses, (0.0, 0.0, -9.8), angles)
+    np.testing.assert_allclose(found, np.column_stack([shoulder, 9.8 * 4.0 * fore]), atol=1e-12)
+
+
+def test_the_usual_torque_is_the_root_mean_square_over_the_range_of_angles():
+    still = replace(arm_of(), limits=np.radians([[60.0, 60.0], [0.0, 0.0]]))
+    torque = 9.8 * 10.0 * 2.0 * 0.5
+    np.testing.assert_allclose(usual_gravity_torque(still, (Mass(1, 10.0, 1.0),), (0.0, 0.0, -9.8)), [torque, 0.0])
+    # Mean of cos^2 over whole turns is a half, to three standard errors of its 64 poses, sd(cos^2) = 1 / sqrt 8.
+    free = usual_gravity_torque(arm_of(), (Mass(1, 10.0, 1.0),), (0.0, 0.0, -9.8))[0] / 196.0
+    assert free**2 == pytest.approx(0.5, abs=3 * np.sqrt(1 / 8 / 64))

@@ -1,0 +1,170 @@
+"""Robot files as the plant reads them, by hand and against pinocchio."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from support import OTHER_CHAINS, refused
+
+from elastocal.plant.arm import arm_from_document, arm_from_file, link_frames, turned
+
+CHAIN = "Tz(l1) Rz(q1) Tx(-l2) [A] Rx(90deg) Ty(0.5) Ry(-q2) Tz(0.3) [B]"
+
+
+def document(chain=CHAIN, joints=2, **more):
+    lengths = {"l1": 0.4, "l2": 0.2} if chain == CHAIN else {}
+    limits = [[-90.0, 180.0]] * joints
+    compliance = [float(joint) for joint in range(1, joints + 1)]
+    return {
+        "name": "test",
+        "chain": chain,
+        "lengths_m": lengths,
+        "compliance_urad_per_Nm": compliance,
+        "joint_limits_deg": limits,
+    } | more
+
+
+def arm_of(*arguments, **more):
+    return arm_from_document(document(*arguments, **more))
+
+
+def one_link(length_m, joints=1, **more):
+    """One joint about y with all the reach behind it, others after it."""
+    rest = " ".join(f"Ry(q{joint})" for joint in range(2, joints + 1))
+    return arm_of(f"Tz(0.7) Ry(q1) Tx({length_m}) {rest} [A]", joints, **more)
+
+
+def test_a_chain_is_cut_into_stretches_at_its_joints():
+    arm = arm_of()
+    column, link, flange = arm.stretches
+    np.testing.assert_allclose([s.vector_m for s in arm.stretches], [[0, 0, 0.4], [-0.2, 0, 0.5], [0, 0, 0.3]], atol=1e-15)
+    np.testing.assert_allclose(link.rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
+    np.testing.assert_array_equal(column.rotation, np.eye(3))
+    np.testing.assert_array_equal(arm.axes, [[0, 0, 1], [0, -1, 0]])
+    assert not column.points and [p.name for p in link.points + flange.points] == list(arm.points) == ["A", "B"]
+    # [A] stands before the fixed rotation.
+    np.testing.assert_array_equal(link.points[0].rotation, np.eye(3))
+    np.testing.assert_allclose(link.points[0].position_m, [-0.2, 0, 0])
+
+
+def test_compliances_and_limits_are_in_radians():
+    arm = arm_of()
+    np.testing.assert_allclose(arm.compliance, [1e-6, 2e-6])
+    np.testing.assert_allclose(arm.limits, [[-np.pi / 2, np.pi]] * 2)
+
+
+@pytest.mark.parametrize("word", ["Tw(1)", "Rz", "[A", "Sx(1)", "Tz(1)Rz(q1)"])
+def test_a_word_that_is_none_is_refused_by_name(word):
+    with refused("my.yaml", "chain", repr(word)):
+        arm_from_document(document(f"{word} Rz(q1) Tx(1) [A]", 1), "my.yaml")
+
+
+@pytest.mark.parametrize("chain", ["Rz(q1) Tx(1)", "Rz(q1) Tx(1) [A] Tx(0.1)", "[A] Rz(q1)"])
+def test_a_chain_without_a_measuring_point_at_its_end_is_refused(chain):
+    with refused("my.yaml", "chain", "measuring point"):
+        arm_from_document(document(chain, 1), "my.yaml")
+
+
+def test_the_controller_shows_angles_without_the_coupling_and_the_offset():
+    arm = arm_of(reported_joints={"matrix": [[1, 0], [-1, 2]], "offset_deg": [0, 90]})
+    shown = np.array([[0.1, 0.3], [1.0, -0.2]])
+    angles = np.array([[0.1, 0.5 + np.pi / 2], [1.0, -1.4 + np.pi / 2]])
+    np.testing.assert_allclose(arm.angles_shown_as(shown), angles)
+    np.testing.assert_allclose(arm.shown_angles(angles), shown)
+    np.testing.assert_array_equal(arm_of().shown_angles(shown), shown)
+
+
+def test_masses_and_gravity_are_as_the_file_declares_them_or_of_the_usual_kind():
+    entries = [
+        {"link": 0, "mass_kg": 5, "centre_m": [0, 0, 1]},
+        {"link": 2, "mass_kg": 7.5, "centre_m": [0.1, 0.2, 0.3], "relative_std": 0.02},
+    ]
+    arm = arm_of(masses=entries, gravity_m_s2=[9.8, 0, 0])
+    assert [(m.link, m.mass_kg, m.centre_m, m.relative_std) for m in arm.masses] == [
+        (0, 5.0, (0.0, 0.0, 1.0), 0.1),
+        (2, 7.5, (0.1, 0.2, 0.3), 0.02),
+    ]
+    assert arm.gravity_m_s2 == (9.8, 0.0, 0.0)
+    assert arm_of().masses == () and arm_of().gravity_m_s2 == (0.0, 0.0, -9.80665)
+
+
+@pytest.mark.parametrize(
+    "more, compensated",
+    [
+        ({}, True),
+        ({"masses": []}, False),
+        ({"masses": [], "compensator": {"joint": 2, "kind": "spring"}}, True),
+        ({"compensator": {"joint": 2, "kind": "spring"}}, True),
+    ],
+)
+def test_only_a_file_with_weights_and_no_compensator_is_of_an_arm_without_one(more, compensated):
+    assert arm_of(**more).compensated == compensated
+
+
+def test_reach_is_all_that_the_first_joint_carries():
+    assert arm_of().reach_m == pytest.approx(np.hypot(0.2, 0.5) + 0.3)
+    assert one_link(2.0).reach_m == pytest.approx(2.0)
+
+
+def test_an_arm_without_a_rated_load_carries_by_the_cube_of_its_reach():
+    assert one_link(2.0).payload_kg == pytest.approx(64.0)
+    assert one_link(2.0, payload_kg=12).payload_kg == 12
+
+
+@pytest.mark.parametrize("payload, share", [(70, 0.5), (140, 1.0), (500, 1.0)])
+def test_forces_grow_with_the_rated_load_up_to_those_of_a_heavy_arm(payload, share):
+    assert one_link(1.0, payload_kg=payload).load_share == pytest.approx(share)
+
+
+def test_softness_is_the_median_gear_over_a_heavy_arms_and_never_less_than_one():
+    assert one_link(1.0, 3, compliance_urad_per_Nm=[1.0, 8.0, 90.0]).softness == pytest.approx(4.0)
+    assert one_link(1.0, 3, compliance_urad_per_Nm=[0.1, 0.5, 90.0]).softness == 1.0
+
+
+def test_gears_have_the_files_ratios_or_one_for_every_joint():
+    assert one_link(1.0, 2, gear_ratio=[101, 50]).gear_ratio == (101, 50)
+    usual = one_link(1.0, 8).gear_ratio
+    assert len(usual) == 8 and usual[7] == usual[0] and min(usual) > 50
+
+
+@pytest.mark.parametrize("name_of_chain", sorted(OTHER_CHAINS))
+def test_frames_behind_joints_are_pinocchios(name_of_chain, rng):
+    text = OTHER_CHAINS[name_of_chain]
+    joints = text.count("q")
+    arm = arm_of(text, joints)
+    angles = rng.uniform(-3, 3, (4, joints))
+    # From the words of the chain and not from the stretches.
+    model, parent, place = pin.Model(), 0, pin.SE3.Identity()
+    for word in text.split():
+        kind, axis, inner = word[0], np.eye(3)["xyz".index(word[1])] if word[0] != "[" else None, word[3:-1]
+        if kind == "T":
+            place = place * pin.SE3(np.eye(3), float(inner) * axis)
+        elif kind == "R" and "q" in inner:
+            sense = -1.0 if inner[0] == "-" else 1.0
+            parent = model.addJoint(parent, pin.JointModelRevoluteUnaligned(sense * axis), place, inner)
+            place = pin.SE3.Identity()
+        elif kind == "R":
+            place = place * pin.SE3(pin.exp3(np.radians(float(inner.removesuffix("deg"))) * axis), np.zeros(3))
+    data = model.createData()
+    origin, rotation = link_frames(arm, angles)
+    assert not origin[:, 0].any() and (rotation[:, 0] == np.eye(3)).all()
+    for state, row in enumerate(angles):
+        pin.forwardKinematics(model, data, row)
+        for link in range(1, joints + 1):
+            np.testing.assert_allclose(origin[state, link], data.oMi[link].translation, atol=1e-14)
+            np.testing.assert_allclose(rotation[state, link], data.oMi[link].rotation, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-4, 1.0, np.pi, 5.0, 2 * np.pi])
+def test_rotations_by_rodrigues_are_pinocchios_at_every_angle(angle, rng):
+    axis = rng.standard_normal((2, 3, 3))
+    vector = angle * axis / np.linalg.norm(axis, axis=-1, keepdims=True)
+    wanted = [[pin.exp3(v) for v in row] for row in vector]
+    np.testing.assert_allclose(turned(vector), wanted, atol=2e-15)
+
+
+def test_a_file_is_read_as_its_document(tmp_path):
+    (tmp_path / "arm.yaml").write_text(str(document()), encoding="utf-8")
+    np.testing.assert_array_equal(arm_from_file(tmp_path / "arm.yaml").axes, arm_of().axes)
+    (tmp_path / "arm.yaml").write_text(str(document("Rz(q1)", 1)), encoding="utf-8")
+    with refused((tmp_path / "arm.yaml").as_posix(), "chain"):
+        arm_from_file(tmp_path / "arm.yaml")
