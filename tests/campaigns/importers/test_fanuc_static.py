@@ -1,0 +1,84 @@
+"""The FANUC at poses that are repeated: made-up measurements as a MAT file come back as measurements of the chain."""
+
+import numpy as np
+import pytest
+import scipy.io
+from made_fanuc_sources import POSES, REPEATS, assert_holds, static_source
+from support import refused
+
+from elastocal.campaigns.importers import fanuc_static
+from elastocal.campaigns.reading import read_campaign
+
+
+@pytest.fixture
+def static(fanuc, tmp_path):
+    return static_source(fanuc, tmp_path)
+
+
+def test_static_source_becomes_a_campaign_with_repeats(static, config_folder, tmp_path):
+    path, angles, positions = static
+    fanuc_static.write_campaign(path, tmp_path / "campaign")
+    campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
+    assert (campaign.name, campaign.measured, campaign.frame) == ("fanuc_static", "position", "tracker")
+    assert [(target.name, target.point, target.offset_m) for target in campaign.targets] == [(n, "6DoF", None) for n in "ABC"]
+    assert (campaign.compliance, campaign.declared) == ("nominal", ("joint_offset", "link_geometry"))
+    assert_holds(campaign.measurements, angles, positions)
+    np.testing.assert_array_equal(campaign.measurements.pose, np.arange(POSES).repeat(3 * REPEATS))
+    np.testing.assert_array_equal(campaign.measurements.repeat, np.tile(np.arange(REPEATS).repeat(3), POSES))
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "words"),
+    [
+        ({"q": None}, "q", ["nothing", "6) numbers"]),
+        ({"q": np.zeros((24, 5))}, "q", ["(24, 5)"]),
+        ({"q": np.zeros((0, 6))}, "q", ["(0, 6)"]),
+        ({"mB": np.zeros((23, 3))}, "mB", ["(23, 3)", "3) numbers"]),
+        ({"mC": "text"}, "mC", ["numbers"]),
+    ],
+)
+def test_mat_file_of_other_variables_is_refused(static, tmp_path, changes, key, words):
+    contents = {name: value for name, value in scipy.io.loadmat(static[0]).items() if not name.startswith("__")} | changes
+    path = tmp_path / "other.mat"
+    scipy.io.savemat(path, {name: value for name, value in contents.items() if value is not None})
+    with refused(path, key, *words):
+        fanuc_static.write_campaign(path, tmp_path / "campaign")
+    assert not (tmp_path / "campaign").exists()
+
+
+@pytest.mark.parametrize("contents", [b"", b"no MAT file at all, but long enough to be asked for its header. " * 4])
+def test_file_that_is_no_mat_file_is_refused(tmp_path, contents):
+    path = tmp_path / "other.mat"
+    path.write_bytes(contents)
+    with refused(path, "", "MAT file"):
+        fanuc_static.read(path)
+
+
+def test_missing_source_is_refused(tmp_path):
+    with refused(tmp_path / "nowhere", "", "readable file"):
+        fanuc_static.read(tmp_path / "nowhere")
+
+
+def test_the_file_holds_rad_and_metres_already(static):
+    path, _, positions = static
+    angles, found = fanuc_static.read(path)
+    contents = scipy.io.loadmat(path)
+    np.testing.assert_array_equal(angles, contents["q"])
+    assert list(found) == ["A", "B", "C"]
+    for index, name in enumerate("ABC"):
+        np.testing.assert_array_equal(found[name], positions[:, index])
+
+
+def test_the_hold_out_is_written_as_asked_and_no_noise_is_declared(static, config_folder, tmp_path):
+    fanuc_static.write_campaign(static[0], tmp_path / "campaign", "mine", {"fraction": 0.25, "seed": 3})
+    campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
+    assert (campaign.name, campaign.holdout, campaign.noise) == ("mine", {"fraction": 0.25, "seed": 3}, None)
+
+
+@pytest.mark.parametrize("kind", ["int32", "complex128"])
+def test_angles_that_are_no_real_numbers_are_refused(static, tmp_path, kind):
+    contents = {name: value for name, value in scipy.io.loadmat(static[0]).items() if not name.startswith("__")}
+    path = tmp_path / "other.mat"
+    scipy.io.savemat(path, contents | {"q": contents["q"].astype(kind)})
+    with refused(path, "q", "numbers"):
+        fanuc_static.read(path)

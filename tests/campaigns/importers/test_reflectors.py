@@ -1,0 +1,57 @@
+"""Several reflectors on one flange: a row for each reflector of each measurement."""
+
+import numpy as np
+import pytest
+from support import refused
+
+from elastocal.campaigns.importers.reflectors import reflector_table, write_reflectors
+from elastocal.campaigns.reading import read_campaign
+
+POSITIONS = {"left": np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), "right": -np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])}
+ANGLES = np.array([[0.1, 0.2, 0.3], [-0.1, -0.2, -0.3]])
+
+
+def test_the_reflectors_of_a_measurement_follow_each_other():
+    table = reflector_table(np.array([5, 9]), np.array([0, 2]), ANGLES, POSITIONS)
+    assert {name: values.tolist() for name, values in table.items()} == {
+        "pose": [5, 5, 9, 9],
+        "load": [0, 0, 0, 0],
+        "repeat": [0, 0, 2, 2],
+        "target": ["left", "right", "left", "right"],
+        "q1": [0.1, 0.1, -0.1, -0.1],
+        "q2": [0.2, 0.2, -0.2, -0.2],
+        "q3": [0.3, 0.3, -0.3, -0.3],
+        "x": [1.0, -1.0, 4.0, -4.0],
+        "y": [2.0, -2.0, 5.0, -5.0],
+        "z": [3.0, -3.0, 6.0, -6.0],
+    }
+
+
+@pytest.mark.parametrize("session", [0, 3])
+def test_a_session_is_written_where_one_is_given(session):
+    table = reflector_table(np.array([0, 1]), np.array([0, 0]), ANGLES, POSITIONS, session)
+    assert table["session"].tolist() == [session] * 4
+
+
+def test_a_folder_of_reflectors_is_a_campaign_whose_equal_angles_are_repeats(config_folder, tmp_path):
+    rng = np.random.default_rng(1)
+    angles = rng.uniform(-0.5, 0.5, (8, 6))[[0, 1, 0, 2, 3, 4, 5, 6, 7]]
+    positions = {name: rng.uniform(-1, 1, (9, 3)) for name in ("right", "left")}
+    noise, holdout = {"position_m": 3e-5}, {"fraction": 0.25, "seed": 2}
+    write_reflectors(tmp_path / "campaign", "made", "kuka", angles, positions, holdout, noise)
+    campaign = read_campaign(tmp_path / "campaign", config_folder / "robots")
+    assert (campaign.name, campaign.noise, campaign.holdout) == ("made", noise, holdout)
+    assert [(target.name, target.point) for target in campaign.targets] == [("right", "6DoF"), ("left", "6DoF")]
+    seen = campaign.measurements
+    assert seen.pose.tolist() == np.repeat([0, 1, 0, 2, 3, 4, 5, 6, 7], 2).tolist()
+    assert np.flatnonzero(seen.repeat).tolist() == [4, 5] and seen.repeat.max() == 1
+    assert not seen.session.any() and not seen.load.any() and not seen.wrench.any()
+    np.testing.assert_array_equal(seen.joint_angles, angles.repeat(2, axis=0))
+    for index, name in enumerate(positions):
+        np.testing.assert_array_equal(seen.position[seen.target == index], positions[name])
+
+
+def test_a_declaration_that_no_campaign_may_have_is_refused_and_nothing_is_written(tmp_path):
+    with refused((tmp_path / "campaign" / "campaign.yaml").as_posix(), "noise"):
+        write_reflectors(tmp_path / "campaign", "made", "kuka", np.zeros((2, 6)), POSITIONS, noise={"position_mm": 0.03})
+    assert not (tmp_path / "campaign").exists()

@@ -1,0 +1,121 @@
+"""Measurements to columns of tables and back."""
+
+import numpy as np
+import pytest
+from made_folders import made_folder, made_table
+
+from elastocal.campaigns.campaign import Measurements
+from elastocal.campaigns.columns import columns_of, measurements_from, residual_columns
+from elastocal.campaigns.reading import read_campaign
+from elastocal.io.storage import read_table, write_table
+from elastocal.loop.schemas import measurements
+
+COVARIATES = {
+    "none": {},
+    "all": {"approach3": [1.0, -1.0], "time_s": [0.0, 5.0], "temperature_c": [20.0, 21.5]},
+}
+
+
+def there_and_back(path, columns):
+    write_table(path, measurements(6), [columns], {})
+    return read_table(path, measurements(6))
+
+
+def two_measurements(**others):
+    """Of a robot with two joints; no two numbers are alike."""
+    parts = {
+        "session": [0, 1],
+        "pose": [2, 3],
+        "load": [4, 5],
+        "repeat": [6, 7],
+        "target": [8, 9],
+        "joint_angles": [[0.1, 0.2], [0.3, 0.4]],
+        "wrench": [[11, 12, 13, 14, 15, 16], [21, 22, 23, 24, 25, 26]],
+        "position": [[31, 32, 33], [41, 42, 43]],
+        "rotation_vector": [[51, 52, 53], [61, 62, 63]],
+        "approach": [[1, -1], [0, 1]],
+        "time_s": [71, 81],
+        "temperature_c": [72, 82],
+        "row": [91, 92],
+    }
+    return Measurements(**{name: None if v is None else np.array(v) for name, v in (parts | others).items()})
+
+
+def listed(columns):
+    return {name: np.asarray(values).tolist() for name, values in columns.items()}
+
+
+def test_every_number_stands_in_the_column_of_its_name():
+    identity = {"session": [0, 1], "pose": [2, 3], "load": [4, 5], "repeat": [6, 7], "target": [8, 9], "row": [91, 92]}
+    expected = identity | {"q1": [0.1, 0.3], "q2": [0.2, 0.4]}
+    expected |= {"fx": [11, 21], "fy": [12, 22], "fz": [13, 23], "mx": [14, 24], "my": [15, 25], "mz": [16, 26]}
+    expected |= {"x": [31, 41], "y": [32, 42], "z": [33, 43], "rx": [51, 61], "ry": [52, 62], "rz": [53, 63]}
+    expected |= {"approach1": [1, 0], "approach2": [-1, 1], "time_s": [71, 81], "temperature_c": [72, 82]}
+    assert listed(columns_of(two_measurements())) == expected
+
+
+ABSENT = {
+    "rotation_vector": ("rx", "ry", "rz"),
+    "approach": ("approach1", "approach2"),
+    "time_s": ("time_s",),
+    "temperature_c": ("temperature_c",),
+}
+
+
+@pytest.mark.parametrize("name", ABSENT)
+def test_what_was_not_measured_is_an_empty_column_and_is_absent_again(name):
+    columns = columns_of(two_measurements(**{name: None}))
+    assert {column for column, values in columns.items() if np.isnan(values).any()} == set(ABSENT[name])
+    back = measurements_from(columns)
+    assert [part for part, values in vars(back).items() if values is None] == [name]
+
+
+@pytest.mark.parametrize("measured", ["position", "pose"])
+@pytest.mark.parametrize("covariates", COVARIATES)
+def test_measurements_come_back_as_they_were(measured, covariates, kuka, config_folder, tmp_path):
+    table = made_table(kuka, "c")
+    count = len(table["pose"])
+    table |= {name: np.resize(values, count) for name, values in COVARIATES[covariates].items()}
+    table |= {f"approach{joint}": np.zeros(count) for joint in range(1, 7) if joint != 3 and covariates == "all"}
+    table["session"] = table["pose"] % 2
+    folder = made_folder(tmp_path / "c", kuka, table=table, measured=measured)
+    before = read_campaign(folder, config_folder / "robots").measurements
+    assert (before.rotation_vector is None) == (measured == "position")
+    assert (before.approach is None) == (before.time_s is None) == (covariates == "none")
+    after = measurements_from(there_and_back(tmp_path / "r.parquet", columns_of(before)))
+    for name, values in vars(before).items():
+        if values is None:
+            assert getattr(after, name) is None, name
+        else:
+            np.testing.assert_array_equal(getattr(after, name), values)
+            assert getattr(after, name).dtype == values.dtype, name
+
+
+def residuals_of(rows, held_out=False, **others):
+    before, after = (np.arange(2.0 * rows).reshape(2, rows) + start for start in (100.0, 200.0))
+    position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    return residual_columns(two_measurements(**others), held_out, np.array([False, True]), position, before, after)
+
+
+def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given():
+    columns = listed(residuals_of(6))
+    for number, component in enumerate(("dx", "dy", "dz", "rx", "ry", "rz")):
+        assert columns[f"before_{component}"] == [100.0 + number, 106.0 + number]
+        assert columns[f"after_{component}"] == [200.0 + number, 206.0 + number]
+    assert (columns["x"], columns["y"], columns["z"]) == ([1.0, 4.0], [2.0, 5.0], [3.0, 6.0])
+    assert (columns["row"], columns["q2"], columns["mz"], columns["time_s"]) == ([91, 92], [0.2, 0.4], [16, 26], [71, 81])
+    assert columns["outside_range"] == [False, True]
+
+
+def test_residuals_of_positions_have_no_rotation():
+    columns = residuals_of(3)
+    empty = {f"{stage}_{axis}" for stage in ("before", "after") for axis in ("rx", "ry", "rz")}
+    assert {name for name, values in columns.items() if np.isnan(values).any()} == empty
+    assert columns["after_dz"].tolist() == [202.0, 205.0]
+
+
+@pytest.mark.parametrize("held_out", [False, True])
+def test_all_residuals_of_a_part_are_held_out_or_none_is(held_out):
+    columns = residuals_of(6, held_out, time_s=None)
+    assert columns["held_out"].tolist() == [held_out] * 2 and columns["held_out"].dtype == bool
+    assert np.isnan(columns["time_s"]).all()
