@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 from made_verdicts import said, truth
 from scipy.stats import beta
@@ -21,8 +20,6 @@ from elastocal.blind.cases import (
     specimen_of,
 )
 from elastocal.blind.sweep import against_angle, swept
-from elastocal.figures.style import save
-from elastocal.figures.sweep import sweep
 from elastocal.plant.campaigns import schedule_of
 from elastocal.plant.defects import Defect, with_defects
 
@@ -94,16 +91,3 @@ def test_each_case_of_the_sweep_counts_in_the_bin_of_its_angle():
     assert (row["cases"], row["right"], row["class"], row["wrong"], row["other"]) == (2, 0, 0.5, 0.5, 0)
     assert row["right_high"] == pytest.approx(beta.ppf(0.975, 1, 2))
     assert set(table["angle_up_to_deg"]) == {5, 10, 90}
-
-
-def test_the_figure_has_a_panel_for_each_pair_and_can_be_empty(tmp_path):
-    figure = sweep(against_angle(swept(TRUTHS, VERDICTS)))
-    assert [axis.get_title() for axis in figure.axes[:3]] == ["all", "link weight /\npayload", ""]
-    tops = {}
-    for bar in figure.axes[0].patches:
-        tops[bar.get_x()] = max(bar.get_y() + bar.get_height(), tops.get(bar.get_x(), 0.0))
-    assert list(tops.values()) == pytest.approx([1.0] * 3)
-    save(figure, f"{tmp_path}/sweep.pdf", f"{tmp_path}/sweep.png")
-    empty = sweep(against_angle(swept({}, {})))
-    save(empty, f"{tmp_path}/empty.pdf", f"{tmp_path}/empty.png")
-    assert isinstance(against_angle(swept({}, {})), pd.DataFrame)

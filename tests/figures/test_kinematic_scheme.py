@@ -1,7 +1,8 @@
 """A kinematic scheme is drawn from its robot's chain: all names are there, and none hides another."""
 
 import pytest
-from drawn_schemes import CHAINS, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap, from_chain, from_file, texts
+from drawn_figures import texts
+from drawn_schemes import CHAINS, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap, from_chain, from_file
 from matplotlib.text import Text
 
 from elastocal.figures.kinematic_scheme import kinematic_scheme

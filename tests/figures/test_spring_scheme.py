@@ -1,7 +1,8 @@
 """A spring scheme shows every spring of its robot's model, and no text hides another."""
 
 import pytest
-from drawn_schemes import CHAINS, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap, from_chain, from_file, texts
+from drawn_figures import texts
+from drawn_schemes import CHAINS, assert_about_160_mm_wide_and_drawn_alike, assert_no_overlap, from_chain, from_file
 
 from elastocal.figures.spring_scheme import spring_scheme
 

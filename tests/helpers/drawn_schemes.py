@@ -35,10 +35,6 @@ def from_chain(chain):
     return robot_from_document({"name": "made up", "chain": chain, **known})
 
 
-def texts(figure):
-    return [artist.get_text() for artist in figure.findobj(Text) if artist.get_text()]
-
-
 def assert_no_overlap(figure):
     renderer = FigureCanvasAgg(figure).get_renderer()
     figure.draw(renderer)

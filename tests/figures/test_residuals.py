@@ -1,0 +1,210 @@
+"""Residuals against what the robot did, and as arrows where it stood: what is drawn is what the table holds."""
+
+import numpy as np
+import pytest
+from drawn_figures import texts
+from made_loop_tables import residual_table
+from matplotlib.collections import PathCollection
+from matplotlib.quiver import Quiver, QuiverKey
+from statsmodels.api import OLS
+
+from elastocal.figures.residuals import (
+    arrows,
+    bins_of,
+    components,
+    length_unit,
+    middle_of_cells,
+    quantities,
+    residuals,
+    running_quartiles,
+    share_explained,
+)
+
+
+def labels_of(figure):
+    return [axis.get_xlabel() for axis in figure.axes if axis.get_xlabel()]
+
+
+def test_residuals_have_a_panel_for_each_quantity_that_varies():
+    figure = residuals(residual_table())
+    assert labels_of(figure) == [f"angle of joint {joint} (°)" for joint in range(1, 7)] + ["force (N)", "time (min)"]
+    assert figure.axes[0].get_ylabel() == "residual (µm)"
+
+
+def test_residuals_leave_out_what_was_not_recorded_or_did_not_vary():
+    table = residual_table(loaded=False, timed=False)
+    table["q4"][:] = 0.3
+    assert labels_of(residuals(table)) == [f"angle of joint {joint} (°)" for joint in (1, 2, 3, 5, 6)]
+
+
+def test_the_joint_behind_the_residual_is_said_to_explain_it():
+    figure = residuals(residual_table(poses=120, loaded=False))
+    component, shares = figure.axes[1].get_title(loc="left").split(": ")
+    before, after = (float(share) for share in shares.removesuffix(" %").split(" → "))
+    assert component == "vertical" and before > 90 and after < 10
+
+
+def test_held_out_measurements_are_marked_apart():
+    table = residual_table()
+    clouds = [artist for artist in residuals(table).axes[0].collections if isinstance(artist, PathCollection)]
+    sizes = [len(cloud.get_offsets()) for cloud in clouds]
+    assert sizes == 2 * [(~table["held_out"]).sum(), table["held_out"].sum()]
+
+
+def test_one_stage_is_drawn_where_nothing_was_found():
+    figure = residuals(residual_table(found=False))
+    assert "with the effects found" not in texts(figure)
+    assert (
+        len([artist for artist in arrows(residual_table(found=False)).axes[0].get_children() if isinstance(artist, Quiver)])
+        == 1
+    )
+
+
+def test_many_points_are_pixels():
+    table = residual_table(poses=400)
+    assert all(cloud.get_rasterized() for cloud in residuals(table).findobj(PathCollection) if len(cloud.get_offsets()))
+
+
+def test_millimetres_where_residuals_are_large():
+    table = residual_table()
+    table |= {name: 100 * values for name, values in table.items() if name.startswith(("before_d", "after_d"))}
+    assert residuals(table).axes[0].get_ylabel() == "residual (mm)"
+
+
+def test_components_are_those_about_the_vertical_and_along_the_force():
+    table = {"x": np.array([0.0, 1.0]), "y": np.array([2.0, 0.0])}
+    table |= {"before_dx": np.array([1.0, 1.0]), "before_dy": np.array([2.0, 2.0]), "before_dz": np.array([3.0, 3.0])}
+    table |= {"fx": np.array([0.0, 0.0]), "fy": np.array([0.0, -5.0]), "fz": np.array([0.0, 0.0])}
+    expected = [[2.0, -1.0, 3.0, np.nan], [1.0, 2.0, 3.0, -2.0]]
+    np.testing.assert_allclose(components(table, "before"), expected, atol=1e-12)
+
+
+def test_chance_explains_nothing():
+    rng = np.random.default_rng(0)
+    assert share_explained(bins_of(rng.uniform(size=2000)), rng.normal(size=2000)) < 0.01
+    assert share_explained(np.zeros(5, int), np.full(5, np.nan)) == 0.0
+
+
+def test_no_line_crosses_a_gap():
+    values = np.concatenate([np.linspace(0, 10, 200), np.linspace(50, 60, 200)])
+    middle, quartiles = running_quartiles(values, np.sin(values), bins_of(values))
+    assert np.isnan(quartiles).all(axis=1).sum() == 1
+    assert middle[~np.isnan(quartiles[:, 1])].max() > 50
+    levels = np.repeat([0.0, 1000.0], 50)
+    assert not np.isnan(running_quartiles(levels, levels, bins_of(levels))[1]).any()
+
+
+def test_arrows_stand_where_measurements_were_taken():
+    table = residual_table(poses=20, repeats=3)
+    figure = arrows(table)
+    before = next(
+        artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver) and artist.get_gid() == "before"
+    )
+    # Repeats are averaged: one arrow for each pose, load and target.
+    assert len(before.X) == 20 * 2 * 2
+    assert [axis.get_xlabel() for axis in figure.axes] == ["x (m)", "x (m)"]
+    assert [axis.get_ylabel() for axis in figure.axes] == ["z (m)", "y (m)"]
+    (key,) = figure.findobj(QuiverKey)
+    assert key.label == "200 µm"
+
+
+def test_large_campaigns_draw_one_state_of_each_cell():
+    figure = arrows(residual_table(poses=500))
+    quivers = [artist for artist in figure.axes[0].get_children() if isinstance(artist, Quiver)]
+    assert max(len(quiver.X) for quiver in quivers) < 500
+    assert any("one state of each cell" in text for text in texts(figure))
+
+
+def test_the_middle_of_each_cell_is_taken():
+    at = np.array([[0.1, 0.1], [0.2, 0.2], [0.3, 0.3], [5.0, 5.0]])
+    assert sorted(middle_of_cells(at, np.array([3.0, 1.0, 2.0, 9.0]), 1.0)) == [2, 3]
+
+
+def test_residuals_of_one_pose_are_a_note():
+    table = residual_table(loaded=False, timed=False)
+    table |= {f"q{joint}": np.full(len(table["pose"]), 0.3) for joint in range(1, 7)}
+    assert any("nothing to draw them against" in text for text in texts(residuals(table)))
+
+
+def drawn_arrows(figure, view, stage):
+    return next(
+        artist for artist in figure.axes[view].get_children() if isinstance(artist, Quiver) and artist.get_gid() == stage
+    )
+
+
+def state_means(table):
+    """Places and residuals (states, 3) in m, averaged over the repeats of each held-out flag, pose and load."""
+    keys = np.column_stack([table[name] for name in ("held_out", "pose", "load")])
+    members = [(keys == key).all(axis=1) for key in np.unique(keys, axis=0)]
+    return (
+        np.array([[table[f"{start}{axis}"][mine].mean() for axis in "xyz"] for mine in members]) for start in ("", "before_d")
+    )
+
+
+def test_arrows_begin_at_their_state_and_are_its_mean_residual_enlarged_as_the_arrow_of_the_scale():
+    table = residual_table(poses=4, targets=1, repeats=3)
+    figure = arrows(table)
+    (key,) = figure.findobj(QuiverKey)
+    size, unit = key.label.split()
+    assert unit == "µm"
+    place, off = state_means(table)
+    for view, axes in ((0, [0, 2]), (1, [0, 1])):
+        quiver = drawn_arrows(figure, view, "before")
+        np.testing.assert_allclose(quiver.XY, place[:, axes])
+        drawn = np.column_stack([quiver.U, quiver.V])
+        np.testing.assert_allclose(drawn, off[:, axes] * key.U / (1e-6 * float(size)), rtol=1e-9, atol=1e-12)
+
+
+def test_the_horizontal_components_are_turned_and_keep_their_length():
+    table = residual_table()
+    found = components(table, "before")
+    np.testing.assert_allclose(np.hypot(*found[:, :2].T), np.hypot(table["before_dx"], table["before_dy"]))
+    # Along the radius from the axis of the base.
+    radius = np.hypot(table["x"], table["y"])
+    np.testing.assert_allclose(found[:, 0], (table["x"] * table["before_dx"] + table["y"] * table["before_dy"]) / radius)
+
+
+def test_the_share_explained_is_the_adjusted_coefficient_of_determination_about_zero():
+    rng = np.random.default_rng(3)
+    bins = rng.integers(0, 5, 60)
+    values = rng.normal(size=60) + 0.6 * bins
+    fit = OLS(values, np.eye(5)[bins], hasconst=False).fit()
+    assert share_explained(bins, values) == pytest.approx(fit.rsquared_adj)
+    # What is not known and what is in no bin do not count.
+    padded = np.append(values, [np.nan, 1e6]), np.append(bins, [0, -1])
+    assert share_explained(padded[1], padded[0]) == pytest.approx(fit.rsquared_adj)
+
+
+def test_bins_are_the_levels_of_few_values_and_equal_counts_of_many():
+    np.testing.assert_array_equal(bins_of(np.array([5.0, 1.0, np.nan, 1.0004, 3.0])), [2, 0, -1, 0, 1])
+    counts = np.bincount(bins_of(np.random.default_rng(0).gamma(1.0, size=4000)))
+    assert len(counts) == 50 and counts.min() == counts.max() == 80
+
+
+def test_quartiles_of_a_bin_are_those_of_its_residuals_and_few_measurements_have_none():
+    values, residual = np.repeat([1.0, 2.0, 3.0], [5, 3, 9]), np.arange(17.0)
+    middle, quartiles = running_quartiles(values, residual, bins_of(values))
+    np.testing.assert_array_equal(middle, [1.0, 3.0])
+    np.testing.assert_array_equal(quartiles, [[1, 2, 3], [10, 12, 14]])
+
+
+@pytest.mark.parametrize("last_s, label, end", [(7200.0, "time (min)", 120.0), (7260.0, "time (h)", 7260 / 3600)])
+def test_time_begins_at_zero_and_is_in_hours_beyond_two(last_s, label, end):
+    table = residual_table()
+    table["time_s"] = np.linspace(500.0, 500.0 + last_s, len(table["pose"]))
+    found = quantities(table)[label]
+    assert (found.min(), found.max()) == (0.0, pytest.approx(end))
+
+
+def test_angles_are_in_degrees_and_the_force_is_its_size():
+    table = residual_table()
+    table |= {"fx": 3.0 * table["load"], "fy": -4.0 * table["load"], "fz": 12.0 * table["load"]}
+    found = quantities(table)
+    np.testing.assert_allclose(np.radians(found["angle of joint 2 (°)"]), table["q2"])
+    assert set(found["force (N)"]) == {0.0, 13.0}
+
+
+@pytest.mark.parametrize("largest_m, unit", [(0.99e-3, (1e6, "µm")), (1.01e-3, (1e3, "mm"))])
+def test_the_unit_follows_the_residuals_and_not_a_few_outliers(largest_m, unit):
+    lengths = np.append(np.full(99, largest_m), 0.5)
+    assert length_unit(lengths) == unit

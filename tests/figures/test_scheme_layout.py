@@ -1,0 +1,135 @@
+"""From a chain to places on paper: links follow one another and do not cross, joints and measuring points stand on them."""
+
+from itertools import combinations, pairwise
+
+import numpy as np
+import pytest
+from drawn_schemes import CHAINS, from_chain, from_file
+
+from elastocal.figures.scheme_layout import DRAWING_MM, Joint, Point, Segment, laid_out, projected, view_of
+from elastocal.figures.scheme_sheet import SYMBOL_RADIUS_MM
+from elastocal.mechanics.robot import with_target_offset
+
+ROBOTS = {name: from_file(name) for name in ("kuka", "fanuc", "kuka_extended")}
+ROBOTS |= {name: from_chain(chain) for name, chain in CHAINS.items()}
+LAID_OUT = {}
+
+
+@pytest.fixture(params=ROBOTS)
+def drawn(request):
+    """A robot with its items and the direction on paper of what recedes."""
+    name = request.param
+    if name not in LAID_OUT:
+        LAID_OUT[name] = laid_out(ROBOTS[name].chain)
+    return ROBOTS[name], *LAID_OUT[name]
+
+
+def of(kind, items):
+    return [item for item in items if isinstance(item, kind)]
+
+
+def side(one, other, point):
+    return np.sign(round(float((other - one)[0] * (point - one)[1] - (other - one)[1] * (point - one)[0]), 9))
+
+
+def cross(one, other):
+    """Whether two strokes cross, by the sides on which the ends of each lie of the other."""
+    a, b, c, d = one.start, one.end, other.start, other.end
+    return side(a, b, c) * side(a, b, d) < 0 and side(c, d, a) * side(c, d, b) < 0
+
+
+def test_links_follow_one_another_from_the_origin(drawn):
+    _, items, _ = drawn
+    segments = of(Segment, items)
+    np.testing.assert_allclose(segments[0].start, 0)
+    for one, following in pairwise(segments):
+        np.testing.assert_allclose(one.end, following.start)
+
+
+def test_links_do_not_cross(drawn):
+    _, items, _ = drawn
+    assert not [pair for pair in combinations(of(Segment, items), 2) if cross(*pair)]
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "kuka",
+        # The search for the scale counts the ends of links and not the origin in which the first one starts.
+        pytest.param("fanuc", marks=pytest.mark.xfail(strict=True, reason="100 mm high, as the first link is not counted")),
+    ],
+)
+def test_a_robot_is_drawn_at_a_scale_at_which_it_fits_the_drawing(name):
+    items, _ = laid_out(ROBOTS[name].chain)
+    places = [place for item in of(Segment, items) for place in (item.start, item.end)]
+    assert (np.ptp(places, axis=0) <= DRAWING_MM).all()
+
+
+def test_a_link_points_where_its_direction_is_projected(drawn):
+    _, items, depth = drawn
+    for segment in of(Segment, items):
+        shown, expected = segment.end - segment.start, projected(segment.direction, depth)
+        np.testing.assert_allclose(shown / np.linalg.norm(shown), expected / np.linalg.norm(expected))
+        assert np.linalg.norm(segment.direction) == pytest.approx(1)
+
+
+def test_every_joint_is_drawn_once_apart_from_the_others_and_on_the_arm(drawn):
+    robot, items, _ = drawn
+    joints = of(Joint, items)
+    assert [joint.number for joint in joints] == list(range(1, robot.joints + 1))
+    ends = [end for segment in of(Segment, items) for end in (segment.start, segment.end)]
+    for joint in joints:
+        carrier = joint.carrier
+        if carrier is None:
+            assert min(np.linalg.norm(joint.place - end) for end in ends) < 1e-9
+        else:
+            # Moved along its own axis, it remains the same joint.
+            assert abs(joint.axis @ carrier.direction) == pytest.approx(1)
+            parts = np.linalg.norm(joint.place - carrier.start), np.linalg.norm(carrier.end - joint.place)
+            assert sum(parts) == pytest.approx(np.linalg.norm(carrier.end - carrier.start)) and min(parts) > 0
+    for one, other in combinations(joints, 2):
+        assert np.linalg.norm(one.place - other.place) > SYMBOL_RADIUS_MM
+
+
+def test_labels_are_the_lengths_of_the_chain_in_millimetres(drawn):
+    robot, items, _ = drawn
+    lengths = [1000 * t.constant for t in robot.chain.transforms if t.kind == "T" and t.constant]
+    labelled = [segment for segment in of(Segment, items) if segment.label]
+    assert [segment.length_m for segment in labelled] == pytest.approx([abs(length) / 1000 for length in lengths])
+    for number, (segment, length) in enumerate(zip(labelled, lengths, strict=True), start=1):
+        name, value = segment.label.removesuffix(" mm").split(" = ")
+        assert name == f"$l_{{{number}}}$" and float(value.replace("\N{MINUS SIGN}", "-")) == pytest.approx(length, abs=0.05)
+
+
+def test_a_longer_link_is_not_drawn_shorter_than_one_that_carries_as_many_joints(drawn):
+    _, items, depth = drawn
+    size = {0: [], 1: [], 2: []}
+    for segment in of(Segment, items):
+        drawn_mm = np.linalg.norm(segment.end - segment.start) / np.linalg.norm(projected(segment.direction, depth))
+        size[len(segment.carried)].append((segment.length_m, round(drawn_mm, 6)))
+    for pairs in size.values():
+        assert [drawn_mm for _, drawn_mm in sorted(pairs)] == sorted(drawn_mm for _, drawn_mm in pairs)
+
+
+def test_measuring_points_stand_at_their_place_on_the_arm_and_only_an_offset_moves_them():
+    robot = ROBOTS["kuka"]
+    points = of(Point, LAID_OUT.get("kuka", laid_out(robot.chain))[0])
+    assert [point.name for point in points] == [point.name for point in robot.chain.points]
+    assert all(np.allclose(point.place, point.node) for point in points)
+    moved = of(Point, laid_out(with_target_offset(robot, (0.0, 0.1, 0.05)).chain)[0])
+    assert all(np.linalg.norm(point.place - point.node) > 5 for point in moved if np.linalg.norm(point.offset))
+    assert [point for point in moved if np.linalg.norm(point.offset)]
+
+
+@pytest.mark.parametrize("name, right", [("kuka", 0), ("fanuc", 0), ("pitch about x", 1), ("three axes that meet", 0)])
+def test_the_view_is_that_in_which_most_joints_point_into_the_paper(name, right):
+    view = view_of(ROBOTS[name].chain)
+    assert view[0, right] == 1 and view[1].tolist() == [0, 0, 1]
+    # Right, up and towards the reader are right-handed, so into the paper is the other way.
+    np.testing.assert_array_equal(np.cross(view[0], view[1]), -view[2])
+
+
+def test_what_lies_in_the_plane_of_the_paper_keeps_its_place():
+    depth = np.array([0.5, 0.25])
+    np.testing.assert_array_equal(projected(np.array([3.0, 4.0, 0.0]), depth), [3, 4])
+    np.testing.assert_array_equal(projected(np.array([3.0, 4.0, -2.0]), depth), [2, 3.5])

@@ -1,0 +1,100 @@
+"""The common look of all figures: sizes, lines that stay apart, and files without dates that appear whole or not at all."""
+
+from itertools import combinations, pairwise
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from drawn_figures import texts
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.image import imread
+from PIL import Image
+
+from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, line_style, note, panels, save, styled
+
+# Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
+DICHROMATS = {
+    "without red cones": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "without green cones": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+}
+XYZ_OF_RGB = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
+
+
+def lab_as_seen(colour, eye):
+    """CIELAB of an sRGB colour as a dichromat sees it."""
+    value = np.array(to_rgb(colour))
+    linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+    part = XYZ_OF_RGB @ np.clip(eye @ linear, 0, 1) / XYZ_OF_RGB.sum(axis=1)
+    x, y, z = np.where(part > 216 / 24389, np.cbrt(part), (24389 / 27 * part + 16) / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+def saved(figure, folder, name="figure"):
+    pdf, png = folder / f"{name}.pdf", folder / f"{name}.png"
+    save(figure, pdf.as_posix(), png.as_posix())
+    return pdf, png
+
+
+def test_a_figure_has_its_size_in_millimetres_and_a_grid_of_axes_even_for_one():
+    figure, axes = panels(1, 1, 50.8)
+    np.testing.assert_allclose(figure.get_size_inches(), [WIDTH_MM / 25.4, 2.0])
+    assert axes.shape == (1, 1)
+    figure, axes = panels(2, 3, 60, width_mm=76.2, sharey=True)
+    assert axes.shape == (2, 3) and figure.get_figwidth() == pytest.approx(3.0)
+    axes[0, 0].set_ylim(0, 7)
+    assert axes[1, 2].get_ylim() == (0, 7)
+
+
+def test_a_note_is_its_text_alone():
+    figure = note("Nothing to draw.")
+    assert texts(figure) == ["Nothing to draw."] and not figure.axes[0].axison
+
+
+def test_the_look_holds_inside_a_figure_function_and_nowhere_else():
+    outside = dict(mpl.rcParams)
+    assert styled(lambda: (mpl.rcParams["font.size"], mpl.rcParams["axes.spines.top"]))() == (8, False)
+    assert dict(mpl.rcParams) == outside
+
+
+def test_the_first_eight_lines_differ_in_colour_and_the_ninth_begins_anew():
+    styles = [line_style(index) for index in range(9)]
+    assert len({style["color"] for style in styles}) == len(PALETTE) == len(DASHES) == 8
+    assert styles[8] == styles[0]
+    # Lines that coincide show through the gaps of the upper one.
+    assert all(one["linestyle"] != other["linestyle"] for one, other in pairwise(styles))
+
+
+@pytest.mark.parametrize("eye", DICHROMATS.values(), ids=DICHROMATS)
+def test_colour_blind_readers_see_eight_different_colours(eye):
+    seen = [lab_as_seen(colour, np.array(eye)) for colour in PALETTE]
+    # A difference of 2.3 is just noticeable side by side (Mahy et al. 1994); lines of a plot need several times that.
+    assert min(np.linalg.norm(one - other) for one, other in combinations(seen, 2)) > 10
+
+
+def test_the_same_figure_gives_the_same_bytes_without_a_date(tmp_path):
+    files = []
+    for name in "ab":
+        figure, axes = panels(1, 1, 30)
+        axes[0, 0].plot([1, 2], [3, 4])
+        files.append(saved(figure, tmp_path, name))
+    for one, other in zip(*files, strict=True):
+        assert one.read_bytes() == other.read_bytes()
+    assert b"CreationDate" not in files[0][0].read_bytes()
+    assert "Software" not in Image.open(files[0][1]).info
+
+
+def test_pictures_have_150_dots_an_inch_and_fonts_of_the_pdf_are_true_type(tmp_path):
+    pdf, png = saved(panels(1, 1, 25.4)[0], tmp_path)
+    assert imread(png).shape[:2] == (150, int(150 * WIDTH_MM / 25.4))
+    assert b"/Type3" not in pdf.read_bytes() and b"/CIDFontType2" in pdf.read_bytes()
+
+
+def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_path):
+    (tmp_path / "figure.pdf").write_text("earlier", encoding="utf-8")
+    figure = Figure()
+    figure.text(0.5, 0.5, r"$\unknowncommand$")
+    with pytest.raises(ValueError):
+        saved(figure, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["figure.pdf"]
+    assert (tmp_path / "figure.pdf").read_text(encoding="utf-8") == "earlier"
