@@ -1,0 +1,81 @@
+"""What the proposal of the next experiment is asked with; the search itself has tests of its own."""
+
+import numpy as np
+import pytest
+from made_folders import made_folder
+
+from elastocal.campaigns.reading import read_campaign
+from elastocal.diagnosis.proposal import Proposal, without_poses
+from elastocal.loop import proposed as module
+from elastocal.loop.proposed import proposed
+
+
+def made_proposal(joints, poses, ladder, draws):
+    """Angles and loads anywhere, as a search would leave them."""
+    count = np.arange(poses, dtype=float)
+    wrench = np.tile([0.0, 0.0, -500.0, 0.0, 0.0, 0.0], (poses, 1))
+    angles = draws.uniform(-1, 1, (poses, joints))
+    return Proposal(
+        angles, wrench, None, np.zeros(poses, bool), ladder, ("6DoF",), count, count, 1.0, 9, ("a",), ("b",), (), ""
+    )
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What the diagnosis and the search were asked, neither of which runs."""
+    heard = []
+
+    def diagnose(case, settings, seed):
+        heard.append({"case": case, "diagnosis seed": seed})
+        return "diagnosis"
+
+    def propose(diagnosis, limits, settings, draws, poses, ladder):
+        heard[-1] |= {"diagnosis": diagnosis, "limits": limits, "ladder": ladder}
+        heard[-1]["proposal"] = made_proposal(len(limits), poses, ladder, draws)
+        return heard[-1]["proposal"]
+
+    monkeypatch.setattr(module, "diagnose", diagnose)
+    monkeypatch.setattr(module, "propose", propose)
+    return heard
+
+
+@pytest.fixture
+def folder(kuka, tmp_path):
+    return made_folder(tmp_path / "case_1", kuka, "case_1", holdout={"poses": [2, 5]})
+
+
+def test_no_held_out_pose_reaches_the_diagnosis_from_which_poses_are_proposed(asked, folder, config_folder):
+    proposed(folder, config_folder / "robots", 3, (0.0, 1.0), 4)
+    everything = read_campaign(folder, config_folder / "robots").measurements
+    seen = set(asked[0]["case"].observations.states.pose.tolist())
+    assert seen == set(everything.pose.tolist()) - {2, 5}
+    assert asked[0]["diagnosis seed"] == 4 and asked[0]["diagnosis"] == "diagnosis"
+
+
+def test_as_many_poses_as_wanted_are_looked_for_within_the_joint_limits_on_the_given_ladder(asked, folder, config_folder, kuka):
+    table = proposed(folder, config_folder / "robots", 3, (0.0, 1.0, -0.5), 4)
+    np.testing.assert_array_equal(asked[0]["limits"], kuka.joint_limits)
+    assert asked[0]["ladder"] == (0.0, 1.0, -0.5) and len(table) == 3
+
+
+def test_the_table_has_angles_as_the_controller_reports_them_and_the_loads(asked, folder, config_folder, kuka):
+    table = proposed(folder, config_folder / "robots", 3, (0.0, 1.0), 4)
+    angles = table[[f"q{joint}" for joint in range(1, 7)]].to_numpy()
+    np.testing.assert_allclose(angles, kuka.reported_angles(asked[0]["proposal"].joint_angles))
+    assert table.fz.tolist() == [-500.0] * 3 and table.effect.tolist() == ["a or b"] * 3
+
+
+def test_poses_follow_from_the_seed_and_differ_between_campaigns(asked, folder, config_folder, kuka, tmp_path):
+    other = made_folder(tmp_path / "case_2", kuka, "case_2")
+    first, again, seed, name = (
+        proposed(where, config_folder / "robots", 2, (0.0, 1.0), seed).q1.tolist()
+        for where, seed in ((folder, 4), (folder, 4), (folder, 5), (other, 4))
+    )
+    assert first == again
+    assert first != seed and first != name
+
+
+def test_where_nothing_is_ambiguous_the_table_has_its_columns_and_no_row(asked, folder, config_folder, monkeypatch):
+    monkeypatch.setattr(module, "propose", lambda *arguments: without_poses(6, ("a",), (), "nothing is missing"))
+    table = proposed(folder, config_folder / "robots", 3, (0.0, 1.0), 4)
+    assert table.empty and {"pose", "q6", "fz", "separation"} <= set(table)

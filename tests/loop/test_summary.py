@@ -1,0 +1,121 @@
+"""All campaigns on one page: rows, counted verdicts, and errors by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_loop_tables import residual_table
+from scipy.stats import t as student
+
+from elastocal.loop.summary import campaign_rows
+
+
+def verdict(word, *effects):
+    return {"verdict": word, "effects": [{"name": name, "joints": list(joints)} for name, joints in effects]}
+
+
+def errors(before, after=None, pose=None, repeat=None, session=0):
+    """Held-out rows with errors along x of so many millimetres."""
+    before = np.asarray(before, float)
+    after = before if after is None else np.asarray(after, float)
+    count = len(before)
+    table = {
+        "session": np.full(count, session),
+        "pose": np.arange(count) if pose is None else pose,
+        "load": 0,
+        "target": 0,
+        "repeat": np.zeros(count, int) if repeat is None else repeat,
+    }
+    for stage, values in (("before", before), ("after", after)):
+        table |= {f"{stage}_dx": 1e-3 * values, f"{stage}_dy": 0.0, f"{stage}_dz": 0.0}
+    return pd.DataFrame(table)
+
+
+def rows_of(**residuals):
+    return campaign_rows({name: verdict("named") for name in residuals}, residuals, {}, 1)
+
+
+def test_errors_are_distances_in_millimetres_before_and_after():
+    row = rows_of(one=errors([1.0, -2.0, 3.0], [0.1, 0.1, -0.4])).iloc[0]
+    assert (row.campaign, row.session, row.poses) == ("one", 0, 3)
+    assert (row.before_mean_mm, row.before_rms_mm, row.before_max_mm) == pytest.approx((2.0, np.sqrt(14 / 3), 3.0))
+    assert row.before_p95_mm == pytest.approx(2.9)
+    assert (row.after_mean_mm, row.after_rms_mm, row.after_max_mm) == pytest.approx((0.2, np.sqrt(0.06), 0.4))
+
+
+def test_all_three_axes_make_one_distance():
+    table = errors([1.0, 1.0])
+    table["before_dy"], table["before_dz"] = 2e-3, -2e-3
+    assert rows_of(one=table).before_rms_mm[0] == pytest.approx(3.0)
+
+
+def test_repeats_of_a_state_are_averaged_before_their_error_is_taken():
+    # Noise that cancels between repeats is gone; the mean of 1.5 and -0.5 is left.
+    table = errors([1.5, -0.5, 0.25], pose=[4, 4, 7], repeat=[0, 1, 0])
+    row = rows_of(one=table).iloc[0]
+    assert row.poses == 2 and row.before_mean_mm == pytest.approx(0.375) and row.before_max_mm == pytest.approx(0.5)
+
+
+def test_loads_and_targets_of_a_pose_are_measurements_of_their_own():
+    table = errors([1.0, 3.0, 5.0, 7.0], pose=[2, 2, 2, 2])
+    table["load"], table["target"] = [0, 0, 1, 1], [0, 1, 0, 1]
+    assert rows_of(one=table).before_mean_mm[0] == pytest.approx(4.0)
+
+
+def test_each_session_has_a_row_of_its_own():
+    both = pd.concat([errors([1.0, 1.0], session=0), errors([3.0, 3.0], session=5)])
+    table = rows_of(one=both, other=errors([2.0, 2.0]))
+    assert list(zip(table.campaign, table.session, table.before_rms_mm.round(9), strict=True)) == [
+        ("one", 0, 1.0),
+        ("one", 5, 3.0),
+        ("other", 0, 2.0),
+    ]
+
+
+def test_folds_of_one_campaign_are_one_row_with_all_their_poses_and_counted_verdicts():
+    verdicts = {
+        "fold 1": verdict("named", ("joint_offset", (3,))),
+        "alone": verdict("adequate"),
+        "fold 2": verdict("class", ("joint_offset", (3,)), ("payload", ())),
+        "fold 3": verdict("named", ("joint_offset", (3,))),
+    }
+    residuals = {name: errors([1.0 + k, 1.0 + k], pose=[2 * k, 2 * k + 1]) for k, name in enumerate(verdicts)}
+    table = campaign_rows(verdicts, residuals, {"all folds": ["fold 1", "fold 2", "fold 3"]}, 1).set_index("campaign")
+    assert list(table.index) == ["alone", "all folds"]
+    folded = table.loc["all folds"]
+    assert folded.poses == 6 and folded.before_mean_mm == pytest.approx((1 + 3 + 4) / 3)
+    assert folded.verdict == "2 of 3: named; 1 of 3: class"
+    assert folded.effects == "2 of 3: joint_offset (joint 3); 1 of 3: joint_offset (joint 3) + payload"
+    assert (table.verdict["alone"], table.effects["alone"]) == ("adequate", "none")
+
+
+def test_an_effect_of_several_joints_names_them_all():
+    verdicts = {"one": verdict("named", ("cross_compliance", (2, 3)))}
+    assert campaign_rows(verdicts, {"one": errors([1.0, 1.0])}, {}, 1).effects[0] == "cross_compliance (joint 2, 3)"
+
+
+def test_with_three_poses_the_interval_of_the_rms_is_students_on_the_logarithm():
+    # Mean squares 1, 4, 9 of the poses; the error of the logarithm of their mean by leaving out one pose.
+    row = rows_of(one=errors([1.0, 2.0, 3.0])).iloc[0]
+    left = np.log([13 / 2, 10 / 2, 5 / 2])
+    error = np.sqrt(2 / 3 * ((left - left.mean()) ** 2).sum())
+    reach = np.exp(0.5 * student.ppf(0.975, 2) * error)
+    rms = np.sqrt(14 / 3)
+    assert (row.before_rms_low_mm, row.before_rms_high_mm) == pytest.approx((rms / reach, rms * reach))
+
+
+def test_an_error_that_halves_everywhere_is_a_reduction_of_a_half_without_an_interval_around_it():
+    before = np.array([1.0, 2.0, 0.5, 1.5, 3.0, 2.5, 1.0, 0.8])
+    row = rows_of(one=errors(before, 0.5 * before)).iloc[0]
+    assert (row.rms_reduction_low, row.rms_reduction_high) == pytest.approx((0.5, 0.5))
+
+
+def test_intervals_follow_from_the_seed_and_hold_the_figures():
+    held_out = pd.DataFrame(residual_table(poses=30))
+    held_out = held_out[held_out.held_out]
+    one, again, other = (campaign_rows({"a": verdict("named")}, {"a": held_out}, {}, seed) for seed in (1, 1, 2))
+    pd.testing.assert_frame_equal(one, again)
+    assert one.before_rms_low_mm[0] != other.before_rms_low_mm[0]
+    row = one.iloc[0]
+    for stage in ("before", "after"):
+        assert row[f"{stage}_rms_low_mm"] < row[f"{stage}_rms_mm"] < row[f"{stage}_rms_high_mm"]
+    assert row.rms_reduction_low < 1 - row.after_rms_mm / row.before_rms_mm < row.rms_reduction_high
