@@ -1,20 +1,16 @@
 """A diagnosis as files and back: one writer, one reader, and the same verdict from either."""
 
 import json
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from made_folders import PLAN, made_folder, made_table
-from planted import planted
 
 from elastocal.diagnosis.confounding import angles_between
-from elastocal.diagnosis.diagnose import _effect_steps, diagnose
+from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
-from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.next_experiment import propose
-from elastocal.diagnosis.refit import fit_with_sizes, selected
-from elastocal.diagnosis.search import initial_screening, posterior
+from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
@@ -90,38 +86,6 @@ def test_an_effect_that_is_expected_to_help_is_adopted(found):
     assert [entry["adopted"] for entry in diagnosis.document["effects"]] == [True]
     assert [step.kind for step in diagnosis.steps] == ["frames", "declared", "effect"]
     assert not any("stays as declared" in warning for warning in diagnosis.document["warnings"])
-
-
-@pytest.mark.parametrize(
-    ("most", "steps"),
-    [
-        (4, ["transmission_harmonic", "joint_offset", "payload"]),
-        (3, ["transmission_harmonic", "joint_offset", "payload"]),
-        (2, ["transmission_harmonic", "2 further effects"]),
-    ],
-)
-def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_many_the_rest_together(kuka, most, steps):
-    """A wave, a smaller offset and a still smaller payload; the last step is the final model, and each has those before it."""
-    sizes = {"payload": [5.0, 0, 0, 0], "transmission_harmonic@2[orders 1-2]": [0, 0, 1e-3, 0], "joint_offset@3": [6e-4]}
-    campaign = planted(kuka, sizes, seed=1, poses=40)
-    candidates = [campaign.candidates[key] for key in sizes]
-    line = linearized(campaign.declared, campaign.observations, candidates, Settings())
-    names, met = {key.split("@")[0] for key in sizes}, posterior(line.problem)
-    mechanisms = [{line.problem.units[number].mechanism for number in model.units} for model in met.models]
-    best = SimpleNamespace(named=tuple(sorted(names)), model=mechanisms.index(names))
-    found = SimpleNamespace(linearized=line, posterior=met, conclusion=SimpleNamespace(best=best))
-    chosen = selected(line, met.models[best.model])
-    final = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, chosen)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("elastocal.diagnosis.diagnose._MOST_STEPS", most)
-        case = SimpleNamespace(observations=campaign.observations)
-        made = _effect_steps(case, campaign.declared, final, found)
-    assert [step.name for step in made] == [f"+ {name}" for name in steps] and made[-1].fitted is final
-    known = len(campaign.declared.model.effects)
-    counts = [len(step.fitted.model.effects) - known for step in made]
-    assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])
-    misfit = [(step.fitted.whitened(step.fitted.residual) ** 2).sum() for step in made]
-    assert misfit == sorted(misfit, reverse=True)
 
 
 @pytest.mark.parametrize("kind", ["found", "faulty"])

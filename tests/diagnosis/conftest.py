@@ -1,0 +1,21 @@
+"""Fixtures: a campaign that two mechanisms explain, and the next experiment that is proposed for it."""
+
+import numpy as np
+import pytest
+from open_alternatives import ELASTIC, LADDER, SETTINGS, diagnosed, keys_like, limits
+from planted import planted, two_loads_a_pose
+
+from elastocal.diagnosis.next_experiment import propose
+
+
+@pytest.fixture(scope="session")
+def ambiguous(kuka):
+    """A nonlinear link in eight poses, which the tilt of a joint explains as well."""
+    states = two_loads_a_pose(6, 8, (5, 3), 1500.0)
+    campaign = planted(kuka, {"link_elasticity@2": (3e-8, 3e-8)}, seed=3, poses=8, states=states)
+    return diagnosed(campaign, kuka, keys_like(campaign, *ELASTIC)), campaign
+
+
+@pytest.fixture(scope="session")
+def proposal(ambiguous, kuka):
+    return propose(ambiguous[0], limits(kuka), SETTINGS, np.random.default_rng(0), 10, LADDER)

@@ -1,0 +1,241 @@
+"""What training poses say of a campaign: noise, faults, effects one at a time, and the figures of the verdict."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from made_folders import PLAN, made_folder, made_table
+from planted import planted
+from scipy.stats import chi2
+
+from elastocal.data_checks.protocol import Fault
+from elastocal.diagnosis import diagnose as module
+from elastocal.diagnosis.diagnose import _effect_steps, _noise_warnings, _pose_error_warnings, diagnose
+from elastocal.diagnosis.linearize import linearized
+from elastocal.diagnosis.refit import fit_with_sizes, selected
+from elastocal.diagnosis.search import posterior
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.noise import Noise
+from elastocal.loop.whole import cases_in
+
+OFFSET = 1e-3
+
+
+@pytest.fixture(scope="module")
+def diagnosed(kuka, config_folder, tmp_path_factory):
+    """Diagnoses by the noise that is declared, m, of measurements that scatter by 60 um without repeats."""
+    found = {}
+    for declared_m in (6e-5, 1e-6):
+        folder = tmp_path_factory.mktemp("noise") / "made"
+        table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=OFFSET)
+        first = [repeat == 0 for repeat in table["repeat"]]
+        table = {name: [value for value, kept in zip(values, first, strict=True) if kept] for name, values in table.items()}
+        changes = {"noise": {"position_m": declared_m}, "declared": ["link_geometry"]}
+        case, _ = cases_in(made_folder(folder, kuka, table=table, **changes), config_folder / "robots")
+        found[declared_m] = diagnose(case, Settings(), 1)
+    return found
+
+
+def test_the_problem_is_whitened_by_the_noise_that_is_there(diagnosed):
+    rows = [diagnosed[level].evidence.linearized for level in (6e-5, 1e-6)]
+    assert rows[0].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
+    assert rows[1].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
+
+
+def test_sizes_and_verdict_do_not_follow_the_noise_that_was_declared(diagnosed):
+    right, wrong = diagnosed[6e-5], diagnosed[1e-6]
+    assert right.evidence.linearized.declared_size == wrong.evidence.linearized.declared_size
+    # The wrong zero of a joint is a wrong geometry of its link, which is declared.
+    assert right.document["verdict"] == wrong.document["verdict"] == "adequate"
+    assert right.document["noise"]["factor"] == pytest.approx(1.0, abs=0.3)
+    assert wrong.document["noise"]["factor"] == pytest.approx(60.0, rel=0.3)
+    errors = [np.sqrt(np.diag(each.final.covariance)) for each in (right, wrong)]
+    np.testing.assert_allclose(errors[0], errors[1], rtol=0.35)
+    assert right.final.converged and wrong.final.converged
+
+
+def test_noise_that_is_far_too_small_is_a_warning(diagnosed):
+    told = [[line for line in diagnosed[level].document["warnings"] if "scatter" in line] for level in (6e-5, 1e-6)]
+    assert not told[0] and len(told[1]) == 1
+    assert "the noise that is declared" in told[1][0]
+
+
+@pytest.mark.parametrize("error_rad", [0.0, 3e-4])
+def test_an_error_that_all_measurements_of_a_pose_share_is_noise_of_the_model_and_said(
+    error_rad, kuka, config_folder, tmp_path
+):
+    """Joints that stand otherwise in each pose than they report, by the same in all of its measurements."""
+    table = made_table(kuka, "made", plan=replace(PLAN, poses=40))
+    drawn = error_rad * np.random.default_rng(3).standard_normal((max(table["pose"]) + 1, 6))
+    table |= {f"q{joint}": table[f"q{joint}"] + drawn[table["pose"], joint - 1] for joint in range(1, 7)}
+    case, _ = cases_in(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    found = diagnose(case, Settings(), 1)
+    said = [line for line in found.document["warnings"] if "err together" in line]
+    assert found.document["verdict"] == "adequate"
+    assert len(said) == (error_rad > 0)
+    # To the steps of its grid, of which neighbours differ by a factor of two.
+    assert found.final.noise.pose_rad == pytest.approx(error_rad, rel=0.8)
+    assert found.document["noise"]["pose_rad"] == found.final.noise.pose_rad
+
+
+@pytest.fixture(scope="module")
+def case(kuka, config_folder, tmp_path_factory):
+    """A robot whose joint 3 stands 1 mrad beyond what it reports; a load that is nowhere but at the last point."""
+    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
+    folder = made_folder(tmp_path_factory.mktemp("diagnose") / "made", kuka, table=table)
+    return cases_in(folder, config_folder / "robots")[0]
+
+
+@pytest.fixture(scope="module")
+def found(case):
+    """Its diagnosis with every seventh candidate and that of the offset, and what was reported on the way."""
+    few = dict(list(case.candidates.items())[::7]) | {"joint_offset@3": case.candidates["joint_offset@3"]}
+    lines = []
+    return diagnose(replace(case, candidates=few), Settings(), 1, lines.append), lines
+
+
+def test_progress_has_the_measurements_first_and_then_the_verdict_of_each_linearisation(found, case):
+    diagnosis, lines = found
+    assert lines[0] == f"declared model fitted to {len(case.observations)} measurements"
+    facts = diagnosis.document["probabilities"]
+    best = facts["sets"][0]["probability"]
+    expected = f"named: joint_offset, probability {best:.2f}, alarm p {facts['alarm_p_value']:.3f}"
+    assert lines[-1] == expected and 2 <= len(lines) <= 1 + Settings().linearizations
+
+
+def test_steps_go_from_the_frames_alone_to_the_springs_to_the_effect(found):
+    """Springs are declared as to be identified; the frame is the base, so that the first step has nothing to fit."""
+    diagnosis, _ = found
+    effects = [[effect.key for effect in step.fitted.model.effects] for step in diagnosis.steps]
+    springs = [key for key in effects[1] if key.startswith("joint_compliance")]
+    assert effects == [[], springs, [*springs, "joint_offset@3"]] and len(springs) == 1
+    assert diagnosis.declared is diagnosis.steps[1].fitted and diagnosis.final is diagnosis.steps[2].fitted
+    size = diagnosis.final.estimate.coefficients[-1][0]
+    assert size == pytest.approx(OFFSET, abs=4 * np.sqrt(diagnosis.final.covariance[-1, -1]))
+
+
+def test_the_misfit_falls_to_that_of_the_noise(found):
+    """To a mean square of one, but for chance: 0.1 % each side, and twice the noise is seen with a power above 0.99.
+
+    Before, errors that all measurements of a pose share bear most of the offset, but not all of it.
+    """
+    diagnosis, _ = found
+    misfit, freedom = diagnosis.document["misfit"], diagnosis.evidence.linearized.products.freedom
+    low, high = chi2.ppf([1e-3, 1 - 1e-3], freedom) / freedom
+    assert chi2.sf(freedom * high / 4, freedom) > 0.99
+    assert low < misfit["after"] < high and misfit["before"] > misfit["after"] + 0.2
+
+
+def test_every_candidate_is_tested_or_has_a_reason(found):
+    diagnosis, _ = found
+    document, evidence = diagnosis.document, diagnosis.evidence.linearized
+    tested = {unit.candidate.key for unit in evidence.problem.units if unit.candidate}
+    assert document["candidates_tested"] == len(tested)
+    assert tested | set(document["untestable"]) == set(diagnosis.case.candidates)
+    assert not tested & set(document["untestable"]) and all(document["untestable"].values())
+
+
+def test_compliances_before_and_after_are_those_of_the_fits_in_microradians(found):
+    diagnosis, _ = found
+    facts = diagnosis.document["compliance_urad_per_Nm"]
+    declared, final = diagnosis.declared, diagnosis.final
+    np.testing.assert_allclose(facts["before"], 1e6 * joint_compliances(declared.model, declared.estimate))
+    error = np.array(facts["std_error"])
+    # What is averaged over the models is within its own standard error of the one that is fitted.
+    after = 1e6 * joint_compliances(final.model, final.estimate)
+    assert (np.abs(facts["after"] - after) <= error).all() and (error > 0).all()
+
+
+def test_held_parameters_are_named_with_their_owners(found):
+    diagnosis, _ = found
+    final = diagnosis.final
+    names = {f"{owner} {parameter.name}" for owner, parameter in final.parameters}
+    held = diagnosis.document["held"]
+    assert len(held) == final.held.sum() and set(held) <= names and held == sorted(held)
+
+
+def faults(*decisive):
+    return [Fault(f"fault_{n}", (), "as measured", (), (1.0, 1.0), (), one) for n, one in enumerate(decisive)]
+
+
+@pytest.mark.parametrize(
+    ("decisive", "verdict", "names"),
+    [((True,), "named", ["fault_0"]), ((True, False, True), "several", ["fault_0", "fault_2"])],
+)
+def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive, verdict, names, case, monkeypatch):
+    monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(*decisive))
+    monkeypatch.setattr(module, "_explained", None)
+    diagnosis = diagnose(case, Settings(), 1)
+    document = diagnosis.document
+    assert diagnosis.evidence is None and diagnosis.final is diagnosis.declared
+    assert document["verdict"] == verdict and [entry["name"] for entry in document["effects"]] == names
+    assert (document["probabilities"], document["misfit"], document["candidates_tested"]) == (None, None, 0)
+    # What is not decisive is a warning, and nothing else is.
+    minor = [line for line in document["warnings"] if line.startswith("fault_")]
+    assert minor == [f"fault_{n}: as measured" for n, is_decisive in enumerate(decisive) if not is_decisive]
+
+
+def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
+    monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
+    fitted = module.fit
+    monkeypatch.setattr(module, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
+    document = diagnose(case, Settings(), 1).document
+    assert document["converged"] == {"declared": False, "final": False}
+    assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [
+        "the fit of the declared model",
+        "the fit of the final model",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("factor", "source", "words"),
+    [
+        (1.49, "repeats", None),
+        (2.04, "repeats", "2.0 times as much as their repeats about each other"),
+        (11.6, "declared", "12 times as much as the noise that is declared for them"),
+    ],
+)
+def test_noise_that_is_much_larger_than_it_was_taken_is_a_warning_from_one_and_a_half_times_on(factor, source, words):
+    taken = Noise(source, 6e-5, 6e-5, np.zeros(6))
+    found = _noise_warnings(taken, taken.scaled(factor), Settings())
+    assert found == ([f"measurements scatter about the model {words}"] if words else [])
+
+
+def test_a_pose_error_is_a_warning_from_the_size_that_repeats_of_a_pose_could_show():
+    noise, line = Noise("declared", 6e-5, 6e-5, np.zeros(6)), SimpleNamespace(pose_std_error_rad=2e-5)
+    below, above = (_pose_error_warnings(replace(noise, pose_rad=size), line) for size in (1.9e-5, 3.4e-5))
+    assert below == [] and len(above) == 1 and "every joint were 34 µrad off" in above[0]
+
+
+@pytest.mark.parametrize(
+    ("most", "steps"),
+    [
+        (4, ["transmission_harmonic", "joint_offset", "payload"]),
+        (3, ["transmission_harmonic", "joint_offset", "payload"]),
+        (2, ["transmission_harmonic", "2 further effects"]),
+    ],
+)
+def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_many_the_rest_together(kuka, most, steps):
+    """A wave, a smaller offset and a still smaller payload; the last step is the final model, and each has those before it."""
+    sizes = {"payload": [5.0, 0, 0, 0], "transmission_harmonic@2[orders 1-2]": [0, 0, 1e-3, 0], "joint_offset@3": [6e-4]}
+    campaign = planted(kuka, sizes, seed=1, poses=40)
+    candidates = [campaign.candidates[key] for key in sizes]
+    line = linearized(campaign.declared, campaign.observations, candidates, Settings())
+    names, met = {key.split("@")[0] for key in sizes}, posterior(line.problem)
+    mechanisms = [{line.problem.units[number].mechanism for number in model.units} for model in met.models]
+    best = SimpleNamespace(named=tuple(sorted(names)), model=mechanisms.index(names))
+    found = SimpleNamespace(linearized=line, posterior=met, conclusion=SimpleNamespace(best=best))
+    chosen = selected(line, met.models[best.model])
+    final = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, chosen)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("elastocal.diagnosis.diagnose._MOST_STEPS", most)
+        case = SimpleNamespace(observations=campaign.observations)
+        made = _effect_steps(case, campaign.declared, final, found)
+    assert [step.name for step in made] == [f"+ {name}" for name in steps] and made[-1].fitted is final
+    known = len(campaign.declared.model.effects)
+    counts = [len(step.fitted.model.effects) - known for step in made]
+    assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])
+    misfit = [(step.fitted.whitened(step.fitted.residual) ** 2).sum() for step in made]
+    assert misfit == sorted(misfit, reverse=True)
