@@ -1,0 +1,59 @@
+"""The pages of the study's report compile from its facts and tables, with the robots that were studied."""
+
+import shutil
+
+import pytest
+import typst
+from made_study_tables import facts
+
+from elastocal.figures.style import panels
+from elastocal.report.pages import write_report
+
+FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
+FIGURES += ["scores_against_paper"]
+HEAD = {
+    "table1": ["robot", "c1"],
+    "table2": ["robot", "mean mm"],
+    "table3": ["robot", "c1"],
+    "table4": [f"n {k}" for k in range(8)],
+}
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("figures")
+    panels(1, 1, 20)[0].savefig(folder / "empty.pdf")
+    for name in FIGURES:
+        shutil.copy(folder / "empty.pdf", folder / f"{name}.pdf")
+    return [f"{folder}/{name}.pdf" for name in FIGURES]
+
+
+def tables(figures):
+    return {name: [head, ["1.0 ± 0.1"] * len(head)] for name, head in HEAD.items()} | {"figures": figures}
+
+
+def test_the_report_is_a_pdf_that_the_same_facts_give_again(pictures, tmp_path):
+    for name in "ab":
+        write_report(tmp_path / f"{name}.pdf", facts(), tables(FIGURES), pictures)
+    assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
+    assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+
+
+def test_a_figure_that_the_study_has_must_be_given(pictures, tmp_path):
+    with pytest.raises(typst.TypstError, match="fig5d"):
+        write_report(tmp_path / "study.pdf", facts(), tables([*FIGURES, "fig5d"]), pictures)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_fact_is_an_error_and_no_blank(pictures, tmp_path):
+    known = facts()
+    del known["within_percent"]
+    with pytest.raises(typst.TypstError, match="within_percent"):
+        write_report(tmp_path / "study.pdf", known, tables(FIGURES), pictures)
+    assert not list(tmp_path.iterdir())
+
+
+def test_facts_of_the_report_are_json_without_nan(tmp_path):
+    with pytest.raises(ValueError, match="JSON"):
+        write_report(tmp_path / "study.pdf", {"x": float("nan")}, {}, [])
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,69 @@
+"""A document compiles with the data and pictures that it reads, and its PDF appears whole or not at all."""
+
+from importlib import resources
+
+import pytest
+import typst
+
+from elastocal.figures.style import panels
+from elastocal.report.typesetting import compile_document
+
+DOCUMENT = """#set document(date: none)
+#let facts = json("facts.json")
+#let other = json("other.json")
+#assert.eq(facts, ("name": "Übermaß µ", "rows": ((1, 2.5), (none, true))))
+#assert.eq(other, "x")
+#facts.name #image("picture.pdf")
+"""
+DATA = {"facts": {"name": "Übermaß µ", "rows": [[1, 2.5], [None, True]]}, "other": "x"}
+
+
+@pytest.fixture
+def written(tmp_path, monkeypatch):
+    """Folder of the results; documents stand in a folder beside it."""
+    documents, results = tmp_path / "documents", tmp_path / "results"
+    documents.mkdir()
+    results.mkdir()
+    monkeypatch.setattr(resources, "files", {"elastocal.report": documents}.__getitem__)
+    (documents / "made.typ").write_text(DOCUMENT, encoding="utf-8")
+    (documents / "broken.typ").write_text("#nothing-of-this-name", encoding="utf-8")
+    return results
+
+
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory):
+    path = tmp_path_factory.mktemp("figures") / "picture.pdf"
+    panels(1, 1, 20)[0].savefig(path)
+    return path.as_posix()
+
+
+def test_a_document_reads_its_data_and_pictures_as_they_were_given(written, picture):
+    compile_document(written / "made.pdf", "made.typ", DATA, [picture])
+    assert (written / "made.pdf").read_bytes().startswith(b"%PDF")
+    assert [file.name for file in written.iterdir()] == ["made.pdf"]
+
+
+def test_the_same_data_give_the_same_bytes(written, picture):
+    for name in "ab":
+        compile_document(written / f"{name}.pdf", "made.typ", DATA, [picture])
+    assert (written / "a.pdf").read_bytes() == (written / "b.pdf").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "document, data, pictures, error, message",
+    [
+        ("made.typ", {"facts": float("nan")}, [], ValueError, "JSON"),
+        ("made.typ", {"facts": float("inf")}, [], ValueError, "JSON"),
+        ("made.typ", DATA, ["missing.pdf"], FileNotFoundError, "missing.pdf"),
+        ("made.typ", DATA, [], typst.TypstError, "picture.pdf"),
+        ("broken.typ", {}, [], typst.TypstError, "nothing-of-this-name"),
+        ("unknown.typ", {}, [], FileNotFoundError, "unknown.typ"),
+    ],
+    ids=["not a number", "infinite", "no such picture", "picture not given", "broken document", "no such document"],
+)
+def test_what_cannot_be_compiled_leaves_the_earlier_pdf_as_it_was(written, document, data, pictures, error, message):
+    (written / "report.pdf").write_text("earlier", encoding="utf-8")
+    with pytest.raises(error, match=message):
+        compile_document(written / "report.pdf", document, data, pictures)
+    assert [file.name for file in written.iterdir()] == ["report.pdf"]
+    assert (written / "report.pdf").read_text(encoding="utf-8") == "earlier"
