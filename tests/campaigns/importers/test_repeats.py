@@ -35,6 +35,12 @@ def test_a_chain_of_near_rows_is_one_pose():
     assert pose.tolist() == [0, 1, 0, 0] and repeat.tolist() == [0, 0, 1, 2]
 
 
+def test_repeats_among_many_rows_keep_their_order():
+    pose, repeat = pose_and_repeat(np.random.default_rng(1).integers(0, 3, (2000, 1)).astype(float))
+    for number in range(3):
+        assert repeat[pose == number].tolist() == list(range((pose == number).sum()))
+
+
 def test_one_row_is_one_pose():
     assert [part.tolist() for part in pose_and_repeat(np.zeros((1, 6)))] == [[0], [0]]
 

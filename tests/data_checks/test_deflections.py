@@ -1,0 +1,264 @@
+"""Deflections beside what the loads should have made of them, the unit that explains them, and states of each pose."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_campaigns import POINTS, Plan, made
+from support import PinocchioPoint
+
+from elastocal.data_checks.deflections import (
+    UNITS,
+    Deflections,
+    StateDeflections,
+    deflections,
+    state_deflections,
+    unit_of_loads,
+)
+
+EXACT = Plan(poses=6, loads=2, noise=0.0)
+JOINTS = 6
+
+
+@pytest.fixture(scope="module")
+def campaign(fanuc):
+    return made(fanuc, 1, EXACT)
+
+
+def expected_parts(robot, seen, part):
+    """Deflection of each target by each joint at nominal compliance from forces or moments alone, ndarray (N, 3, n)."""
+    end = PinocchioPoint(robot.chain, robot.chain.end_effector)
+    points = [PinocchioPoint(robot.chain, robot.chain.point(name)) for name in POINTS]
+    parts = []
+    for q, wrench, target in zip(seen.joint_angles, seen.wrench, seen.target, strict=True):
+        torques = end.pose_and_jacobian(q)[2][part].T @ wrench[part]
+        parts.append(points[target].pose_and_jacobian(q)[2][:3] * torques * robot.compliance)
+    return np.array(parts)
+
+
+def less_group_means(values, *keys):
+    group = np.unique(np.column_stack(keys), axis=0, return_inverse=True)[1].ravel()
+    return np.array([value - values[group == number].mean(axis=0) for value, number in zip(values, group, strict=True)])
+
+
+def test_deflections_are_those_of_each_joint_by_pinocchio_less_the_mean_of_target_and_pose(fanuc, campaign):
+    seen = campaign.measurements
+    found = deflections(campaign, seen)
+    assert found.poses == 6 and found.seen.shape == (3 * len(seen),)
+    for by, part in ((found.by_force, slice(0, 3)), (found.by_moment, slice(3, 6))):
+        expected = less_group_means(expected_parts(fanuc, seen, part), seen.pose, seen.target)
+        np.testing.assert_allclose(by.reshape(-1, 3, JOINTS), expected, rtol=0, atol=1e-12)
+    # Second order in turns of some milliradians over metres.
+    np.testing.assert_allclose(found.seen, (found.by_force + found.by_moment).sum(axis=1), rtol=0, atol=2e-4)
+    assert np.abs(found.seen).max() > 1e-3
+
+
+def test_a_frame_and_targets_that_nobody_knows_leave_the_same_deflections(fanuc, campaign):
+    tracked = made(fanuc, 1, replace(EXACT, tracker=True, poses=20))
+    found = deflections(tracked, tracked.measurements)
+    expected = (found.by_force + found.by_moment).sum(axis=1)
+    assert np.corrcoef(found.seen, expected)[0, 1] > 0.99 and np.abs(found.seen - expected).max() < 0.1 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("loaded_only", [False, True])
+def test_joints_off_their_zeros_leave_no_trace_in_the_deflections(fanuc, loaded_only):
+    """As means of a pose, or by projection where each pose has one load."""
+    plan = Plan(poses=40, loads=1, noise=0.0)
+    straight, off = (made(fanuc, 1, plan, true_offset=offset) for offset in (0.0, 2e-3 * np.array([1, -1, 1, -1, 1, -1])))
+    kept = straight.measurements.load >= loaded_only
+    assert np.linalg.norm(off.measurements.position - straight.measurements.position, axis=1).max() > 3e-3
+    one, other = (deflections(each, each.measurements.select(kept)) for each in (straight, off))
+    # What is left is of second order: two milliradians of every deflection.
+    assert np.abs(other.seen - one.seen).max() < 0.02 * np.abs(one.seen).max()
+
+
+def test_where_a_pose_has_one_load_nothing_that_joint_offsets_make_is_left(fanuc):
+    plan = Plan(poses=30, loads=1, noise=0.0)
+    campaign = made(fanuc, 1, plan)
+    seen = campaign.measurements.select(campaign.measurements.load > 0)
+    found = deflections(campaign, seen)
+    points = [PinocchioPoint(fanuc.chain, fanuc.chain.point(name)) for name in POINTS]
+    pairs = zip(seen.joint_angles, seen.target, strict=True)
+    offsets = np.concatenate([points[target].pose_and_jacobian(q)[2][:3] for q, target in pairs])
+    for values in (found.seen[:, None], found.by_force, found.by_moment):
+        size = np.linalg.norm(values) * np.linalg.norm(offsets)
+        np.testing.assert_allclose(offsets.T @ values / size, 0.0, atol=1e-12)
+    # Lovell: what the rest tells of the compliances is what all columns together tell.
+    whole = np.concatenate([expected_parts(fanuc, seen, slice(0, 6)).reshape(-1, JOINTS), offsets], axis=1)
+    pairs = zip(seen.joint_angles, seen.target, strict=True)
+    nominal = np.concatenate([points[target].pose_and_jacobian(q)[0] for q, target in pairs])
+    together = np.linalg.lstsq(whole, seen.position.ravel() - nominal, rcond=None)[0][:JOINTS]
+    alone = np.linalg.lstsq(found.by_force + found.by_moment, found.seen, rcond=None)[0]
+    np.testing.assert_allclose(alone, together, rtol=1e-6, atol=1e-9)
+
+
+def test_moments_alone_deflect_by_moments_alone(campaign):
+    wrench = campaign.measurements.wrench * np.repeat([0.0, 1.0], 3)
+    found = deflections(campaign, replace(campaign.measurements, wrench=wrench))
+    assert not found.by_force.any() and np.abs(found.by_moment).max() > 1e-6
+
+
+def test_nothing_is_said_without_loads_or_with_too_few_poses(campaign):
+    seen = campaign.measurements
+    assert deflections(campaign, replace(seen, wrench=0.0 * seen.wrench)) is None
+    assert deflections(campaign, seen.select(seen.pose < 3)) is None
+    assert deflections(campaign, seen.select(seen.pose < 4)) is not None
+
+
+def made_deflections(sign=1.0, force=1.0, moment=1.0, ratios=1.0, noise=1e-5, seed=1):
+    """Forces and moments that deflect alike, seen as loads in another unit make them seen."""
+    rng = np.random.default_rng(seed)
+    by_force, by_moment = 1e-3 * rng.standard_normal((2, 450, JOINTS))
+    made_by = force * by_force + moment * by_moment
+    scale = np.abs(made_by).max()
+    seen = sign * made_by @ (ratios * np.ones(JOINTS)) + noise * scale / 1e-3 * rng.standard_normal(450)
+    return Deflections(seen, by_force, by_moment, 75)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: f"{unit.force:.3g}-{unit.moment:.3g}")
+def test_every_unit_and_sign_is_found_by_what_it_makes_of_the_deflections(sign, unit):
+    deflected = made_deflections(sign, unit.force, unit.moment)
+    found = unit_of_loads(deflected)
+    if sign > 0 and not unit.detail:
+        # Newtons and newton metres as they should be.
+        assert found is None
+        return
+    assert (found.sign, found.unit) == (sign, unit)
+    # Forces and moments deflect alike here, so that the slope is the mean of their factors.
+    alike = unit.force == unit.moment
+    assert found.slope == pytest.approx(sign * (unit.force + unit.moment) / 2, rel=0.01 if alike else 0.1)
+    as_written = (deflected.by_force + deflected.by_moment).sum(axis=1)
+    assert found.rms_as_written == pytest.approx(np.std(deflected.seen - as_written), rel=0.02)
+    assert found.rms_corrected < 0.1 * found.rms_as_written
+
+
+@pytest.mark.parametrize(
+    "ratios",
+    [1.0, 0.5, 2.0, 3.0, 9.8 * np.array([1.0, 3.0, 0.4, 1.0, 2.5, 0.5]), 9.8 * np.array([1.0, -1.0, 1.0, 1.0, -1.0, 1.0])],
+    ids=str,
+)
+def test_no_unit_is_found_for_compliances_that_are_only_off(ratios):
+    assert unit_of_loads(made_deflections(ratios=ratios)) is None
+
+
+def test_compliances_may_be_off_by_a_third_and_the_unit_is_found():
+    ratios = 9.80665 * np.array([1.0, 1.3, 0.8, 1.1, 0.75, 1.2])
+    assert unit_of_loads(made_deflections(ratios=ratios)).unit == UNITS[1]
+
+
+def test_deflections_that_the_loads_do_not_explain_have_no_unit():
+    assert unit_of_loads(made_deflections(force=9.80665, moment=9.80665, noise=1e-2)) is None
+
+
+def test_some_rows_far_off_do_not_hide_the_unit():
+    deflected = made_deflections(-1.0)
+    deflected.seen[::30] += 0.5
+    found = unit_of_loads(deflected)
+    assert found.sign == -1.0 and found.rms_corrected < 1e-3
+
+
+def test_only_newtons_go_without_a_sentence():
+    assert [unit for unit in UNITS if not unit.detail] == [UNITS[0]] and (UNITS[0].force, UNITS[0].moment) == (1.0, 1.0)
+    assert len({(unit.force, unit.moment) for unit in UNITS}) == len(UNITS)
+
+
+def made_states(states=9, targets=3, seed=1, compliance=None):
+    """Deflections that are just what the load of each state makes of the compliances."""
+    rng = np.random.default_rng(seed)
+    wrench, end = 300.0 * rng.standard_normal((states, 6)), rng.standard_normal((states, 6, JOINTS))
+    jacobian = rng.standard_normal((states, targets, 3, JOINTS))
+    read = np.ones((states, targets), bool)
+    read[2, 1:] = False
+    jacobian *= read[..., None, None]
+    seen = np.einsum("stcj,j,saj,sa->stc", jacobian, compliance, end, wrench)
+    return StateDeflections(wrench, seen, jacobian, end, read.sum(axis=1), tuple((s,) for s in range(states)))
+
+
+NOMINAL = 1e-6 * np.arange(1.0, 7.0)
+
+
+def test_misfits_are_the_root_mean_squares_written_out():
+    states = made_states(compliance=1.4 * NOMINAL)
+    other = states.seen + 1e-4 * np.random.default_rng(2).standard_normal(states.seen.shape) * (states.seen != 0)
+    for seen, found in ((states.seen, states.misfits(NOMINAL)), (other, states.misfits(NOMINAL, other))):
+        for row in range(9):
+            for column in range(9):
+                left = seen[row].copy()
+                torques = states.end_jacobian[row].T @ states.wrench[column]
+                for target in range(3):
+                    left[target] -= states.jacobian[row, target] @ (NOMINAL * torques)
+                expected = np.sqrt((left**2).sum() / states.targets[row])
+                assert found[row, column] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    np.testing.assert_allclose(np.diag(states.misfits(1.4 * NOMINAL)), 0.0, atol=1e-9)
+
+
+def test_sizes_are_root_mean_squares_over_the_targets_that_were_read():
+    states = made_states(compliance=NOMINAL)
+    seen = np.zeros((9, 3, 3))
+    seen[0, :, 0] = [1.0, 2.0, 2.0]
+    seen[2, 0] = [2.0, 3.0, 6.0]
+    found = replace(states, seen=seen).sizes()
+    assert (found[0], found[1], found[2]) == (pytest.approx(np.sqrt(3)), 0.0, 7.0)
+
+
+def test_compliances_are_those_that_made_the_deflections_within_the_range_of_robots():
+    factors = np.array([1.0, 0.5, 2.5, 0.1, 8.0, 1.5])
+    found = made_states(compliance=factors * NOMINAL)
+    every = np.arange(9)
+    np.testing.assert_allclose(found.compliance(every, every, NOMINAL) / NOMINAL, [1.0, 0.5, 2.5, 0.3, 3.0, 1.5], rtol=1e-9)
+
+
+def test_compliances_are_of_the_states_and_the_loads_that_are_given():
+    made_by = made_states(compliance=1.5 * NOMINAL)
+    order = np.array([1, 2, 0, 4, 3, 5, 6, 8, 7])
+    moved = replace(made_by, wrench=made_by.wrench[order])
+    # The load of state s stands at the place where `order` has it.
+    np.testing.assert_allclose(moved.compliance(np.arange(9), np.argsort(order), NOMINAL), 1.5 * NOMINAL, rtol=1e-9)
+    spoiled = replace(made_by, seen=np.where(np.arange(9)[:, None, None] < 3, 1.0, made_by.seen))
+    np.testing.assert_allclose(spoiled.compliance(np.arange(3, 9), np.arange(3, 9), NOMINAL), 1.5 * NOMINAL, rtol=1e-9)
+
+
+@pytest.fixture(scope="module")
+def repeated(fanuc):
+    return made(fanuc, 1, Plan(poses=6, loads=2, repeats=2, noise=0.0))
+
+
+def test_states_are_the_loaded_ones_less_the_unloaded_one_of_their_pose(fanuc, repeated):
+    seen = repeated.measurements
+    found = state_deflections(repeated, seen)
+    assert len(found.wrench) == 12 and (found.targets == 4).all()
+    for state, (pose, load) in enumerate((pose, load) for pose in range(6) for load in (1, 2)):
+        here = (seen.pose == pose) & (seen.load == load)
+        np.testing.assert_array_equal(found.wrench[state], seen.wrench[here][0])
+        assert found.rows[state] == tuple(seen.row[here].tolist())
+        for target in range(4):
+            of_target = seen.target == target
+            unloaded = seen.position[(seen.pose == pose) & (seen.load == 0) & of_target].mean(axis=0)
+            expected = seen.position[here & of_target].mean(axis=0) - unloaded
+            np.testing.assert_allclose(found.seen[state, target], expected, rtol=0, atol=1e-12)
+            point = PinocchioPoint(fanuc.chain, fanuc.chain.point(POINTS[target]))
+            jacobian = point.pose_and_jacobian(seen.joint_angles[here][0])[2][:3]
+            np.testing.assert_allclose(found.jacobian[state, target], jacobian, rtol=0, atol=1e-12)
+    # Second order in turns of some milliradians.
+    assert (np.diag(found.misfits(fanuc.compliance)) < 0.03 * found.sizes()).all()
+
+
+def test_a_target_that_one_of_the_two_states_lacks_counts_for_nothing(repeated):
+    seen = repeated.measurements
+    lacking = np.zeros(len(seen), bool)
+    for pose, load, target in ((2, 1, 3), (4, 0, 0)):
+        lacking |= (seen.pose == pose) & (seen.load == load) & (seen.target == target)
+    found = state_deflections(repeated, seen.select(~lacking))
+    targets = dict.fromkeys(((p, load) for p in range(6) for load in (1, 2)), 4) | {(2, 1): 3, (4, 1): 3, (4, 2): 3}
+    assert found.targets.tolist() == list(targets.values())
+    for state, target in ((4, 3), (8, 0), (9, 0)):
+        assert not found.seen[state, target].any() and not found.jacobian[state, target].any()
+
+
+def test_poses_without_an_unloaded_state_are_left_out(repeated):
+    seen = repeated.measurements
+    found = state_deflections(repeated, seen.select((seen.load > 0) | (seen.pose > 1)))
+    assert len(found.wrench) == 8 and min(min(rows) for rows in found.rows) > seen.row[seen.pose == 1].max()
+    for kept in (seen.load == 0, seen.load > 0):
+        assert state_deflections(repeated, seen.select(kept)) is None
