@@ -10,6 +10,16 @@ from pathlib import Path
 
 from common import ROOT
 
+_TOUCH = """
+for path in snakemake.output:
+    open(path, "w").close()
+"""
+# A job ends before those start that depend on it: in the order of these names every job finds what it needs.
+_RECORD = """
+import pickle, time
+with open(f"{jobs}/{{time.time_ns()}}-{script}", "wb") as file:
+    pickle.dump(snakemake, file)
+"""
 SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src")
 
 
@@ -35,7 +45,7 @@ def copy_study(folder: Path) -> Path:
     return folder
 
 
-def reduce_to_touching(folder: Path) -> None:
+def reduce_to_imports(folder: Path) -> None:
     """Rewrite the scripts of a copy: they import what they import and touch their outputs.
 
     Parameters
@@ -43,13 +53,27 @@ def reduce_to_touching(folder: Path) -> None:
     folder : Path
         From `copy_study`.
     """
-    for script in (folder / "workflow" / "scripts").glob("*.py"):
-        if script.name == "job.py":
-            continue
+    for script in _scripts(folder):
         tree = ast.parse(script.read_text(encoding="utf-8"))
         imports = [ast.unparse(node) for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-        touch = "for path in snakemake.output:\n    open(path, 'w').close()\n"
-        script.write_text("\n".join([*imports, touch]), encoding="utf-8")
+        script.write_text("\n".join([*imports, _TOUCH]), encoding="utf-8")
+
+
+def reduce_to_records(folder: Path) -> None:
+    """Rewrite the scripts of a copy: they import nothing of ours, touch their outputs and record their job in ``jobs/``.
+
+    Parameters
+    ----------
+    folder : Path
+        From `copy_study`.
+    """
+    (folder / "jobs").mkdir()
+    for script in _scripts(folder):
+        script.write_text(_TOUCH + _RECORD.format(script=script.name, jobs=folder / "jobs"), encoding="utf-8")
+
+
+def _scripts(folder: Path) -> list[Path]:
+    return [path for path in (folder / "workflow" / "scripts").glob("*.py") if path.name != "job.py"]
 
 
 def snakemake(folder: Path, *arguments: str) -> tuple[float, str]:
