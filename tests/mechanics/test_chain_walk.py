@@ -1,5 +1,7 @@
 """Frames and screws of a walk along a chain against pinocchio, and where plain numbers stand for arrays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, PARALLELOGRAM, TRACK, PinocchioPoint, chain_of, random_angles
@@ -89,6 +91,13 @@ def test_a_screw_has_a_point_only_where_a_point_behind_it_moves():
     assert [screw.origin is None for screw in sweep(chain, angles, [chain.point("B")])[1]] == [False, True]
     assert [screw.origin is None for screw in sweep(chain, angles, [chain.point("C")])[1]] == [False, False, False]
     assert [screw.origin is None for screw in sweep(chain, angles, [chain.point("B")], lines=True)[1]] == [False] * 3
+
+
+@pytest.mark.parametrize("offset, turns_only", [((0.3, 0.0, 0.0), True), ((0.0, 0.1, 0.0), False), ((0.1, 0.0, -0.1), False)])
+def test_a_target_beside_the_axis_is_moved_by_it_and_one_along_it_is_not(offset, turns_only):
+    chain = chain_of("Rz(q1) Tx(0.5) Rx(q2) Tx(0.3) [B]")
+    point = replace(chain.end_effector, offset_m=offset)
+    assert [screw.origin is None for screw in sweep(chain, np.full((2, 1), 0.2), [point])[1]] == [False, turns_only]
 
 
 @pytest.mark.parametrize("size, lengths", [(0, []), (1, [1]), (BLOCK, [BLOCK]), (2 * BLOCK + 5, [BLOCK, BLOCK, 5])])

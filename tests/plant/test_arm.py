@@ -46,6 +46,16 @@ def test_a_chain_is_cut_into_stretches_at_its_joints():
     np.testing.assert_allclose(link.points[0].position_m, [-0.2, 0, 0])
 
 
+def test_a_measuring_point_behind_a_fixed_rotation_is_turned_and_placed_by_it():
+    arm = arm_of("Rz(q1) Tx(1) Rx(90deg) Ty(0.5) [A] Rz(90deg) Tx(0.1) [B]", 1)
+    first, second = arm.stretches[1].points
+    np.testing.assert_allclose(first.position_m, [1.0, 0.0, 0.5], atol=1e-15)
+    np.testing.assert_allclose(first.rotation, pin.exp3(np.array([np.pi / 2, 0, 0])), atol=1e-15)
+    # x of [B] is y of [A], which is z of the link.
+    np.testing.assert_allclose(second.position_m, [1.0, 0.0, 0.6], atol=1e-15)
+    np.testing.assert_allclose(second.rotation, [[0, -1, 0], [0, 0, -1], [1, 0, 0]], atol=1e-15)
+
+
 def test_compliances_and_limits_are_in_radians():
     arm = arm_of()
     np.testing.assert_allclose(arm.compliance, [1e-6, 2e-6])

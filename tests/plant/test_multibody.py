@@ -114,6 +114,13 @@ def test_a_load_counts_from_the_flange_and_turns_with_it(flange):
     np.testing.assert_allclose(data.xipos[body], [1.0 + 0.3, 0.0, 0.4 - 0.5 - 0.1], atol=1e-9)
 
 
+def test_a_load_counts_in_the_axes_of_a_flange_that_is_turned_on_its_link():
+    arm = arm_of("Rz(q1) Tx(1) Ry(q2) Tx(0.5) Rx(90deg) [B]")
+    model = machine_of(arm, Structure(payload=Mass(2, 20.0, 1.0, (0.1, 0.2, 0.3)))).model
+    # y of the flange is z of the link, and z its -y.
+    np.testing.assert_allclose(model.body("arm2").ipos, [0.6, -0.3, 0.2], atol=1e-9)
+
+
 @pytest.mark.parametrize("segments", [1, 4])
 def test_a_mass_on_an_elastic_link_stands_where_it_does_on_a_rigid_one(segments):
     masses = (Mass(1, 30.0, 0.0), Mass(1, 20.0, 0.55, (0.0, 0.1, 0.0)), Mass(1, 10.0, 1.0))
