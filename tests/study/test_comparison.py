@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from made_study_tables import metrics_of, replicates_of
+from made_metrics import metrics_of, replicates_of
 
 from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.tables import table4

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_study_tables import metrics_of, replicates_of
+from made_metrics import metrics_of, replicates_of
 
 from elastocal.study.tables import (
     deviation_ratio,
