@@ -22,7 +22,6 @@ from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
 from elastocal.effects.conditions import offered, with_springs
 from elastocal.effects.declared_weight import candidate
-from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
@@ -276,13 +275,3 @@ def test_gravity_on_odd_robots_is_the_slope_of_their_potential(name):
         step = 1e-5 * np.eye(robot.joints)[joint]
         slope = (work(states.joint_angles + step) - work(states.joint_angles - step)) / 2e-5
         np.testing.assert_allclose(found[:, joint], slope, rtol=0, atol=1e-7)
-
-
-def test_carriage_yields_to_the_force_along_its_track():
-    robot = robot_of(ODD_CHAINS["track"], [1e-8, 1e-6, 1e-6, 1e-6])
-    model = made_model(robot, (Target("A", "hand", (0, 0, 0)),), fitted_frames=False, compliance=robot.compliance)
-    states = made_states(4, 3, seed=22)
-    shifted = displaced_coordinates(model, made_estimate(model), conditions(model, made_estimate(model), states))[:, 0]
-    # The carriage runs along -x.
-    np.testing.assert_allclose(shifted - states.joint_angles[:, 0], -1e-8 * states.wrench[:, 0], rtol=1e-9)
-    assert [p.unit for p in joint_compliance(model.sites).parameters] == ["m/N", *["rad/(N m)"] * 3]

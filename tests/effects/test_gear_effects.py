@@ -8,8 +8,6 @@ from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
 from synthetic import candidate_on, circumstances_on, displacements, equipped, made_states
 
 from elastocal.effects.catalogue import candidates_on
-from elastocal.effects.full_load import full_torque_Nm, lever_m
-from elastocal.mechanics.robot import Mass
 
 COUNT = 6
 
@@ -233,17 +231,3 @@ def test_a_track_has_friction_in_metres_and_no_gear_that_turns():
     for effect, count in (("lost_motion", 1), ("stiffening", 2)):
         joints = [c.joints for c in found.values() if c.effect == effect]
         assert joints == [(2,), (3,), (4,)] * count
-
-
-def test_the_full_torque_has_the_lever_of_a_tool_at_least_and_the_weight_behind_the_joint():
-    """Levers of the outstretched arm, by hand; the weight of a mass half way along its link."""
-    sites = equipped(chain_of("Rz(q1) Tz(1) Ry(q2) Tx(2) Ry(q3) Tx(0.1) [hand]"))
-    assert [lever_m(sites, joint) for joint in range(3)] == pytest.approx([3.1, 2.1, 0.5])
-    assert [full_torque_Nm(sites, joint) for joint in range(3)] == pytest.approx([3100.0, 2100.0, 500.0])
-    g = np.linalg.norm(sites.gravity_m_s2)
-    loaded = replace(sites, payload_kg=10.0, masses=(Mass(2, 30.0, (-1.0, 0.0, 0.0), 0.1),))
-    # It turns joint 2 at a metre, and joint 1, whose axis stands upright, not at all; it is before joint 3.
-    found = [full_torque_Nm(loaded, joint) for joint in range(3)]
-    assert found[0] == pytest.approx(31 * g) and found[2] == pytest.approx(5 * g)
-    # The longest lever is that of some poses, so almost that of the arm outstretched.
-    assert 0.98 * 30 * g < found[1] - 21 * g <= 30 * g
