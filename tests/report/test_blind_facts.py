@@ -8,6 +8,7 @@ from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MANIFEST, MEASURED, PROOF, facts_of, tables
 from scipy.stats import beta
 
+from elastocal.blind.confusion import CLASS_WITHOUT
 from elastocal.report.blind_facts import blind_facts
 
 
@@ -48,6 +49,25 @@ def test_a_run_without_a_robot_of_the_proof_proves_nothing(tmp_path):
 def test_shares_of_the_verdicts_on_effects_outside_of_the_catalogue_add_up(facts):
     (row,) = facts["outside"]
     assert row == ["refraction", "200", "1", "100", "0", "0", "0", "0"]
+
+
+def test_each_verdict_on_an_effect_outside_of_the_catalogue_has_its_own_share(given):
+    row = given["confusion"].query("truth == 'outside:refraction'").iloc[0]
+    counts = {
+        CLASS_WITHOUT: 1,
+        "several": 2,
+        "unexplained": 4,
+        "adequate": 2,
+        "not_testable": 1,
+        "payload": 6,
+        "lost_motion": 4,
+    }
+    kept = ["robots", "settings", "truth", "level"]
+    row = {name: row[name] if name in kept else counts.get(name, 0) for name in row.index}
+    changed = given | {"confusion": pd.DataFrame([row])}
+    (found,) = blind_facts(changed, "", "quick", 7)["outside"]
+    # Names of the catalogue, class, several, unexplained and adequate or not testable, of 20 cases.
+    assert found == ["refraction", "200", "20", "50", "5", "10", "20", "15"]
 
 
 def test_what_is_absorbed_is_listed_with_its_reason(facts):
