@@ -78,9 +78,6 @@ def test_without_cases_both_panels_are_empty_and_can_be_drawn():
     assert_nothing_cut_off(figure)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="limits of the axes become NaN: of a fault of the data no error is known", raises=ValueError
-)
 def test_a_case_without_a_held_out_error_leaves_the_others_drawn():
     table = of_cases(("single", 50.0, 110, 100), ("single", 50.0, float("nan"), 100))
     left, _ = errors_against_oracle(table).axes

@@ -55,8 +55,7 @@ def test_links_do_not_cross(drawn):
     "name",
     [
         "kuka",
-        # The search for the scale counts the ends of links and not the origin in which the first one starts.
-        pytest.param("fanuc", marks=pytest.mark.xfail(strict=True, reason="100 mm high, as the first link is not counted")),
+        "fanuc",
     ],
 )
 def test_a_robot_is_drawn_at_a_scale_at_which_it_fits_the_drawing(name):

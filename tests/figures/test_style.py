@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
 
-from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, line_style, note, panels, save, styled
+from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, styled
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
 DICHROMATS = {
@@ -98,3 +98,13 @@ def test_a_figure_that_cannot_be_drawn_leaves_the_earlier_file_as_it_was(tmp_pat
         saved(figure, tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["figure.pdf"]
     assert (tmp_path / "figure.pdf").read_text(encoding="utf-8") == "earlier"
+
+
+@pytest.mark.parametrize(("colour", "ink"), [((1, 1, 1), "black"), ((0, 0, 0), "white"), ((0.5, 0.5, 0.5), "black")])
+def test_numbers_on_a_colour_have_the_ink_of_the_higher_contrast(colour, ink):
+    assert ink_on((*colour, 1.0)) == ink
+
+
+def test_blue_carries_white_although_a_green_as_bright_carries_black():
+    assert ink_on((0.0, 0.0, 1.0)) == "white"
+    assert ink_on((0.0, 1.0, 0.0)) == "black"

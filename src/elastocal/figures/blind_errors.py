@@ -36,13 +36,15 @@ def errors_against_oracle(cases: pd.DataFrame) -> Figure:
     Parameters
     ----------
     cases : pandas.DataFrame
-        Of reports/blind/cases.csv.
+        Of reports/blind/cases.csv. A case without a held-out error, whose data are at fault, is not drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS)]
+    mine = cases[(cases.robots == leading(cases.robots)) & cases.group.isin(_GROUPS)].dropna(
+        subset=["oracle_rms_m", "after_rms_m"]
+    )
     figure, axes = panels(1, 2, 82, width_ratios=(1, 1.1))
     left, right = axes[0]
     for detected, color, size in ((True, PALETTE[0], 5), (False, PALETTE[1], 7)):

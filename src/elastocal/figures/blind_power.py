@@ -10,7 +10,7 @@ from matplotlib.patches import Rectangle
 
 from elastocal.blind.confusion import PAIR, WORDS
 from elastocal.blind.robots import leading
-from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -25,7 +25,6 @@ PANELS = {
 }
 # Never black, so that the numbers can be read everywhere.
 _SHARES = LinearSegmentedColormap.from_list("shares", ["#ffffff", "#c6dbef", "#4292c6", "#08519c"])
-_DARK = 0.55
 _PER_CENT = 100.0
 _LEAST_WRITTEN = 0.045
 _ALL, _NONE, _OUTSIDE = "all", "none", "outside:"
@@ -127,9 +126,8 @@ def _heat(axis: Axes, shares: np.ndarray, size: float) -> None:
     axis.imshow(np.ma.masked_invalid(shares), cmap=_SHARES, vmin=0, vmax=1, interpolation="nearest", aspect="auto")
     for row, column in np.argwhere(np.isfinite(shares)):
         if shares[row, column] >= _LEAST_WRITTEN:
-            ink = "white" if shares[row, column] > _DARK else "black"
             text = f"{_PER_CENT * shares[row, column]:.0f}"
-            axis.text(column, row, text, ha="center", va="center", fontsize=size, color=ink)
+            axis.text(column, row, text, ha="center", va="center", fontsize=size, color=ink_on(_SHARES(shares[row, column])))
     axis.tick_params(length=0)
     axis.grid(visible=False)
     axis.spines[:].set_visible(False)

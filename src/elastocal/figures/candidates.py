@@ -10,7 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Patch, Rectangle
 
 from elastocal.diagnosis.words import candidate_words, hypotheses_words
-from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -128,7 +128,7 @@ def confounding(table: Mapping[str, np.ndarray], pairs: Mapping[str, np.ndarray]
     for row in range(count):
         for column in range(count):
             if row != column and np.isfinite(angles[row, column]):
-                ink = "white" if angles[row, column] < 45 else "black"
+                ink = ink_on(colours(angles[row, column] / 90))
                 axis.text(column, row, f"{angles[row, column]:.0f}", ha="center", va="center", fontsize=6, color=ink)
     numbered = [f"{short_name(name)}  {number}" for number, name in enumerate(names, 1)]
     axis.set(xticks=range(count), yticks=range(count))

@@ -253,9 +253,9 @@ def _samples(segment: Segment, first: float, last: float) -> np.ndarray:
 
 
 def _place(items: Sequence[Item], scale: float, depth: np.ndarray) -> np.ndarray:
-    """Places on paper of everything, in millimetres from the base's origin."""
+    """Places on paper of the base's origin and of everything, in millimetres from that origin."""
     longest = max((item.length_m for item in items if isinstance(item, Segment)), default=0.0)
-    here, places = np.zeros(3), []
+    here, places = np.zeros(3), [np.zeros(2)]
     for item in items:
         place = projected(here, depth)
         if isinstance(item, Segment):

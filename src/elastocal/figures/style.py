@@ -68,6 +68,27 @@ def line_style(index: int) -> dict[str, Any]:
     return {"color": PALETTE[index % len(PALETTE)], "linestyle": DASHES[index % len(DASHES)]}
 
 
+def ink_on(colour: tuple[float, ...]) -> str:
+    """Black or white, whichever has the higher contrast on a colour by its relative luminance [1]_.
+
+    Parameters
+    ----------
+    colour : tuple of float
+        Red, green and blue of sRGB, 0 to 1; what follows is ignored.
+
+    Returns
+    -------
+    {"black", "white"}
+
+    References
+    ----------
+    .. [1] World Wide Web Consortium, Web Content Accessibility Guidelines 2.2, "relative luminance" and "contrast ratio", 2023.
+    """
+    linear = [value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4 for value in colour[:3]]
+    luminance = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+    return "black" if (luminance + 0.05) ** 2 > 1.05 * 0.05 else "white"
+
+
 @styled
 def save(figure: Figure, pdf: str, png: str) -> None:
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
