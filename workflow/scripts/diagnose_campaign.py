@@ -12,7 +12,7 @@ from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop import diagnosis_tables as tables
-from elastocal.loop.opened import opened_case
+from elastocal.loop.case_files import load_case
 from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS
 from elastocal.random_streams import stream
 
@@ -20,7 +20,7 @@ from job import Job, run
 
 
 def diagnose_campaign(job: Job) -> None:
-    case = opened_case(job.input.descriptions, job.input.training)
+    case = load_case(job.input.descriptions, job.input.training)
     campaign = job.wildcards.campaign
     found = diagnose(case, Settings(), job.params.seed, lambda line: print(f"{campaign}: {line}", file=sys.stderr, flush=True))
     robot, draws = case.campaign.robot, stream(job.params.seed, case.campaign.name, "next experiment", 0)

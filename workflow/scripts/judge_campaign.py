@@ -8,15 +8,15 @@ from elastocal.io.json_files import read_json, write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
-from elastocal.loop.opened import opened_case
+from elastocal.loop.case_files import load_case
 from elastocal.loop.schemas import STEPS, residuals
 
 from job import Job, run
 
 
 def judge_campaign(job: Job) -> None:
-    case = opened_case(job.input.descriptions, job.input.training)
-    held_out = opened_case(job.input.descriptions, job.input.held_out, "held_out")
+    case = load_case(job.input.descriptions, job.input.training)
+    held_out = load_case(job.input.descriptions, job.input.held_out, "held_out")
     found = tables.diagnosis_from(case, read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     verdict = judge(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
+from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.blind.oracle import oracle
-from elastocal.blind.truths import opened_truths
 from elastocal.io.json_files import read_json, write_json
 
 from job import Job, run
 
 
 def oracle_cases(job: Job) -> None:
-    truths = opened_truths(Path(job.input.sealed).glob("*.json"), job.input.manifest)
+    truths = load_ground_truth(Path(job.input.sealed).glob("*.json"), job.input.manifest)
     verdicts = {verdict["campaign"]: verdict for verdict in read_json(job.input.verdicts)}
     found = {}
     for name, truth in truths.items():

@@ -8,9 +8,9 @@ from elastocal.blind.calibration import reliability, statements
 from elastocal.blind.case_rows import case_row
 from elastocal.blind.confusion import confused
 from elastocal.blind.coverage import covered, intervals_of
+from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.blind.power import powers, undetectable
 from elastocal.blind.targets import by_setting, summarized
-from elastocal.blind.truths import opened_truths
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
@@ -18,7 +18,9 @@ from job import Job, run
 
 
 def score_cases(job: Job) -> None:
-    truths = opened_truths([file for folder in job.input.sealed for file in Path(folder).glob("*.json")], job.input.manifest)
+    truths = load_ground_truth(
+        [file for folder in job.input.sealed for file in Path(folder).glob("*.json")], job.input.manifest
+    )
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
     oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
     cases = pd.DataFrame([case_row(truth, verdicts[name], oracles[name]) for name, truth in truths.items()])

@@ -13,7 +13,7 @@ from elastocal.blind.follow_up_scores import (
     with_one_effect,
     with_prospects,
 )
-from elastocal.blind.truths import opened_truths
+from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
@@ -22,7 +22,7 @@ from job import Job, run
 
 def score_follow_ups(job: Job) -> None:
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
-    truths = opened_truths(files, job.input.manifest)
+    truths = load_ground_truth(files, job.input.manifest)
     first = {verdict["campaign"]: verdict for path in job.input.first for verdict in read_json(path)}
     anew = [entry for path in job.input.anew for entry in read_json(path)]
     proposals = pd.concat([pd.read_csv(path) for path in job.input.proposals], ignore_index=True)

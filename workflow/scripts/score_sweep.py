@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.blind.sweep import against_angle, swept
-from elastocal.blind.truths import opened_truths
 from elastocal.figures.style import save
 from elastocal.figures.sweep import sweep
 from elastocal.io.data_frames import write_csv
@@ -15,7 +15,7 @@ from job import Job, run
 def score_sweep(job: Job) -> None:
     files = [file for folder in job.input.sealed for file in Path(folder).glob("*.json")]
     verdicts = {verdict["campaign"]: verdict for path in job.input.verdicts for verdict in read_json(path)}
-    cases = swept(opened_truths(files, job.input.manifest), verdicts)
+    cases = swept(load_ground_truth(files, job.input.manifest), verdicts)
     table = against_angle(cases)
     write_csv(job.output.cases, cases)
     write_csv(job.output.table, table)

@@ -134,7 +134,7 @@ def read_blocks(
         A file that cannot be read, is another table, or whose contents are not those written.
     """
     wanted = schema.columns if columns is None else [schema.column(name) for name in columns]
-    with _opened(path) as file:
+    with _parquet_file(path) as file:
         name = _metadata(path, file, _TABLE, schema.name)
         if name != schema.name:
             raise InputError(path, f"metadata {_TABLE}", name, schema.name)
@@ -192,11 +192,11 @@ def read_provenance(path: str | Path) -> dict[str, Any]:
     -------
     dict
     """
-    with _opened(path) as file:
+    with _parquet_file(path) as file:
         return _metadata(path, file, _PROVENANCE)
 
 
-def _opened(path: str | Path) -> pq.ParquetFile:
+def _parquet_file(path: str | Path) -> pq.ParquetFile:
     try:
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-def opened_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
+def load_case(descriptions_path: str | Path, measurements_path: str | Path, part: str | None = None) -> Case:
     """A campaign from the files of step 1.
 
     Parameters

@@ -4,7 +4,7 @@ import hashlib
 
 import pytest
 
-from elastocal.blind.truths import opened_truths
+from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.errors import InputError
 
 
@@ -20,15 +20,15 @@ def sealed(tmp_path):
 
 
 def test_truths_come_by_the_names_of_their_cases(sealed):
-    assert opened_truths(*sealed) == {name: {"campaign": name} for name in ("case_a", "case_b")}
-    assert list(opened_truths(*sealed)) == ["case_a", "case_b"]
+    assert load_ground_truth(*sealed) == {name: {"campaign": name} for name in ("case_a", "case_b")}
+    assert list(load_ground_truth(*sealed)) == ["case_a", "case_b"]
 
 
 def test_a_truth_that_was_changed_or_not_promised_is_refused(sealed, tmp_path):
     files, manifest = sealed
     files[0].write_text('{"campaign": "case_c"}', encoding="utf-8")
     with pytest.raises(InputError, match=r"case_b\.json.*as sealed"):
-        opened_truths(files, manifest)
+        load_ground_truth(files, manifest)
     (tmp_path / "case_d.json").write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match=r"case_d\.json"):
-        opened_truths([tmp_path / "case_d.json"], manifest)
+        load_ground_truth([tmp_path / "case_d.json"], manifest)

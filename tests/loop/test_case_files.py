@@ -8,8 +8,8 @@ from support import changed, refused
 from elastocal.campaigns.columns import columns_of
 from elastocal.io.json_files import write_json
 from elastocal.io.storage import write_table
+from elastocal.loop.case_files import load_case
 from elastocal.loop.loading import load_campaign
-from elastocal.loop.opened import opened_case
 from elastocal.loop.schemas import measurements
 
 
@@ -30,7 +30,7 @@ def files(loaded, tmp_path):
 
 
 def test_the_case_has_the_measurements_and_the_description_of_the_folder(files, loaded):
-    case, training = opened_case(*files), loaded[1]
+    case, training = load_case(*files), loaded[1]
     for name in ("pose", "load", "joint_angles", "wrench", "position"):
         np.testing.assert_array_equal(getattr(case.campaign.measurements, name), getattr(training, name))
     assert case.campaign.name == "made" and case.campaign.noise == {"position_m": 6e-5}
@@ -38,7 +38,7 @@ def test_the_case_has_the_measurements_and_the_description_of_the_folder(files, 
 
 
 def test_repeats_are_averaged_and_nothing_declared_is_looked_for(files, loaded):
-    case, training = opened_case(*files), loaded[1]
+    case, training = load_case(*files), loaded[1]
     states = {(s, p, x) for s, p, x in zip(training.session, training.pose, training.load, strict=True)}
     assert len(case.observations.states) == len(states) < len(training)
     assert {effect.effect for effect in case.model.effects} >= {"joint_offset"}
@@ -46,7 +46,7 @@ def test_repeats_are_averaged_and_nothing_declared_is_looked_for(files, loaded):
 
 
 def test_a_test_without_a_campaign_of_its_own_is_described_as_the_training(files):
-    assert opened_case(*files, "held_out").campaign.name == "made"
+    assert load_case(*files, "held_out").campaign.name == "made"
 
 
 def test_a_test_of_another_campaign_has_the_description_of_that_campaign(files, loaded):
@@ -54,8 +54,8 @@ def test_a_test_of_another_campaign_has_the_description_of_that_campaign(files, 
     other = {key: descriptions[key] for key in ("source", "campaign", "robot")}
     other = changed(changed(other, ("campaign", "campaign"), "other"), ("campaign", "noise", "position_m"), 2e-5)
     write_json(files[0], descriptions | {"held_out": other})
-    assert opened_case(*files).campaign.name == "made"
-    case = opened_case(*files, "held_out")
+    assert load_case(*files).campaign.name == "made"
+    case = load_case(*files, "held_out")
     assert case.campaign.name == "other" and case.campaign.noise == {"position_m": 2e-5}
 
 
@@ -63,4 +63,4 @@ def test_measurements_of_a_robot_with_other_joints_are_refused_by_their_file(fil
     robot = loaded[0]["robot"]
     write_json(files[0], loaded[0] | {"robot": robot | {"compliance_urad_per_Nm": [1.0] * 7}})
     with refused(files[1], ""):
-        opened_case(*files)
+        load_case(*files)

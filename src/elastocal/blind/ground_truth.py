@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable
 
 
-def opened_truths(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
+def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
     """Open sealed files that are as promised.
 
     Parameters
