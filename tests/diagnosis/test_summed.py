@@ -117,7 +117,7 @@ def test_blocks_have_fewer_rows_the_more_columns_there_are_and_one_at_least():
 
 
 # 4,000 draws; moments at 5 standard errors fail by chance once in some 3e4 seeds a moment, and see with a power of 0.9 what
-# moves one by 6.3 of them: 14 % of a variance. Kolmogorov-Smirnov at 0.1 % sees a shift of 0.05 standard deviations with 0.9.
+# moves one by 6.3 of them: 14 % of a variance. Kolmogorov-Smirnov at 0.1 % sees a shift of 0.1 standard deviations with 0.9.
 DRAWS, BEYOND = 4000, 5.0
 
 

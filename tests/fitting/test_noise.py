@@ -30,7 +30,10 @@ def drawn(robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGE
 
 
 def band(freedom):
-    """Range of a standard deviation from so many degrees of freedom, 99.9 % of the time."""
+    """Range of a standard deviation from so many degrees of freedom, 99.9 % of the time.
+
+    Of 700 or more, one that is off by 15 % is seen with a power of 0.98.
+    """
     return np.sqrt(chi2.ppf([5e-4, 1 - 5e-4], freedom) / freedom)
 
 
@@ -45,8 +48,8 @@ def test_sensor_alone_is_found_and_no_joints_are_made_up(fanuc, rows):
 
 
 def test_joints_are_made_up_seldom(fanuc):
-    made_up = sum(noise_from_repeats(*drawn(fanuc, seed, poses=8, repeats=3)).joint_rad.any() for seed in range(6))
-    assert made_up <= 1
+    """Of 60 campaigns none: a rate of 1 in 200 fails one set of seeds in four, one of 1 in 20 is seen with a power of 0.95."""
+    assert not sum(noise_from_repeats(*drawn(fanuc, seed, poses=8, repeats=3)).joint_rad.any() for seed in range(60))
 
 
 @pytest.mark.parametrize("rows", [3, 6])

@@ -222,6 +222,7 @@ def test_of_two_repeats_neither_leaves():
 
 @pytest.mark.parametrize("repeats", [3, 4, 5, 6, 9])
 def test_clean_noise_loses_nothing(repeats):
+    """Of 3,600 poses: a rate of 1 in 1,000 is seen with a power of 0.97."""
     assert sum(len(rows_lost(repeated(repeats, poses=60, seed=seed))) for seed in range(60)) == 0
 
 

@@ -56,7 +56,8 @@ def test_table2_is_the_statistics_of_all_configurations_together():
     row = table2({"arm": initial}, {"arm": weights}).iloc[0]
     assert row.mean_mm == pytest.approx(1e3 * data.mean()) and row.std_mm == pytest.approx(1e3 * data.std())
     assert row.max_mm == pytest.approx(1e3 * data.max())
-    assert row.mean_mm_std_error == pytest.approx(1e3 * data.mean(axis=1).std() / np.sqrt(50), rel=0.2)
+    # A standard deviation of 400 replicates is known to 3.5 %: 12 % at 3.4 standard errors; 20 % is seen with a power of 0.97.
+    assert row.mean_mm_std_error == pytest.approx(1e3 * data.mean(axis=1).std() / np.sqrt(50), rel=0.12)
     assert row.mean_mm_one_set_std == pytest.approx(1e3 * data.mean(axis=1).std(ddof=1))
 
 

@@ -123,6 +123,7 @@ def test_intervals_hold_what_they_are_of(errors):
 def test_a_maximum_has_no_interval_but_a_share_that_stays_below_it(errors):
     assert np.isnan(intervals(errors, 50, np.random.default_rng(6))[0][0]["max_m"]).all()
     # Of many samples of 12 poses, 95 % have a maximum that at least this share of all poses stays below.
+    # 4,000 samples: 1.1 % are 3.2 standard errors, and a share of 93 % is seen with a power of 0.98.
     largest = np.random.default_rng(7).random((4000, 12)).max(axis=1)
     assert (largest > share_below_largest(12)).mean() == pytest.approx(0.95, abs=0.011)
 
@@ -176,6 +177,8 @@ def test_noise_floor_is_what_the_noise_alone_leaves(rows, repeats, fanuc):
         positions = [one.position + noise.position_m * rng.standard_normal(one.position.shape) for one in moved]
         off.append(np.mean(positions, axis=0) - seen.position)
     simulated = np.sqrt((np.array(off) ** 2).sum(axis=-1).mean())
+    # Joints of 1,200 states share their errors over two targets: the simulation is sure to 1.5 %, 5 % are 3.3 of that, and a
+    # floor that is off by a tenth is seen with a power of 0.99.
     assert noise_floor(fitted, seen, model, estimate) == pytest.approx(simulated, rel=0.05)
 
 
