@@ -60,18 +60,29 @@ def test_every_caller_of_the_diagnosis_is_compared_here():
 
 
 @pytest.fixture(scope="module")
-def folder(kuka, tmp_path_factory):
-    """Joint 3 stands a milliradian beyond what it reports."""
-    table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=1e-3)
-    return made_folder(tmp_path_factory.mktemp("block") / "made", kuka, table=table)
+def both(kuka, tmp_path_factory):
+    """Joint 3 stands a milliradian beyond what it reports; or nothing is missing, so that the seed is seen in the alarm."""
+    found = {}
+    for kind, offset in (("named", 1e-3), ("adequate", 0.0)):
+        table = made_table(kuka, "made", plan=PLAN, offset_of_joint_3=offset)
+        folder = made_folder(tmp_path_factory.mktemp(kind) / "made", kuka, table=table)
+        verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
+        assert verdict["verdict"] == kind
+        found[kind] = folder, verdict
+    assert [effect["name"] for effect in found["named"][1]["effects"]] == ["joint_offset"]
+    assert 0.02 < found["adequate"][1]["probabilities"]["alarm_p_value"] < 0.98
+    return found
 
 
-@pytest.fixture(scope="module")
-def expected(folder):
+@pytest.fixture
+def folder(both):
+    return both["named"][0]
+
+
+@pytest.fixture
+def expected(both):
     """The verdict of the one call."""
-    verdict = as_json(diagnosed(folder.as_posix(), ROBOTS.as_posix(), SEED))
-    assert verdict["verdict"] == "named" and [effect["name"] for effect in verdict["effects"]] == ["joint_offset"]
-    return verdict
+    return both["named"][1]
 
 
 def as_json(document):
@@ -133,7 +144,9 @@ def run_of(script, tmp_path, monkeypatch, verdict, **parts):
     return json.loads(path.read_text(encoding="utf-8")), one_call.asked
 
 
-def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(folder, expected, tmp_path):
+@pytest.mark.parametrize("kind", ["named", "adequate"])
+def test_rules_come_to_the_same_verdict_with_their_tables_between_the_steps(kind, both, tmp_path):
+    folder, expected = both[kind]
     run_loop(folder, ROBOTS, tmp_path, ANALYSIS)
     by_rules = json.loads(Path(Files(tmp_path).verdict).read_text(encoding="utf-8"))
     # What to measure next is proposed by the rules alone, beside the verdict.
@@ -171,8 +184,10 @@ def test_next_experiment_is_proposed_for_the_same_diagnosis(folder, monkeypatch)
     same_case(case, cases_in(folder, ROBOTS)[0])
 
 
-def test_benchmark_of_the_engine_times_the_same_verdict(folder, expected, monkeypatch, capsys):
+@pytest.mark.parametrize("kind", ["named", "adequate"])
+def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch, capsys):
     """The script that it gives to a process of its own, in this one: the two calls by hand."""
+    folder, expected = both[kind]
     tree = ast.parse((BENCHMARKS / "large.py").read_text(encoding="utf-8"))
     assigned = (node for node in tree.body if isinstance(node, ast.Assign))
     (script,) = (ast.literal_eval(n.value) for n in assigned if getattr(n.targets[0], "id", "") == "SCRIPT")
