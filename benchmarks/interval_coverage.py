@@ -1,4 +1,4 @@
-"""How often 95 % intervals of held-out errors hold the truth: `python benchmarks/interval_coverage.py`, two minutes.
+"""How often 95 % intervals of held-out errors contain the true value: `python benchmarks/interval_coverage.py`, two minutes.
 
 Prints the table of docs/held_out_intervals.md.
 """
@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def covered(kind: str, poses: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:
-    """Shares of campaigns whose intervals hold the truth, and whose 95th percentile has no upper limit."""
+    """Shares of campaigns whose intervals contain the true value, and whose 95th percentile has no upper limit."""
     rng, hits, open_above = np.random.default_rng(7), {}, 0
     for before, after, false in campaigns_of(kind, CAMPAIGNS, poses, (8, poses)):
         found = {method: by_scipy(before, after, false, method, rng) for method in METHODS[:2]}

@@ -72,7 +72,7 @@ class LogHandler(LogHandlerBase):
         if event == LogEvent.ERROR and self._failed and _FAILED in record.getMessage():
             return [_reason(rule, logs) for rule, logs in self._failed]
         if event == LogEvent.ERROR and "CalledProcessError" in record.getMessage():
-            # What the job itself has said stands above, and why it failed below.
+            # The output of the job itself stands above, and why it failed below.
             return []
         if event in (LogEvent.JOB_STARTED, LogEvent.JOB_FINISHED, LogEvent.PROGRESS, LogEvent.WORKFLOW_STARTED):
             return []

@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_verdicts import said, truth
+from made_verdicts import truth, verdict_of
 from scipy.stats import beta
 
 from elastocal.blind.follow_up_scores import (
@@ -26,7 +26,7 @@ def sealed(case, *effects, robot="gp180", group="single"):
     return document | {"campaign": case, "case": document["case"] | {"robot": robot}}
 
 
-CLASS = said("class", "link_weight", alternatives=["payload@2"])
+CLASS = verdict_of("class", "link_weight", alternatives=["payload@2"])
 TRUTHS = {
     "a": sealed("a", "payload"),
     "b": sealed("b", "payload"),
@@ -34,14 +34,14 @@ TRUTHS = {
     "d": sealed("d", "payload", "joint_tilt", group="pair"),
 }
 ANEW = [
-    entry("a", "proposed", 5, said("named", "payload")),
+    entry("a", "proposed", 5, verdict_of("named", "payload")),
     *(entry("a", "random", poses, CLASS) for poses in (5, 10, 20)),
     entry("b", "proposed", 5, CLASS),
-    entry("b", "proposed", 10, said("named", "link_weight")),
-    entry("b", "random", 5, said("several", "payload", "joint_tilt")),
+    entry("b", "proposed", 10, verdict_of("named", "link_weight")),
+    entry("b", "random", 5, verdict_of("several", "payload", "joint_tilt")),
     entry("b", "random", 10, CLASS),
-    entry("b", "random", 20, said("named", "payload")),
-    *(entry(case, arm, 5, said("named", "payload")) for case in "cd" for arm in ("proposed", "random")),
+    entry("b", "random", 20, verdict_of("named", "payload")),
+    *(entry(case, arm, 5, verdict_of("named", "payload")) for case in "cd" for arm in ("proposed", "random")),
 ]
 
 

@@ -1,4 +1,4 @@
-"""A truth is opened only as it was promised."""
+"""The ground truth of a case is read only from the file whose hash was published."""
 
 import hashlib
 
@@ -19,12 +19,12 @@ def sealed(tmp_path):
     return files, tmp_path / "manifest.sha256"
 
 
-def test_truths_come_by_the_names_of_their_cases(sealed):
+def test_ground_truths_come_by_the_names_of_their_cases(sealed):
     assert load_ground_truth(*sealed) == {name: {"campaign": name} for name in ("case_a", "case_b")}
     assert list(load_ground_truth(*sealed)) == ["case_a", "case_b"]
 
 
-def test_a_truth_that_was_changed_or_not_promised_is_refused(sealed, tmp_path):
+def test_a_ground_truth_that_was_changed_or_not_published_is_refused(sealed, tmp_path):
     files, manifest = sealed
     files[0].write_text('{"campaign": "case_c"}', encoding="utf-8")
     with pytest.raises(InputError, match=r"case_b\.json.*as sealed"):

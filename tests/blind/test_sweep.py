@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_verdicts import said, truth
+from made_verdicts import truth, verdict_of
 from scipy.stats import beta
 
 pytest.importorskip("mujoco", reason="the blind proof needs the extra `blind`")
@@ -73,11 +73,11 @@ def nearest(verdict, angle):
 TRUTHS = {name: a_truth(angle, "payload") for name, angle in zip("abcd", (3.0, 4.9, 5.1, 90.0), strict=True)}
 TRUTHS["e"] = truth("payload")
 VERDICTS = {
-    "a": nearest(said("class", "link_weight", alternatives=["payload"]), 2.0),
-    "b": nearest(said("named", "link_weight"), 30.0),
-    "c": nearest(said("named", "payload"), None),
-    "d": said("adequate"),
-    "e": nearest(said("named", "payload"), 3.0),
+    "a": nearest(verdict_of("class", "link_weight", alternatives=["payload"]), 2.0),
+    "b": nearest(verdict_of("named", "link_weight"), 30.0),
+    "c": nearest(verdict_of("named", "payload"), None),
+    "d": verdict_of("adequate"),
+    "e": nearest(verdict_of("named", "payload"), 3.0),
 }
 
 

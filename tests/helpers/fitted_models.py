@@ -1,4 +1,4 @@
-"""Models of a robot with effects by their keys, measurements of them, and what a fit could not tell."""
+"""Models of a robot with effects by their keys, measurements of them, and what a fit does not identify."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ TARGETS = Target("A", "6DoF", None), Target("B", "3DoF", None)
 
 
 def model_of(robot, *keys, targets=TARGETS[:1], **options):
-    """A model of a robot with its nominal springs and these candidates of the catalogue; one target unless told."""
+    """A model of a robot with its nominal springs and these candidates of the catalogue; one target by default."""
     effects = tuple(candidate_on(robot.chain, key) for key in keys)
     return made_model(robot.chain, targets, effects=effects, compliance=robot.compliance, **options)
 

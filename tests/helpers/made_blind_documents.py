@@ -1,4 +1,4 @@
-"""Truths, verdicts and oracles of blind cases as documents, without making any case."""
+"""Ground truths, verdicts and oracles of blind cases as documents, without making any case."""
 
 import pandas as pd
 
@@ -52,7 +52,7 @@ def effect(name, *joints, parameters=(), alternatives=(), adopted=True):
 
 
 def verdict(word, *effects, before=2e-4, after=1e-4, reduction=(0.4, 0.6), warnings=(), compliance=1.0, freedom=0):
-    """What was said."""
+    """A verdict as in verdict.json."""
     return {
         "verdict": word,
         "effects": list(effects),
@@ -79,5 +79,5 @@ def oracle(p_value=1e-6, rms=1e-4):
 
 
 def frame(*entries):
-    """Rows of cases.csv of (truth, verdict, oracle)."""
+    """Rows of cases.csv of (ground truth, verdict, oracle)."""
     return pd.DataFrame([case_row(*entry) for entry in entries])

@@ -26,10 +26,10 @@ def scale():
 def tables(folder, *entries, follow_up=(), sweep=()):
     """As the pipeline has them: written and read again."""
     cases = frame(*entries)
-    intervals = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
+    intervals = pd.DataFrame([row for document, found, _ in entries for row in intervals_of(document, found)])
     made = {
         "cases": cases,
-        "summary": summarized(cases, intervals, statements((document, said) for document, said, _ in entries), 1),
+        "summary": summarized(cases, intervals, statements((document, found) for document, found, _ in entries), 1),
         "settings": by_setting(cases),
         "confusion": confused(cases),
         "power": powers(cases),

@@ -87,7 +87,7 @@ def made_unit(mechanism, location, columns, signs=0, log_prior=0.0, candidate=No
 
 
 def made_problem(rows, units, settings=None, tau=None):
-    """The problem of some rows, at the engine's own sizes of the pose error unless told, and its products."""
+    """The problem of some rows, at the engine's own sizes of the pose error by default, and its products."""
     settings, products = settings or Settings(), rows.products
     if tau is None:
         # In standard errors with which the measurements of one pose determine a joint angle.

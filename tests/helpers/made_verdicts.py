@@ -6,5 +6,5 @@ def truth(*effects, group="single", level=50.0):
     return {"campaign": "case_x", "case": case}
 
 
-def said(word, *names, alternatives=()):
+def verdict_of(word, *names, alternatives=()):
     return {"verdict": word, "effects": [{"name": name, "alternatives": list(alternatives)} for name in names]}

@@ -11,14 +11,14 @@ from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import Observations
 
-# At known places, so that nothing but the effects is to be told.
+# At known places, so that nothing but the effects is to be identified.
 HAND = (Target("hand", "6DoF", (0.1, 0.05, 0.02)),)
 ELBOW_AND_HAND = (Target("elbow", "3DoF", (0.0, 0.1, 0.05)), *HAND)
 
 
 @dataclass(frozen=True)
 class Planted:
-    """A campaign whose truth is known.
+    """A campaign whose ground truth is known.
 
     Attributes
     ----------
@@ -53,7 +53,7 @@ def two_loads_a_pose(joints, poses, seed, force=800.0):
 
 
 def planted(robot, sizes, seed=0, poses=25, targets=ELBOW_AND_HAND, states=None, **model):
-    """A campaign of positions and, unless told otherwise, identified compliances.
+    """A campaign of positions and, by default, identified compliances.
 
     Parameters
     ----------

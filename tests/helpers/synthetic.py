@@ -50,7 +50,7 @@ def equipped(holder):
 
 
 def made_model(holder, targets=None, rows=3, fitted_frames=True, compliance=None, effects=(), identified=False):
-    """A model of a chain or a robot; its targets are unknown offsets from the last measuring point unless told."""
+    """A model of a chain or a robot; its targets are unknown offsets from the last measuring point by default."""
     sites = equipped(holder)
     targets = (Target("A", sites.chain.end_effector.name, None),) if targets is None else targets
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else np.asarray(compliance)

@@ -1,4 +1,4 @@
-"""The blind proof: sealed cases on an independent plant, diagnosed without their truths, scored with them.
+"""The blind proof: sealed cases on an independent plant, diagnosed without their ground truths, scored with them.
 
 `snakemake -j2 blind` makes the size quick; `--config blind=full` the whole. Writes data/blind/, data/sealed/,
 results/blind/{block}.json and reports/blind/manifest.sha256. What is sealed is read by seal_cases here and, after the diagnosis, by

@@ -1,4 +1,4 @@
-"""What a finished run tells: where each report is that it made and, of a campaign, the verdict."""
+"""The outcome of a finished run: where each report is that it made and, of a campaign, the verdict."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""What was said for what was true."""
+"""Confusion matrix: verdicts by ground truth."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""How often intervals of parameters hold the truth."""
+"""How often intervals of parameters contain the true value."""
 
 import pandas as pd
 

@@ -1,4 +1,4 @@
-"""What the experiments of one robot can tell one strategy."""
+"""What one strategy can identify from the experiments of one robot."""
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table

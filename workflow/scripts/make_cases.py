@@ -1,4 +1,4 @@
-"""A block of blind cases: campaigns for the analyst, and their truths, sealed."""
+"""A block of blind cases: campaigns for the analyst, and their ground truths, sealed."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What was sealed against what was said."""
+"""The sealed ground truth against the verdicts."""
 
 from pathlib import Path
 
@@ -25,11 +25,11 @@ def score_cases(job: Job) -> None:
     oracles = {name: found for path in job.input.oracles for name, found in read_json(path).items()}
     cases = pd.DataFrame([case_row(truth, verdicts[name], oracles[name]) for name, truth in truths.items()])
     intervals = pd.DataFrame([row for name, truth in truths.items() for row in intervals_of(truth, verdicts[name])])
-    said = statements((truth, verdicts[name]) for name, truth in truths.items())
+    stated = statements((truth, verdicts[name]) for name, truth in truths.items())
     write_csv(job.output.cases, cases)
-    write_csv(job.output.probabilities, said)
-    write_csv(job.output.reliability, reliability(said))
-    write_csv(job.output.summary, summarized(cases, intervals, said, job.params.seed))
+    write_csv(job.output.probabilities, stated)
+    write_csv(job.output.reliability, reliability(stated))
+    write_csv(job.output.summary, summarized(cases, intervals, stated, job.params.seed))
     write_csv(job.output.settings, by_setting(cases))
     write_csv(job.output.confusion, confused(cases))
     write_csv(job.output.power, powers(cases))

@@ -1,4 +1,4 @@
-"""How often the name is right after further poses, proposed or random: what was sealed against what was said then."""
+"""How often the name is right after further poses, proposed or random: the sealed ground truth against the verdict then."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The confounding sweep: what was said of near relatives against the angle between them."""
+"""The confounding sweep: the verdict on near relatives against the angle between them."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The commitment: SHA-256 of every truth, before any diagnosis."""
+"""The commitment: SHA-256 of every ground truth, before any diagnosis."""
 
 import hashlib
 from pathlib import Path

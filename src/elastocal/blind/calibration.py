@@ -1,8 +1,8 @@
-"""Whether stated probabilities are worth what they say: reliability, expected calibration error, coverage of 95 % sets.
+"""Whether stated probabilities are calibrated: reliability diagram, expected calibration error, coverage of 95 % sets.
 
 A hypothesis is a set of mechanisms, as in ``verdict.json``; the empty set is "nothing". What is true of a case is the set of
 its mechanisms. Of a mechanism that the catalogue does not have every set that holds "other" is true; one that the joint
-compliances absorb at any size is as good as nothing, and no measurement could tell the two apart.
+compliances absorb at any size is as good as nothing, and no measurement could distinguish the two.
 """
 
 from __future__ import annotations
@@ -48,10 +48,12 @@ def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, An
         these are, and ``set_probability``, what they reach; ``nothing``; ``alarm_p_value``. None where nothing was stated, as
         with a fault of the data.
     """
-    said = verdict.get("probabilities")
-    if not said or not said["sets"]:
+    probabilities = verdict.get("probabilities")
+    if not probabilities or not probabilities["sets"]:
         return None
-    ranked = sorted(((frozenset(entry["mechanisms"]), entry["probability"]) for entry in said["sets"]), key=lambda e: -e[1])
+    ranked = sorted(
+        ((frozenset(entry["mechanisms"]), entry["probability"]) for entry in probabilities["sets"]), key=lambda e: -e[1]
+    )
     case, believed = truth["case"], credible(ranked)
     top, probability = ranked[0]
     return {
@@ -68,8 +70,8 @@ def stated(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, An
         "held": any(is_true(mechanisms, truth) for mechanisms, _ in believed),
         "set_size": len(believed),
         "set_probability": sum(share for _, share in believed),
-        "nothing": said["nothing"],
-        "alarm_p_value": said["alarm_p_value"],
+        "nothing": probabilities["nothing"],
+        "alarm_p_value": probabilities["alarm_p_value"],
     }
 
 
@@ -115,7 +117,7 @@ def statements(entries: Iterable[tuple[Mapping[str, Any], Mapping[str, Any]]]) -
     Parameters
     ----------
     entries : iterable of (dict, dict)
-        Truth and verdict.
+        Ground truth and verdict.
 
     Returns
     -------
@@ -142,7 +144,7 @@ def expected_calibration_error(probability: np.ndarray, correct: np.ndarray, bin
 
     Notes
     -----
-    As defined in [1]_ and [2]_. Even of verdicts that are calibrated it is not 0 but what `by_chance` tells, for the share of
+    As defined in [1]_ and [2]_. Even of verdicts that are calibrated it is not 0 but what `by_chance` gives, for the share of
     few cases scatters.
 
     References

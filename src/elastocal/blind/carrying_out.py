@@ -1,6 +1,6 @@
 """Experiments after the first, carried out on the robot of a case: the proposed one, and as many random poses beside it.
 
-The plant's side. It is told the name of a case, angles and loads, and makes the robot again from the list of cases; it opens no
+The plant's side. It gets the name of a case, angles and loads, and makes the robot again from the list of cases; it opens no
 sealed file, and what it writes is a campaign like the first.
 """
 
@@ -30,7 +30,7 @@ def carry_out(case: Case, shown: np.ndarray, wrench: np.ndarray, folder: str | P
     ----------
     case : Case
     shown : ndarray (E, n)
-        Angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most telling first.
+        Angles as the controller shows them, rad, as in next_experiment.csv; each row another pose, the most informative first.
     wrench : ndarray (E, 6)
         N, N m; each is read at the shares `LADDER` of it, as the poses of the campaign were.
     folder : str or Path

@@ -51,7 +51,7 @@ def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mappi
         | {
             "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
             "right_place": _places(defects, "effect") == _places(verdict["effects"], "name"),
-            # By the truth alone.
+            # By the ground truth alone.
             "exact_alias": any(_is_alias(defect, truth["case"]["robot"]) for defect in defects),
             "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),
         }

@@ -1,6 +1,6 @@
-"""The cases of the blind proof as data, and the making of one: a campaign for the analyst and a truth that is sealed.
+"""The cases of the blind proof as data, and the making of one: a campaign for the analyst and a ground truth that is sealed.
 
-A case is named by a hash, so that neither its folder nor its place in a list tells what is in it, and is seeded by its key:
+A case is named by a hash, so that neither its folder nor its place in a list reveals what is in it, and is seeded by its key:
 adding cases, or making them in another order or in blocks, changes none that is there.
 """
 
@@ -39,7 +39,7 @@ _WITHOUT_COMPENSATOR: dict[str, tuple[str, ...]] = {"iiwa14": ("compensator_torq
 LEVELS = (10.0, 25.0, 50.0, 200.0)
 NAMED = tuple(sorted(kind for kind in KINDS if not kind.startswith(OUTSIDE)))
 FOREIGN = tuple(sorted(kind for kind in KINDS if kind.startswith(OUTSIDE)))
-# What hides the weight of the links from the analyst: a robot file that does not tell it, of an arm that has no other weight.
+# What hides the weight of the links from the analyst: a robot file that declares none, of an arm that has no other weight.
 WEIGHT = "link_weight"
 SEVERAL_JOINTS, GEAR_GRAVITY, MOVED, UNDECLARED = "several_joints", "gear_gravity", "moved", "undeclared"
 # Mechanisms that come at several joints at once, as a bad mastering or one make of gears does.
@@ -126,7 +126,7 @@ _UNSEEN: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class Case:
-    """One case, from which its campaign and its truth follow.
+    """One case, from which its campaign and its ground truth follow.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Of its folder; tells nothing."""
+        """Of its folder; reveals nothing."""
         return "case_" + hashlib.sha256(f"{self.seed}/{self.key}".encode()).hexdigest()[:12]
 
 
@@ -190,7 +190,7 @@ class Counts:
     moved : int
         Of set-ups that move between rows, by little and by a millimetre, with and without the time written down, each.
     undeclared : int
-        Of arms of which nobody told that any link weighs anything.
+        Of arms whose robot file declares no weight of any link.
     also : tuple of Counts
         Of other robots.
     purpose : str
@@ -409,7 +409,7 @@ def robot_file(case: Case, robots_folder: str | Path) -> Path:
 
 
 def declared_of(case: Case, arm: Arm) -> tuple[LinkMass, ...]:
-    """What the analyst is told of the weights, tuple of LinkMass: nothing where they are what is hidden, or compensated."""
+    """Weights declared to the analyst, tuple of LinkMass: none where they are what is hidden, or compensated."""
     return declared_masses(arm) if _weighs(case) else ()
 
 
@@ -430,14 +430,14 @@ def defects_of(case: Case, robot: PhysicalRobot, design: Design) -> list[_Sized]
     Returns
     -------
     list of (Defect, dict)
-        Each with what the truth says of its size: target, quantity, signal, which draw. Of one mechanism at several joints each
+        Each with its size as in the ground truth: target, quantity, signal, which draw. Of one mechanism at several joints each
         has its own signal; the target is that of all together.
 
     Notes
     -----
     Where a location has no size of the wanted non-centrality, or one beyond three times the plausible, the next one is
     drawn; of eight that are all implausible the least is taken. Where none has a size at all, as with a wrong force scale, the
-    raw non-centrality is taken instead, and the ground truth says so: nothing can find that.
+    raw non-centrality is taken instead, and the ground truth states so: nothing can find that.
     """
     if not case.effects:
         return []
@@ -532,11 +532,11 @@ def _first_plausible(
         shares = [defect.size / KINDS[defect.effect].plausible_on(robot.arm) for defect in sized]
         if least is None or max(shares) < least[0]:
             signals = [signal] if len(sized) == 1 else [yardstick.signal(with_defects(robot, [defect])) for defect in sized]
-            told = {"non_centrality": level, "of": quantity, "draw": number}
+            sizing = {"non_centrality": level, "of": quantity, "draw": number}
             least = (
                 max(shares),
                 [
-                    (defect, told | {"share_of_plausible": share, "signal": asdict(own)})
+                    (defect, sizing | {"share_of_plausible": share, "signal": asdict(own)})
                     for defect, share, own in zip(sized, shares, signals, strict=True)
                 ],
             )
@@ -546,19 +546,19 @@ def _first_plausible(
 
 
 def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, robots_folder: str | Path) -> str:
-    """Make the campaign and the truth of a case.
+    """Make the campaign and the ground truth of a case.
 
     Parameters
     ----------
     case : Case
     blind_folder, sealed_folder : str or Path
-        The campaign goes to ``blind_folder/<name>/``, the truth to ``sealed_folder/<name>.json``.
+        The campaign goes to ``blind_folder/<name>/``, the ground truth to ``sealed_folder/<name>.json``.
     robots_folder : str or Path
 
     Returns
     -------
     str
-        SHA-256 of the truth.
+        SHA-256 of the ground truth.
     """
     robot, design = specimen_of(case, robots_folder), design_of(case)
     sized = defects_of(case, robot, design)
@@ -566,14 +566,14 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     folder = Path(blind_folder) / case.name
     schedule, declared = schedule_of(robot.arm, design, case.seed), declared_of(case, robot.arm)
     made = write_blind_campaign(folder, case.name, robot_file(case, robots_folder), bad, design, schedule, declared)
-    truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | told for defect, told in sized]}
+    truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
     if case.alternative:
         truth["alternative"] = {"effect": case.alternative, "angle_deg": angle_to_alternative(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
 
 
 def write_manifest(path: str | Path, digests: Mapping[str, str]) -> None:
-    """Write the commitment that is published before any diagnosis: a line ``sha256  name`` for each truth.
+    """Write the commitment that is published before any diagnosis: a line ``sha256  name`` for each ground truth.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Truth against what was said, as counts."""
+"""Confusion matrix: ground truth against verdict, as counts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WORDS = (CLASS_WITH, CLASS_WITHOUT, SEVERAL, UNEXPLAINED, NOT_TESTABLE, ADEQUATE
 
 
 def confused(cases: pd.DataFrame) -> pd.DataFrame:
-    """Truth against what was said.
+    """Ground truth against verdict.
 
     Parameters
     ----------
@@ -33,19 +33,19 @@ def confused(cases: pd.DataFrame) -> pd.DataFrame:
     -------
     pandas.DataFrame
         One row for each kind of robots, settings (usual, hard, or a group of its own such as a sweep), truth and level; one
-        column for each name of the catalogue said alone and for each other word, all of them always there: every row adds up to
-        its cases.
+        column for each name of the catalogue stated alone and for each other verdict, all of them always there: every row adds
+        up to its cases.
     """
     names = [*effects()]
-    stated = zip(cases["verdict"], cases["found"], cases["holds_truth"], strict=True)
-    said = [_said(verdict, found, holds_truth, names) for verdict, found, holds_truth in stated]
+    entries = zip(cases["verdict"], cases["found"], cases["holds_truth"], strict=True)
+    verdicts = [_column(verdict, found, holds_truth, names) for verdict, found, holds_truth in entries]
     setting = cases.setting.where(cases.setting == "usual", "hard").where(~cases.group.isin(APART), cases.group)
     truth = cases.truth.where(cases.group != PAIR, PAIR)
-    table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(said, cases.index, name="said"))
+    table = pd.crosstab([cases.robots, setting, truth, cases.level], pd.Series(verdicts, cases.index, name="stated"))
     return table.reindex(columns=[*names, FAULT, *WORDS], fill_value=0).reset_index().rename(columns={"setting": "settings"})
 
 
-def _said(verdict: str, found: str, holds_truth: bool, names: Collection[str]) -> str:
+def _column(verdict: str, found: str, holds_truth: bool, names: Collection[str]) -> str:
     if verdict == NAMED:
         return found if found in names else FAULT
     if verdict == CLASS:

@@ -1,4 +1,4 @@
-"""How often 95 % intervals of parameters hold the truth."""
+"""How often 95 % intervals of parameters contain the true value."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[d
     -------
     list of dict
         Joint compliances, whatever was found; parameters of an effect that was found at the right joints, whatever was found
-        beside it. A parameter that the data could not tell has no interval.
+        beside it. A parameter that the data do not identify has no interval.
     """
     case, found = truth["case"], verdict["effects"]
     right = sorted(effect["name"] for effect in found) == sorted(case["effects"])
@@ -79,7 +79,7 @@ def intervals_of(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> list[d
 
 
 def covered(intervals: pd.DataFrame) -> pd.DataFrame:
-    """Shares of intervals that hold the truth.
+    """Shares of intervals that contain the true value.
 
     Parameters
     ----------

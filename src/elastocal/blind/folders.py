@@ -1,4 +1,4 @@
-"""The folder that an analyst gets, and the sealed truth that he does not. A campaign's format is a contract of both sides."""
+"""The analyst's folder, and the sealed ground truth outside of it. A campaign's format is a contract of both sides."""
 
 from __future__ import annotations
 
@@ -38,23 +38,29 @@ def robot_document(
         Of the robot file of which this is a specimen.
     arm : Arm
     declared : tuple of LinkMass
-        What the analyst is told of the weights; where it is nothing, the file says nothing of them.
+        Weights as they are declared to the analyst; where there are none, the file has no masses.
     gravity_m_s2 : tuple of float
 
     Returns
     -------
     dict
     """
-    told = {key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")}
+    described = {
+        key: value for key, value in document.items() if key not in ("masses", "gravity_m_s2", "compensator", "payload_kg")
+    }
     if declared:
-        told["masses"] = [
+        described["masses"] = [
             {"link": m.link, "mass_kg": m.mass_kg, "centre_m": list(m.centre_m), "relative_std": m.relative_std}
             for m in declared
         ]
-    told |= {"gravity_m_s2": list(gravity_m_s2), "payload_kg": round(arm.payload_kg, 1), "gear_ratio": list(arm.gear_ratio)}
+    described |= {
+        "gravity_m_s2": list(gravity_m_s2),
+        "payload_kg": round(arm.payload_kg, 1),
+        "gear_ratio": list(arm.gear_ratio),
+    }
     if arm.compensated:
-        told["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
-    return told
+        described["compensator"] = document.get("compensator", {"joint": 2, "kind": "spring"})
+    return described
 
 
 def campaign_document(name: str, arm: Arm, design: Design) -> dict[str, Any]:
@@ -91,20 +97,20 @@ def write_blind_campaign(
     folder : str or Path
         The campaign's own.
     name : str
-        Of the campaign; must not give the truth away.
+        Of the campaign; must not give the ground truth away.
     robot_file : str or Path
         Of which the robot is a specimen.
     robot : PhysicalRobot
     design : Design
     schedule : Schedule
     declared : tuple of LinkMass
-        What the analyst is told of the weights.
+        Weights as they are declared to the analyst.
     kind : {"parquet", "csv"}
 
     Returns
     -------
     dict
-        What a truth document says of the making of the data.
+        How the data were made, for the ground truth of the case.
     """
     table, outliers = measured_table(robot, design, schedule)
     write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
@@ -154,14 +160,14 @@ def write_dynamic_campaign(
 
 
 def _write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
-    described = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
-    told = robot_document(described, robot.arm, declared, robot.structure.gravity_m_s2)
+    nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
+    document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2)
     with atomic_write(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
-        yaml.safe_dump(told, file, sort_keys=False, default_flow_style=None, width=120)
+        yaml.safe_dump(document, file, sort_keys=False, default_flow_style=None, width=120)
 
 
 def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
-    """Seal a truth document: sorted JSON, outside of the campaign's folder.
+    """Seal the ground truth of a case: sorted JSON, outside of the campaign's folder.
 
     Parameters
     ----------
@@ -181,7 +187,7 @@ def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str
     """
     path, folder = Path(path), Path(campaign_folder)
     if folder.resolve() in path.resolve().parents:
-        raise ValueError(f"{path}: the truth must not lie in the campaign's folder {folder}")
+        raise ValueError(f"{path}: the ground truth must not lie in the campaign's folder {folder}")
     text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:

@@ -1,6 +1,6 @@
 """The loop once more: which blind cases are followed up, what is read further, and the verdicts on it.
 
-The analyst's side, which knows neither truths nor the plant; `carrying_out` is the other side.
+The analyst's side, which knows neither ground truths nor the plant; `carrying_out` is the other side.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def folder_name(arm: str, poses: int) -> str:
 
 
 def diagnosed_until_named(folder_at: Mapping[int, str], diagnose: Callable[[str], dict[str, Any]]) -> dict[int, dict[str, Any]]:
-    """Verdicts with more and more poses, until a single name is said.
+    """Verdicts with more and more poses, until a single name is stated.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ def diagnosed_until_named(folder_at: Mapping[int, str], diagnose: Callable[[str]
     Returns
     -------
     dict of int to dict
-        Verdicts by the number of further poses; the last is the first that says "named", or that on all poses.
+        Verdicts by the number of further poses; the last is the first that is "named", or that on all poses.
     """
-    said: dict[int, dict[str, Any]] = {}
+    verdicts: dict[int, dict[str, Any]] = {}
     for poses, folder in folder_at.items():
-        said[poses] = diagnose(folder)
-        if said[poses]["verdict"] == NAMED:
+        verdicts[poses] = diagnose(folder)
+        if verdicts[poses]["verdict"] == NAMED:
             break
-    return said
+    return verdicts
 
 
 def diagnosed_anew(campaigns: str | Path, diagnose: Callable[[str], dict[str, Any]]) -> list[dict[str, Any]]:

@@ -32,7 +32,7 @@ def followed(
     anew: Sequence[Mapping[str, Any]],
     promised: Mapping[str, float],
 ) -> pd.DataFrame:
-    """What was said of each case followed up, after each number of poses.
+    """Score of the verdict on each case followed up, after each number of poses.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def followed(
     pandas.DataFrame
         One row for each case, arm and number of poses, 0 among them. After a single name no more is measured, and it stands.
     """
-    said = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
+    verdicts = {(entry["campaign"], entry["arm"], entry["poses"]): entry["verdict"] for entry in anew}
     rows = []
     for name in sorted({entry["campaign"] for entry in anew}):
         for arm in ARMS:
             verdict = first[name]
             for poses in (0, *POSES):
-                verdict = said.get((name, arm, poses), verdict)
+                verdict = verdicts.get((name, arm, poses), verdict)
                 rows.append({"arm": arm, "poses_added": poses, "promised": promised[name]} | outcome(truths[name], verdict))
     return pd.DataFrame(rows, columns=_CASE_COLUMNS)
 
@@ -64,7 +64,7 @@ def followed(
 def promised(proposals: pd.DataFrame) -> dict[str, float]:
     """Separation from the nearest alternative with all poses, by the name of the case, of tables of proposals.
 
-    None where a proposal says that it leaves alternatives aside, for it promises no single name then.
+    None where a proposal states that it leaves alternatives aside, for it promises no single name then.
     """
     if "separation" not in proposals:
         return {}
@@ -82,7 +82,7 @@ def with_one_effect(cases: pd.DataFrame) -> pd.Series:
 def with_prospects(cases: pd.DataFrame) -> pd.Series:
     """Which rows are of cases whose proposal promises as much separation as the verdict asks for.
 
-    The others are aliases, exact ones or nearly so: no poses and loads of this kind would tell them apart.
+    The others are aliases, exact ones or nearly so: no poses and loads of this kind would distinguish them.
     """
     return cases["promised"] >= PROMISE
 

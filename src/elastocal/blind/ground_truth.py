@@ -1,4 +1,4 @@
-"""What was sealed, opened for the scores and for nothing else."""
+"""The sealed ground truth of the cases, read for the scores and the oracle only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, dict[str, Any]]:
-    """Open sealed files that are as promised.
+    """Read sealed files whose hashes are those that were published.
 
     Parameters
     ----------
@@ -33,11 +33,11 @@ def load_ground_truth(files: Iterable[Path], manifest: str | Path) -> dict[str, 
         A file is not the one whose hash was published.
     """
     lines = Path(manifest).read_text(encoding="utf-8").splitlines()
-    promised = {name: digest for digest, name in map(str.split, lines)}
+    published = {name: digest for digest, name in map(str.split, lines)}
     truths = {}
     for file in sorted(files, key=lambda file: file.name):
         found = hashlib.sha256(file.read_bytes()).hexdigest()
-        if promised.get(file.name) != found:
-            raise InputError(file, "", f"SHA-256 {found}", f"{promised.get(file.name)}, as sealed")
+        if published.get(file.name) != found:
+            raise InputError(file, "", f"SHA-256 {found}", f"{published.get(file.name)}, as sealed")
         truths[file.stem] = read_json(file)
     return truths

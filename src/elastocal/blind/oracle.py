@@ -1,7 +1,7 @@
-"""The oracle: what the same fit does when it is told which effects there are and at which joints.
+"""The oracle: what the same fit does when it is given which effects there are and at which joints.
 
 It has the measurements, the noise and the held-out poses of the diagnosis, so that what it does better is worth what the search
-for the effect has cost. It is told the effect by its name in the catalogue, not the plant's law; nor which variant of it (axes,
+for the effect has cost. It gets the effect by its name in the catalogue, not the plant's law; nor which variant of it (axes,
 by time or by temperature): of these it takes the one that the residual of the declared model speaks for.
 """
 
@@ -55,7 +55,7 @@ def oracle(
     dict or None
         ``candidates`` that the model was given; ``p_value`` of a Wald test [1]_ of all their coefficients at once (chi-squared,
         with the covariance of the fit at its shapes; a fitted shape counts as one more degree of freedom, and the p-value is
-        multiplied by the number of variants, a Bonferroni correction [2]_), 1 where these data can tell none of them;
+        multiplied by the number of variants, a Bonferroni correction [2]_), 1 where these data identify none of them;
         ``detected`` at 5 %; ``heldout``, errors on the held-out poses as in verdict.json. None where an effect is outside of
         the catalogue: no model of it has that effect.
 
@@ -70,13 +70,13 @@ def oracle(
         return None
     if not effects:
         # Without an effect the declared model is the right one, and has been judged already.
-        return _told((), 1.0, verdict["heldout"]["before"])
+        return _outcome((), 1.0, verdict["heldout"]["before"])
     case, unseen = cases_in(folder, robots_folder)
     declared = fit(case.model, case.observations, noise_from(verdict).of_measurements)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
     _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)
-    return _told(members, p_value, heldout["before"])
+    return _outcome(members, p_value, heldout["before"])
 
 
 def members_of(effect: str, joints: Sequence[int], candidates: Iterable[Candidate]) -> list[list[Candidate]]:
@@ -120,7 +120,7 @@ def _with_effects(
         alternatives = [members for members in alternatives if members]
         if alternatives:
             variants *= len(alternatives)
-            chosen += max(alternatives, key=lambda members: sum(told for told, _, _ in members))
+            chosen += max(alternatives, key=lambda members: sum(factor for factor, _, _ in members))
     members = tuple(candidate for _, candidate, _ in chosen)
     start = declared.estimate.with_effects(members)
     start = replace(start, shapes=(*declared.estimate.shapes, *(np.array(shapes, float) for _, _, shapes in chosen)))
@@ -145,7 +145,7 @@ def _parameters_of(fitted: Fit, key: str) -> np.ndarray:
     return np.flatnonzero([owner == key for owner, _ in fitted.parameters])
 
 
-def _told(members: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]) -> dict[str, Any]:
+def _outcome(members: Iterable[Candidate], p_value: float, heldout: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "candidates": [member.key for member in members],
         "p_value": p_value,

@@ -1,4 +1,4 @@
-"""What the verdict on a case is worth, given its truth."""
+"""What the verdict on a case is worth, given its ground truth."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SILENT = (ADEQUATE, NOT_TESTABLE)
 
 
 def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
-    """What a verdict is worth, given the truth.
+    """What a verdict is worth, given the ground truth.
 
     Whether each true effect is held by another one of those found is an assignment problem [1]_.
 
@@ -34,18 +34,18 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
     Returns
     -------
     dict
-        Of the case: where it belongs, what was true, what was said. ``exact`` says that the names found are the true ones,
-        ``named_right`` that this was said without another name beside it, ``holds_truth`` that as many effects were found as
-        were made and each true one is the name of another of them or among its alternatives, ``wrong_name`` that one wrong
-        name was said alone.
+        Of the case: where it belongs, what was true, what the verdict was. ``exact``: the names found are the true ones;
+        ``named_right``: so, and the verdict states no other name beside it; ``holds_truth``: as many effects were found as
+        were made, and each true one is the name of another of them or among its alternatives; ``wrong_name``: one wrong name
+        is stated alone.
 
     References
     ----------
     .. [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
-    case, said = truth["case"], verdict["verdict"]
+    case, kind = truth["case"], verdict["verdict"]
     names, true = [effect["name"] for effect in verdict["effects"]], list(case["effects"])
-    stated = bool(true) and said in (NAMED, CLASS, SEVERAL)
+    stated = bool(true) and kind in (NAMED, CLASS, SEVERAL)
     right = stated and sorted(names) == sorted(true)
     return {
         "case": truth["campaign"],
@@ -55,13 +55,13 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
         "setting": case["setting"],
         "truth": " + ".join(true) or NONE,
         "level": max(case["levels"], default=0.0),
-        "verdict": said,
+        "verdict": kind,
         "found": " + ".join(names) or NONE,
-        "detected": said not in SILENT,
+        "detected": kind not in SILENT,
         "exact": right,
-        "named_right": right and said == NAMED,
+        "named_right": right and kind == NAMED,
         "holds_truth": stated and _each_is_held(true, verdict["effects"]),
-        "wrong_name": said == NAMED and names != true,
+        "wrong_name": kind == NAMED and names != true,
     }
 
 

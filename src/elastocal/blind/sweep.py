@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 # Upper ends of the bins, degrees.
 ANGLES = (5.0, 10.0, 20.0, 40.0, 90.0)
-# What may come of a case: the right name, a class that holds the truth, a wrong single name, or anything else, such as silence.
+# What may come of a case: the right name, a class that contains it, a wrong single name, or anything else, such as silence.
 OUTCOMES = ("right", "class", "wrong", "other")
 
 
 def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
-    """What was said of each case of the sweep.
+    """Outcome of each case of the sweep.
 
     Parameters
     ----------
@@ -40,8 +40,8 @@ def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mappin
             continue
         row, alternative, angles = outcome(truth, verdicts[name]), truth["alternative"], _angles(verdicts[name])
         pair = " / ".join(sorted((row["truth"], alternative["effect"])))
-        said = "right" if row["named_right"] else "wrong" if row["wrong_name"] else "other"
-        said = "class" if row["verdict"] == "class" and row["holds_truth"] else said
+        result = "right" if row["named_right"] else "wrong" if row["wrong_name"] else "other"
+        result = "class" if row["verdict"] == "class" and row["holds_truth"] else result
         shown = (
             row["truth"],
             row["setting"],
@@ -50,7 +50,7 @@ def swept(truths: Mapping[str, Mapping[str, Any]], verdicts: Mapping[str, Mappin
             row["verdict"],
             row["found"],
         )
-        rows.append((name, row["robot"], pair, *shown, said))
+        rows.append((name, row["robot"], pair, *shown, result))
     return pd.DataFrame(rows, columns=columns)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-# A joint that moves less than measurements of one pose may differ tells no poses apart.
+# A joint that moves less than measurements of one pose may differ does not distinguish poses.
 _STILL_RAD = 0.02
 _ROUNDS = 100
 # How often a pose drawn like the others, from a box, is called beyond their range.

@@ -1,4 +1,4 @@
-"""Checks of measurements as a whole: what can be told wrong of them without fitting anything."""
+"""Checks of measurements as a whole: what can be recognised as wrong in them without fitting anything."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     known = file_columns(joints)
     for name in names:
         if name not in known:
-            # That q7 is unknown tells little where nobody says of how many joints the robot is.
+            # That q7 is unknown helps little where it is not stated how many joints the robot has.
             of = f", for {joints} joints" if name.rstrip("0123456789") in ("q", "approach") else ""
             missing = [other for other in known if other not in names]
             raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)

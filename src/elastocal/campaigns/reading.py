@@ -1,7 +1,7 @@
 """A campaign's folder, read and checked before anything is fitted to it.
 
 A campaign is a folder of ``campaign.yaml`` and ``measurements.csv`` or ``measurements.parquet``, one row for each measurement
-of one target. All that can be told wrong without fitting anything is refused here, in one line; a unit that only a fit can tell
+of one target. All that is wrong on its face is refused here, in one line; a unit that only a fit can show to be
 wrong is left for the diagnosis to trace.
 """
 

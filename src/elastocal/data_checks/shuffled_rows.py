@@ -55,7 +55,7 @@ _SAME_PLACE_M = 1e-3
 # Rows in place tell how well rows in place fit, if they are so many.
 _FEWEST_IN_PLACE = 10
 _MATCHING_ROUNDS = 10
-# Orientations tell places apart as points at this distance from the target would, m.
+# Orientations distinguish places as points at this distance from the target would, m.
 _ARM_M = 0.5
 # A shift concerns all rows: more than this share is absurdly far, and all but a few come right.
 _MANY, _CURED = 0.01, 0.9

@@ -116,7 +116,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     seed : int
         Of the simulated null distribution.
     progress : callable, optional
-        Told a line after each stage.
+        Gets a line after each stage.
 
     Returns
     -------

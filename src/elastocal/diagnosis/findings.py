@@ -192,7 +192,7 @@ def _product(entry: dict[str, Any], model: Model) -> dict[str, Any]:
 
 
 def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observations: Observations) -> list[dict[str, Any]]:
-    """How far weight lets a target sag at most, where the measurements tell no masses.
+    """How far weight lets a target sag at most, where the measurements identify no masses.
 
     Its standard error is by the delta method.
 
@@ -209,7 +209,7 @@ def sag_entries(name: str, members: Sequence[Candidate], final: Fit, observation
     Returns
     -------
     list of dict
-        One entry, in m; none where the effect is not of gravity, or where its masses can be told.
+        One entry, in m; none where the effect is not of gravity, or where its masses are identifiable.
     """
     if members[0].family != "gravity" or final.model.identifies_compliance:
         return []

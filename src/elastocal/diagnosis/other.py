@@ -70,7 +70,7 @@ class Competitor:
 
     @property
     def name(self) -> str:
-        """Tells the laws of one location apart."""
+        """Distinguishes the laws of one location."""
         return self.law if self.location else f"{self.law} {self.motion}"
 
 

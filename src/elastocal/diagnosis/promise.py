@@ -78,7 +78,7 @@ class Promise:
     def separations(self, logs: np.ndarray) -> np.ndarray:
         """Separation of the best hypothesis from each by `log_factors` of an experiment, ndarray (H,); 0 for the best.
 
-        Twice the mean log Bayes factor for the truth, or, where that is carried by a few large draws, the separation of two
+        Twice the mean log Bayes factor for the true model, or, where a few large draws carry that mean, the separation of two
         fixed hypotheses of which one gets odds of 19:1 as often: the smaller of both.
         """
         weights = np.exp(self.log_prior)

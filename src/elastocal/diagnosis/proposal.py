@@ -46,7 +46,7 @@ class Proposal:
         Measuring points at which targets are read in every pose.
     separation : ndarray (E,)
         From the nearest alternative, by measurements of this pose and all before it: at most twice the log Bayes factor that
-        they bring for the truth on average; 16 gives it odds of 19:1 from even ones with 90 %.
+        they bring for the true hypothesis on average; 16 gives it odds of 19:1 from even ones with 90 %.
     resolved : ndarray (E,)
         Probability that after this pose the right hypothesis has 95 %, those in `indistinguishable` aside.
     present : float
@@ -58,7 +58,7 @@ class Proposal:
     nearest : tuple of str
         Of the alternative with the smallest separation.
     indistinguishable : tuple of tuple of str
-        Alternatives that no experiment within reach tells from the best; they do not count in the promise.
+        Alternatives that no experiment within reach distinguishes from the best; they do not count in the promise.
     reason : str
         Why there is nothing to measure; empty where there is.
     """
@@ -213,7 +213,7 @@ def words(mechanisms: Collection[str]) -> str:
 
 
 def _left_aside(proposal: Proposal) -> Iterator[str]:
-    """Sentences on the alternatives that nothing within reach tells from the best: instead of it, or beside it."""
+    """Sentences on the alternatives that nothing within reach distinguishes from the best: instead of it, or beside it."""
     best = set(proposal.best)
     instead = [words(name) for name in proposal.indistinguishable if not set(name) > best or OTHER in set(name) - best]
     beside = dict.fromkeys(

@@ -22,7 +22,7 @@ _ANY_KEY = _KEY.format(names=r"[^@\[]+") + "$"
 _LOCATION = re.compile(r"^(?:(?P<kind>joint|link)s? (?P<numbers>\d+(?: and \d+)*))? ?(?P<detail>.*)$")
 # Locations that have no joint: what stands there in the place of one.
 _PARTS = ("column", "base")
-# Bands of orders, variants and the like are told of as many locations; of more only their joints.
+# Bands of orders, variants and the like are given for as many locations; of more only their joints.
 _MOST_DETAILED = 2
 
 

@@ -1,8 +1,8 @@
 """The weight of the links as the robot file declares it, with errors as large as the file says: theta_i = c_i tau_i(q, m).
 
 No NAME, for it is no missing effect: the declared model has it where the robot file has masses. Linear in the error of each
-mass and of its first moments m c, which are what statics can tell (Atkeson, An and Hollerbach 1986); a mass takes its declared
-centre with it, so that both errors are independent before the data speak.
+mass and of its first moments m c, which are what statics identifies (Atkeson, An and Hollerbach 1986); a mass takes its
+declared centre with it, so that both errors are independent before the data speak.
 """
 
 from __future__ import annotations

@@ -68,7 +68,7 @@ def _of_the_arm(sites: Sites, joints: Sequence[int]) -> Iterator[Candidate]:
             torques = _torques(conditions, links, axes)
             return [dict(enumerate((torque * conditions.compliance).T)) for torque in torques]
 
-        # Without a load nothing tells the compliances, and nominal ones are far off.
+        # Without a load the compliances are not identifiable, and nominal ones are far off.
         return Candidate(
             NAME, FAMILY, (), detail, tuple(parameters), displacement, frozenset({"external load"}), location_name=_OF_THE_ARM
         )

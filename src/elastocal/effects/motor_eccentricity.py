@@ -28,7 +28,7 @@ WORDS = "motor eccentricity"
 _ORDERS = (1, 2)
 # An eccentric of some milliradians at the motor, over a ratio of a hundred.
 _AMPLITUDE_RAD = 5e-5
-# Any angles tell the waves of the motor apart; twice as many as there are of them, and some.
+# Any angles make the waves of the motor distinguishable; twice as many as there are of them, and some.
 _DISTINCT_ANGLES = 12
 
 

@@ -168,7 +168,7 @@ class Candidate:
 
     @property
     def location(self) -> tuple[int | str, ...]:
-        """Where the effect acts: its joints, with the name of the location where they do not tell it."""
+        """Where the effect acts: its joints, with the name of the location where they do not determine it."""
         return (*self.joints, self.location_name) if self.location_name else self.joints
 
     @property

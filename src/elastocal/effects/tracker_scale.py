@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 NAME, FAMILY = "tracker_scale", "geometry"
 WORDS = "scale error of the tracker"
-# Twenty kelvins or 70 hPa of air that nobody told the tracker of.
+# Twenty kelvins or 70 hPa of air that were not entered in the tracker.
 _PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
 
 

@@ -1,4 +1,4 @@
-"""Heat maps of the blind proof: what is found at which size beside the oracle, and what is said for what."""
+"""Heat maps of the blind proof: what is found at which size beside the oracle, and the verdict for each ground truth."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def power_map(power: pd.DataFrame) -> Figure:
 
 @styled
 def confusion_map(confusion: pd.DataFrame) -> Figure:
-    """What was said for what was true, at the largest sizes.
+    """Verdicts by ground truth, at the largest sizes.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def confusion_map(confusion: pd.DataFrame) -> Figure:
         [name for name in (_NONE,) if name in counts.index],
     ]
     order = [name for group in groups for name in group]
-    # A name that nobody said, and that was nowhere true, needs no column.
+    # A name that no verdict states, and that was nowhere true, needs no column.
     columns = [name for name in named if counts[name].any() or name in counts.index] + words
     shown = counts.loc[order, columns].to_numpy(float)
     totals = counts.loc[order].to_numpy(float).sum(axis=1)
@@ -104,7 +104,7 @@ def confusion_map(confusion: pd.DataFrame) -> Figure:
     axis.set(xticks=range(len(columns)), yticks=range(len(order)))
     axis.set_xticklabels([_name(name) for name in columns], rotation=90, fontsize=6)
     axis.set_yticklabels([_name(name) for name in order], fontsize=6)
-    axis.set(xlabel="said", ylabel="true")
+    axis.set(xlabel="verdict", ylabel="ground truth")
     axis.axvline(len(columns) - len(words) - 0.5, color="black", linewidth=0.8)
     for border in np.cumsum([len(group) for group in groups])[:-1]:
         axis.axhline(border - 0.5, color="black", linewidth=0.8)

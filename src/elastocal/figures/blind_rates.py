@@ -1,4 +1,4 @@
-"""Rates of the blind proof as dots with their intervals: against the targets, and how often intervals hold the truth."""
+"""Rates of the blind proof as dots with their intervals: against the targets, and coverage of intervals."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def rates_and_targets(summary: pd.DataFrame) -> Figure:
 
 @styled
 def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
-    """How often 95 % intervals hold the truth, for each kind of parameter.
+    """How often 95 % intervals contain the true value, for each kind of parameter.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
     whole = coverage[(coverage.parameter == "all") & (coverage.level.astype(str) == "all")]
     rows = whole[whole.robots == leading(whole.robots)]
     if rows.empty:
-        return note("This run has no interval that a truth can be compared with.")
+        return note("This run has no interval that a true value can be compared with.")
     of_effects = rows[rows.kind == "effect"].sort_values(["effect"])
     order = [
         *_rows(_Coverage, rows[rows.kind != "effect"]),
@@ -132,7 +132,7 @@ def coverage_by_effect(coverage: pd.DataFrame) -> Figure:
     lowest = min([_PER_CENT * row.low for row in order])
     axis.set(yticks=range(len(order)), ylim=(len(order) - 0.5, -0.5), xlim=(min(80.0, lowest - 2), 100.5))
     axis.set_yticklabels([_coverage_name(row) for row in order], fontsize=7)
-    axis.set_xlabel("95 % intervals that hold the truth (%)")
+    axis.set_xlabel("95 % intervals that contain the true value (%)")
     axis.annotate(
         "intervals", (1.01, -0.9), xycoords=("axes fraction", "data"), va="center", fontsize=6.5, annotation_clip=False
     )

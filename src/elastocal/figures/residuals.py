@@ -311,7 +311,7 @@ def _states(table: Mapping[str, np.ndarray]) -> tuple[np.ndarray, dict[str, np.n
 
 
 def _cell_side(extent: np.ndarray) -> float:
-    # One digit: a cell that can be told to others.
+    # One digit: the side of a cell is a number that can be quoted.
     side = extent.max() / _CELLS
     digit = 10.0 ** np.floor(np.log10(side))
     return float(np.ceil(side / digit) * digit)

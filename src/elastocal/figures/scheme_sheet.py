@@ -53,7 +53,7 @@ class Sheet:
         self.axes.plot(*np.array(points).T, **{"color": INK, "lw": 0.8, "solid_capstyle": "round", **style})
 
     def text(self, place: Place, text: str, **style: Any) -> Text:
-        """A text, centred on its place unless told otherwise."""
+        """A text, centred on its place by default."""
         style = {"ha": "center", "va": "center", "fontproperties": FONT, "color": INK, "zorder": 8, **style}
         return self.axes.text(place[0], place[1], text, **style)
 

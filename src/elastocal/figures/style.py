@@ -1,4 +1,4 @@
-"""One look for all figures: sizes, colours that colour-blind readers can tell apart, and a line style for each strategy."""
+"""One look for all figures: sizes, colours that colour-blind readers can distinguish, and a line style for each strategy."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ _COLUMNS = 4
 
 @styled
 def sweep(table: pd.DataFrame) -> Figure:
-    """Stacked bars of what was said, a panel for each pair and one for all.
+    """Stacked bars of the outcomes, a panel for each pair and one for all.
 
     Parameters
     ----------

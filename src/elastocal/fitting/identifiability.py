@@ -1,9 +1,9 @@
-"""What the data can tell: least squares over that alone, all else held at its value and named."""
+"""What the data identify: least squares over that alone, all else held at its value and named."""
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-# Correlation beyond which a parameter cannot be told because of a shape.
+# Correlation beyond which a parameter is not identifiable because of a shape.
 _BOUND_TO_SHAPE = 0.5
 
 
@@ -16,7 +16,7 @@ def solve_identifiable(
     present: float | np.ndarray = 0.0,
     nonlinear: bool | np.ndarray = False,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Least squares over the parameters that the data can tell.
+    """Least squares over the parameters that the data identify.
 
     A parameter whose standard error would exceed its plausible size, first beside those before it and then beside all, keeps
     its value. Nothing is regularised but what carries a prior, as in generalized ridge regression [1]_.
@@ -90,7 +90,7 @@ def solve_normal(
 
 
 def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
-    """Which parameters the data can tell from zero at their plausible size: first given those before them, then given all.
+    """Which parameters the data distinguish from zero at their plausible size: first given those before them, then given all.
 
     Forward selection in the order given, by the pivots of a sequential Cholesky decomposition, then backward elimination.
 
@@ -118,7 +118,7 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
         if left_over > max(1.0, 1e-11 * gram[number, number]):
             factor[len(kept), : len(kept)], factor[len(kept), len(kept)] = row, np.sqrt(left_over)
             kept.append(number)
-    # Parameters that came later may have taken from what their predecessors could be told by.
+    # Parameters that came later may have taken from what identified their predecessors.
     while kept:
         covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
         deviation = np.sqrt(np.diag(covariance))

@@ -182,7 +182,7 @@ def read_table(
 
 
 def read_provenance(path: str | Path) -> dict[str, Any]:
-    """What `write_table` was told of where the table comes from.
+    """Provenance of a table, as it was given to `write_table`.
 
     Parameters
     ----------

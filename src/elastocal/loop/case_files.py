@@ -1,4 +1,4 @@
-"""Cases from the files that earlier steps wrote."""
+"""The case of a campaign from the files that step 1 wrote."""
 
 from __future__ import annotations
 

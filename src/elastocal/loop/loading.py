@@ -47,6 +47,6 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
 
 def _descriptions(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     document, robot_path = read_descriptions(folder, robots_folder)
-    # What a campaign may leave out is said here, so that no later step has to know what its absence means.
-    said = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
-    return {"source": f"{folder}/{DOCUMENT}", "campaign": said, "robot": read_document(robot_path)}
+    # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.
+    complete = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
+    return {"source": f"{folder}/{DOCUMENT}", "campaign": complete, "robot": read_document(robot_path)}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def proposed(folder: str | Path, robots_folder: str | Path, poses: int, ladder: tuple[float, ...], seed: int) -> pd.DataFrame:
-    """Poses that best tell what was found in a campaign from its alternatives.
+    """Poses that best distinguish what was found in a campaign from its alternatives.
 
     Parameters
     ----------

@@ -46,9 +46,9 @@ def campaign_rows(
     rows = []
     for name, members in groups.items():
         held_out = pd.concat([residuals[member] for member in members])
-        said = pd.Series([verdicts[member]["verdict"] for member in members]).value_counts()
+        stated = pd.Series([verdicts[member]["verdict"] for member in members]).value_counts()
         named = pd.Series([_effects(verdicts[member]) for member in members]).value_counts()
-        head = {"campaign": name, "verdict": _counted(said, len(members)), "effects": _counted(named, len(members))}
+        head = {"campaign": name, "verdict": _counted(stated, len(members)), "effects": _counted(named, len(members))}
         session: Any
         for session, part in held_out.groupby("session"):
             rows.append(head | {"session": session} | _errors(part, stream(seed, name, "summary", session)))

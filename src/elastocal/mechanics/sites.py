@@ -98,7 +98,7 @@ class Sites:
 
     @cached_property
     def followed(self) -> tuple[MeasuringPoint, ...]:
-        """Points whose motion tells the load on the coordinates: the end, the far ends of links 0..n, and what has a mass."""
+        """Points whose motion gives the load on the coordinates: the end, the far ends of links 0..n, and what has a mass."""
         end = MeasuringPoint("end", self.chain.end_effector.after)
         far_ends = [self.far_end(link) for link in range(self.joints + 1)]
         return (end, *far_ends, *(self.body(mass.link) for mass in self.masses))

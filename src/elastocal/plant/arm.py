@@ -236,7 +236,7 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
         tuple(_link_mass(entry) for entry in document.get("masses", ())),
         tuple(map(float, document.get("gravity_m_s2", (0.0, 0.0, -standard_gravity)))),
         document.get("payload_kg"),
-        # A file that tells nothing of weights tells nothing of a compensator either.
+        # A file that declares no weights declares no compensator either.
         "compensator" in document or "masses" not in document,
         tuple(document.get("gear_ratio", ())),
     )

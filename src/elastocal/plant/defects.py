@@ -123,7 +123,7 @@ def with_defects(robot: PhysicalRobot, defects: Iterable[Defect]) -> PhysicalRob
 
 
 def truth_of(robot: PhysicalRobot, defect: Defect) -> dict[str, Any]:
-    """What a truth document says of a defect: effect, joints, size, unit, the parameters that are comparable, seed."""
+    """The ground truth of a defect: effect, joints, size, unit, the parameters that are comparable, seed."""
     parameters = _applied(robot, defect)[1]
     return {
         "effect": defect.effect,

@@ -71,7 +71,7 @@ class Yardstick:
     free_frame : bool
         Whether the analysis fits the tracker's frame.
     declared : tuple of LinkMass
-        Weights as the analysis is told them.
+        Weights as they are declared to the analysis.
     """
 
     def __init__(

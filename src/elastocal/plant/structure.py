@@ -70,7 +70,7 @@ class Compensator:
 
 @dataclass(frozen=True)
 class Structure:
-    """Everything of an arm that its robot file does not tell. The default is an arm of drives alone.
+    """Everything of an arm that its robot file does not declare. The default is an arm of drives alone.
 
     Attributes
     ----------

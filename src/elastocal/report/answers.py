@@ -24,8 +24,8 @@ EXPLANATIONS = {
         "the paper seems to print one data set's. Its maxima cannot come from all of them."
     ),
     "b": (
-        "The bias of 1/ĉ can only lower these values, so a printed one above the truth is noise of the paper's own run. Beside "
-        "that remain the rounding to three digits and other link lengths than those of R2."
+        "The bias of 1/ĉ can only lower these values, so a printed one above the true value is noise of the paper's own run. "
+        "Beside that remain the rounding to three digits and other link lengths than those of R2."
     ),
     "c": (
         "One run moves all k_Σ cells of a robot together, since their data sets are the same: these are few independent "

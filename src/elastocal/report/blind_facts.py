@@ -32,13 +32,13 @@ _GROUPS = {
     MOVED: "set-ups that move between rows",
     UNDECLARED: "weight of all links, undeclared",
 }
-_SAID_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
-_SAID_OF_RELATIVES = ("right", "class", "wrong", "other")
+_VERDICTS_OUTSIDE = ("wrong name", "class", "several", "unexplained", "adequate")
+_OUTCOMES_OF_RELATIVES = ("right", "class", "wrong", "other")
 _ABSENT = "–"
 
 
 class _Design(Protocol):
-    """What is told of the design of a campaign."""
+    """The design of a campaign, as far as the report states it."""
 
     @property
     def poses(self) -> int: ...
@@ -161,9 +161,9 @@ def _hits(row: Any) -> str:
 
 def _targets(summary: pd.DataFrame, robots: str) -> list[list[str]]:
     mine = summary[(summary.robots == robots) & summary.target.fillna("").ne("")]
-    said = {"True": "reached", "False": "missed"}
+    reached = {"True": "reached", "False": "missed"}
     return [
-        [row.quantity, _hits(row), _value(row), _interval(row), row.target, said.get(str(row.holds), "no case")]
+        [row.quantity, _hits(row), _value(row), _interval(row), row.target, reached.get(str(row.holds), "no case")]
         for row in _rows_of(mine)
     ]
 
@@ -208,20 +208,20 @@ def _share(row: Mapping[Hashable, Any], name: str) -> str:
 
 
 def _outside(confusion: pd.DataFrame, robots: str) -> list[list[str]]:
-    """What is said of effects outside of the catalogue, in % of their cases at the largest size."""
+    """Verdicts on effects outside of the catalogue, in % of their cases at the largest size."""
     mine = confusion[(confusion.robots == robots) & confusion.truth.str.startswith(_OUTSIDE)]
     rows = []
     for truth, part in mine.groupby("truth"):
         counts = part.iloc[part.level.argmax()].drop(["robots", "settings", "truth"])
         level, counts = counts["level"], counts.drop("level").astype(float)
-        said = {
+        verdicts = {
             "class": counts[CLASS_WITH] + counts[CLASS_WITHOUT],
             "several": counts["several"],
             "unexplained": counts["unexplained"],
             "adequate": counts["adequate"] + counts["not_testable"],
         }
-        said["wrong name"] = counts.sum() - sum(said.values())
-        shares = [f"{100 * said[word] / counts.sum():.0f}" for word in _SAID_OUTSIDE]
+        verdicts["wrong name"] = counts.sum() - sum(verdicts.values())
+        shares = [f"{100 * verdicts[word] / counts.sum():.0f}" for word in _VERDICTS_OUTSIDE]
         rows.append([words(str(truth).removeprefix(_OUTSIDE)), f"{level:g}", f"{counts.sum():.0f}", *shares])
     return rows
 
@@ -260,7 +260,7 @@ def _undetectable(undetectable: pd.DataFrame, robots: str) -> list[list[str]]:
 
 def _sweep(sweep: pd.DataFrame) -> list[list[str]]:
     return [
-        [f"{row['angle_up_to_deg']:g}°", f"{row['cases']}", *(_share(row, name) for name in _SAID_OF_RELATIVES)]
+        [f"{row['angle_up_to_deg']:g}°", f"{row['cases']}", *(_share(row, name) for name in _OUTCOMES_OF_RELATIVES)]
         for row in sweep[sweep.pair == "all"].to_dict("records")
     ]
 

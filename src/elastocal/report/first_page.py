@@ -44,7 +44,7 @@ AT_FAULT = "the data are at fault"
 OF_DATA = "data"
 # Hypotheses below this stand together as "something else", and so do those beyond the first few.
 LEAST_SHOWN, _MOST_SHOWN = 0.01, 4
-# A location that has this probability goes without saying.
+# From this probability on a location is stated without its alternatives.
 _SURE = 0.95
 MOST_NAMES = 8
 
@@ -61,7 +61,7 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
     -------
     list of str
     """
-    said, found = verdict["verdict"], verdict["effects"]
+    kind, found = verdict["verdict"], verdict["effects"]
     faults = [effect for effect in found if effect["family"] == OF_DATA]
     if faults:
         return [
@@ -69,7 +69,7 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
             "No mechanism was looked for, and the residuals below are those of the data as they are.",
         ]
     tested = counted(verdict["candidates_tested"], "candidate cause")
-    if said == "not_testable":
+    if kind == "not_testable":
         return [
             "Whatever a mechanism of the catalogue would contribute at a plausible size is lost in the noise, or the declared "
             "model absorbs it.",
@@ -77,27 +77,27 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
         ]
     chance = f"{100 * verdict['probabilities']['alarm_p_value']:.2g} %"
     level = f"the alarm is set to {percent(verdict['settings']['alarm_level']['value'])}"
-    if said == "adequate":
+    if kind == "adequate":
         return [
             f"The declared model explains these measurements: none of {tested} is needed. Where nothing is missing, {chance} "
             f"of such campaigns speak as much for a missing mechanism as this one; {level}."
         ]
     alarm = f"If nothing were missing, {chance} of such campaigns would speak as much for a missing mechanism; {level}."
-    if said == "unexplained":
+    if kind == "unexplained":
         return [
             "The residual of the declared model is more than noise, and a smooth error of unknown cause explains it better "
             f"than any of {tested}.",
             alarm,
         ]
     named = [_found(effect) for effect in found]
-    if said == "several":
+    if kind == "several":
         each = listed(
             (f"{name} ({probability_words(effect['probability'])})" for name, effect in zip(named, found, strict=True))
         )
         first = f"The declared model lacks {counted(len(found), 'mechanism')}, each with its probability: {each}."
         return [first, *(_ambiguity(effect) for effect in found if effect["alternatives"]), alarm]
     (effect,) = found
-    if said == "class":
+    if kind == "class":
         return [f"The declared model lacks one mechanism, most probably {named[0]}.", _ambiguity(effect), alarm]
     return [f"The declared model lacks one mechanism: {named[0]}.", *_unsure_location(effect), alarm]
 
@@ -125,15 +125,15 @@ def probability_sentence(probabilities: Mapping[str, Any]) -> str:
 
 def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any]]) -> list[str]:
     """What follows from the verdict for whoever runs the robot, list of str."""
-    said, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
+    kind, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
     if any(effect["family"] == OF_DATA for effect in found):
         return ["Correct the data as stated, in the file or where they are exported, and diagnose again.", *_transforms(found)]
-    if said == "not_testable":
+    if kind == "not_testable":
         return [
             "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The section on what "
             "could not be tested says what each mechanism needs."
         ]
-    if said == "adequate":
+    if kind == "adequate":
         error = length(heldout["after"]["rms_m"])
         return [
             f"Use the declared model with the parameters fitted here; new poses like these will be off by {error} RMS.",
@@ -160,7 +160,7 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
                 "The gain on poses that the corrected model was not fitted to is not certain: measure more validation poses "
                 "before it is used."
             )
-    if said == "unexplained":
+    if kind == "unexplained":
         advice.append(
             "Check first what no model of the robot can describe: a loose target, a tracker or robot foot that moved, warming "
             "up, loads noted wrongly. Then measure again, with repeats, time and approach direction recorded."
@@ -170,7 +170,7 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
         advice.append(
             f"To resolve what is ambiguous measure the {counted(poses, 'pose')} of the section on the next experiment."
         )
-    elif said == "class" and adopted:
+    elif kind == "class" and adopted:
         advice.append(
             "Until an experiment resolves which mechanism acts, trust the correction at poses and loads like these only."
         )
@@ -222,7 +222,7 @@ def _unsure_location(effect: Mapping[str, Any]) -> list[str]:
 
 
 def _transforms(faults: Sequence[Mapping[str, Any]]) -> list[str]:
-    """What turns the data into data that fit, where a fault says so."""
+    """What turns the data into data that fit, where a fault states it."""
     return [
         f"{capital(words(fault['name']))}: the data fit with "
         + listed(f"{entry['name']} = {minus(plain(entry['value'], 4))} {entry['unit']}" for entry in known)

@@ -36,7 +36,7 @@ _MOST_PARAMETERS, _SHOWN_PARAMETERS = 16, 10
 
 
 def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
-    """What the report says of one effect or fault of the data."""
+    """Facts of one effect or fault of the data."""
     known = [entry for entry in effect["parameters"] if not entry.get("held")]
     rest = ""
     shown = known

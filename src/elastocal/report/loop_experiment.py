@@ -1,4 +1,4 @@
-"""The next experiment that a campaign's report proposes: the states to measure, and what is said of them."""
+"""The next experiment that a campaign's report proposes: the states to measure, and why these."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def experiment_facts(rows: Sequence[Mapping[str, Any]], said: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Table of the states proposed, angles in degrees, and what is said of them.
+def experiment_facts(rows: Sequence[Mapping[str, Any]], proposal: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """Table of the states proposed, angles in degrees, and the sentence that justifies them.
 
     Parameters
     ----------
     rows : list of dict
         Of next_experiment.csv.
-    said : dict, optional
+    proposal : dict, optional
         Of verdict.json: ``sentence``, or the ``reason`` why nothing is proposed.
 
     Returns
     -------
     dict
     """
-    said = said or {}
-    sentence = said.get("sentence") or (f"No further measurement is proposed: {said['reason']}." if said.get("reason") else "")
+    proposal = proposal or {}
+    reason = proposal.get("reason")
+    sentence = proposal.get("sentence") or (f"No further measurement is proposed: {reason}." if reason else "")
     found = {"sentence": in_words(sentence), "loaded": False, "approach": False, "heads": [], "rows": [], "gains": []}
     if not rows:
         return found
     angles = [name for name in rows[0] if re.fullmatch(r"q\d+", name)]
     loads = {"fx": "N", "fy": "N", "fz": "N", "mx": "N·m", "my": "N·m", "mz": "N·m"}
-    # Nothing is said of loads where all states are unloaded.
+    # There are no columns of loads where all states are unloaded.
     loads = loads if any(row[name] for row in rows for name in loads) else {}
     sides = [name for name in rows[0] if re.fullmatch(r"approach\d+", name)]
     weighed = any(row.get("reference_weight_kg") for row in rows)

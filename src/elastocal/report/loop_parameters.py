@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from typing import Any
 
-# A standard error above this share of the prior's says what the prior says.
+# A standard error above this share of the prior's adds nothing to the prior.
 _OF_THE_PRIOR = 0.7
 # More than these would fill pages that nobody reads; the tables have them all.
 _MOST_OTHERS = 40

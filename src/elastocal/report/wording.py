@@ -69,7 +69,7 @@ def members_words(keys: Iterable[str], most: int = 12) -> str:
         assert found, key
         joints = tuple(map(int, found["joints"].split("+"))) if found["joints"] else ()
         details.setdefault((found["effect"], joints), []).append(detail_words(found["effect"], found["detail"] or ""))
-    # Single joints of which the same is to be told stand together.
+    # Single joints with the same details stand together.
     alike: dict[tuple[str, tuple[int, ...] | None, str], list[int]] = {}
     for (effect, joints), which in details.items():
         group = (effect, joints if len(joints) != 1 else None, ", ".join(filter(None, which)))
@@ -109,7 +109,7 @@ def percent(share: float) -> str:
 
 
 def probability_words(probability: float) -> str:
-    """A probability in whole percent; none is said to be 0 or 100 %."""
+    """A probability in whole percent; none is given as 0 or 100 %."""
     if probability < 0.005:
         return f"<{_TIED}1{_TIED}%"
     if probability >= 0.995:

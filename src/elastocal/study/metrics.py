@@ -58,8 +58,8 @@ def make_judge(robot: Robot, experiments: Experiments, true_deflection: np.ndarr
 
     Notes
     -----
-    The position error of a model c is (exact prediction at the reference - truth) + A (c - reference); what this leaves out is
-    of second order in the compliance *error*, below a thousandth of the error itself.
+    The position error of a model c is (exact prediction at the reference - true position) + A (c - reference); what this leaves
+    out is of second order in the compliance *error*, below a thousandth of the error itself.
     """
     point = robot.chain.end_effector
     at = loaded_point(robot.chain, point, wrench_at)

@@ -32,7 +32,7 @@ def covariance_columns(joints: int) -> list[tuple[str, int, int]]:
 
 
 def design(joints: int) -> TableSchema:
-    """What the experiments can tell a strategy, whatever the noise; one row for each data set and length."""
+    """What a strategy can identify from the experiments, whatever the noise; one row for each data set and length."""
     covariances = [
         Column(name, "float32", "1/(N m)^2", f"covariance of c{i + 1} and c{j + 1} for unit measurement variance", missing=True)
         for name, i, j in covariance_columns(joints)

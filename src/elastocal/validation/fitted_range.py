@@ -58,8 +58,8 @@ def predictive_variances(
     """How surely a fit predicts positions: those of its own poses, each left out in turn, and those of other states.
 
     The variance comes from the parameters alone, each with its normal prior or else one of its plausible size: what the
-    measurements do not tell is as uncertain as that, and a pose that alone tells a parameter does not make all others look
-    sure.
+    measurements do not identify is as uncertain as that, and a pose that alone identifies a parameter does not make all
+    others look sure.
 
     The variance of a prediction is its leverage, here in m². Poses are left out by case deletion [1]_ with Woodbury's identity
     [2]_.

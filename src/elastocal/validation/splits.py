@@ -81,7 +81,7 @@ def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -
     """Position errors of observations, each predicted by a refit without the part that it belongs to.
 
     Leave-one-block-out cross-validation. A refit starts from the nominal robot, so that a parameter that only the part left out
-    can tell does not keep its value, and keeps the shapes of the fit. A session that is left out has its frame fitted to
+    identifies does not keep its value, and keeps the shapes of the fit. A session that is left out has its frame fitted to
     itself, see `held_out.placed_estimate`.
 
     Parameters

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 TARGET = "SMR"
 # Robots of the source by their number of joints.
 ROBOTS = {6: "ur5", 7: "wam"}
-# The tracker's maker: 15 um + 6 um/m; how far it stood is not told. The least that a measurement scatters: what the joints add
+# The tracker's maker: 15 um + 6 um/m; its distance is not stated. The least that a measurement scatters: what the joints add
 # is the error common to a pose, which is estimated.
 NOISE = {"position_m": 1.5e-5}
 COMMANDED, DIFFERENCE = ("x_t", "y_t", "z_t"), ("x_dif", "y_dif", "z_dif")

@@ -1,4 +1,4 @@
-"""Step 2b: what the experiments of each data set can tell a strategy, before anything is measured.
+"""Step 2b: what a strategy can identify from the experiments of each data set, before anything is measured.
 
 Covariance and condition number depend on configurations and loads alone, so they are worked out once for all noise levels.
 """
