@@ -382,15 +382,9 @@ def closed_form_of(effect):
     return CLOSED_FORMS[effect]
 
 
-# Where an effect is not what its closed form says, as long as that is so.
-KNOWN_FAULTS = {("tracker_scale", "track"): "the travel of a carriage is not scaled, as the tracker would"}
-
-
 @pytest.mark.parametrize("chain", CHAINS)
 @pytest.mark.parametrize("effect", sorted(catalogue.effects()))
-def test_effect_is_its_closed_form(effect, chain, arms, request):
-    if (effect, chain) in KNOWN_FAULTS:
-        request.applymarker(pytest.mark.xfail(reason=KNOWN_FAULTS[effect, chain], strict=True))
+def test_effect_is_its_closed_form(effect, chain, arms):
     closed, laws = closed_form_of(effect), catalogue.effects()[effect].candidates
     for key, made, jacobian, expected in compared(arms, chain, laws, closed):
         found = twist(jacobian, made)

@@ -2,7 +2,8 @@
 
 p' = (1 + s) p about the tracker, with p a position (m) and s the scale error (m/m) [1]_. Scaled about the base positions
 differ from that by a shift of the frame, which is fitted where it is unknown; and a robot whose positions are all scaled about
-its base is one whose column and links are longer by that share.
+its base is one whose column, links and travels along a track are longer by that share. What lies behind a passive joint is no
+link and is left out.
 
 References
 ----------
@@ -34,6 +35,7 @@ def candidates(sites: Sites) -> list[Candidate]:
     """One candidate."""
 
     def displacement(conditions: Conditions) -> Displacements:
-        return [longer(sites, np.ones(len(conditions.joint_angles)))]
+        travels = {joint: conditions.joint_angles[:, joint] for joint, slides in enumerate(sites.prismatic) if slides}
+        return [longer(sites, np.ones(len(conditions.joint_angles))) | travels]
 
     return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]
