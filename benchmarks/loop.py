@@ -11,18 +11,12 @@ from pathlib import Path
 from common import ROOT, Row, interleaved, load_robot
 from copies import copy_study, snakemake
 
-from elastocal.campaigns.holdout import split
 from elastocal.campaigns.public_data import FOLDER_VARIABLE
-from elastocal.campaigns.reading import read_campaign
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
-from elastocal.effects.catalogue import candidates_on
-from elastocal.fitting.case import Case
-from elastocal.fitting.model import declared_model
-from elastocal.fitting.observations import averaged
-from elastocal.mechanics.sites import sites_of
+from elastocal.loop.whole import cases_in
 
 POSES, POINTS = 60, ("2DoF", "3DoF", "4DoF", "6DoF")
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
@@ -56,7 +50,9 @@ def _limit(name: str, seconds: float, allowed: float, how: str) -> Row:
 
 
 def _growth(work: Path) -> Iterator[Row]:
-    whole, half = (_case(work / f"growth{poses}", poses) for poses in (4 * POSES, 2 * POSES))
+    whole, half = (
+        cases_in(_campaign(work / f"growth{poses}", poses), ROOT / "config" / "robots")[0] for poses in (4 * POSES, 2 * POSES)
+    )
     fewer = replace(whole, candidates=dict(list(whole.candidates.items())[::2]))
     functions = {
         "all": lambda: diagnose(whole, Settings(), 1),
@@ -93,10 +89,3 @@ def _campaign(folder: Path, poses: int) -> Path:
     shutil.rmtree(folder, ignore_errors=True)
     write_campaign(folder, document, simulated_measurements(robot, plan, 1, "bench"), robot.joints)
     return folder
-
-
-def _case(folder: Path, poses: int) -> Case:
-    campaign = read_campaign(_campaign(folder, poses), ROOT / "config" / "robots")
-    campaign = replace(campaign, measurements=split(campaign)[0])
-    sites = sites_of(campaign.robot)
-    return Case(campaign, averaged(campaign.measurements), declared_model(campaign), candidates_on(sites))

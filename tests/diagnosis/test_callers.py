@@ -2,7 +2,6 @@
 
 import ast
 import json
-import runpy
 import shutil
 import sys
 from pathlib import Path
@@ -31,7 +30,7 @@ CALLERS = {
     "workflow/scripts/diagnose_campaign.py": "rules",
     "workflow/scripts/diagnose_cases.py": "blind proof",
     "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
-    "benchmarks/loop.py": "benchmark of the loop",
+    "benchmarks/loop.py": "times the call on the case that `cases_in` gives",
     "benchmarks/large.py": "benchmark of the engine",
 }
 
@@ -203,21 +202,6 @@ def test_benchmark_of_the_engine_times_the_same_verdict(kind, both, monkeypatch,
     assert json.loads(capsys.readouterr().out)["candidates"] == len(cases_in(folder, ROBOTS)[0].candidates)
     (verdict,) = seen
     same(as_json(verdict.document), expected)
-
-
-def test_benchmark_of_the_loop_times_the_diagnosis_of_the_same_case(folder, monkeypatch):
-    """It puts the case together itself; the campaign that it makes gives way to the one here."""
-    monkeypatch.syspath_prepend(BENCHMARKS.as_posix())
-    others = {name: sys.modules.pop(name, None) for name in ("common", "copies")}
-    try:
-        case_of = runpy.run_path((BENCHMARKS / "loop.py").as_posix())["_case"]
-    finally:
-        for name, module in others.items():
-            sys.modules.pop(name, None)
-            if module is not None:
-                sys.modules[name] = module
-    monkeypatch.setitem(case_of.__globals__, "_campaign", lambda path, poses: path)
-    same_case(case_of(folder, 0), cases_in(folder, ROBOTS)[0])
 
 
 def test_oracle_that_knows_the_effect_which_is_found_has_the_same_errors_on_held_out_poses(folder, expected):
