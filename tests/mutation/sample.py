@@ -1,9 +1,9 @@
 """Mutation testing of a random sample: how often do the tests notice a small fault in the code?
 
-mutmut makes the mutants and says which tests cover them. Left out are mutants that only change the text of a
-string, annotations, and what mutmut never changes: code outside functions, and decorated functions.
+mutmut makes the mutants and says which tests of the same room cover them. Left out are mutants that only change
+the text of a string, annotations, and what mutmut never changes: code outside functions, and decorated functions.
 
-Usage: python tests/mutation/sample.py [SEED SIZE], from the top of the repository.
+Usage: python tests/mutation/sample.py [SEED SIZE [ROOM ...]], from the top of the repository.
 """
 
 import random
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pandas as pd
 from mutmut.__main__ import _run, collect_or_load_stats, create_file_mutants
+from mutmut.configuration import config
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 from mutmut.state import state
@@ -61,8 +62,10 @@ def described(mutant, path):
     source = path.read_text(encoding="utf-8")
     function = source.index(f"def {name}(", source.index(f"class {owner}") if owner else 0)
     line = source.count("\n", 0, source.index(before[0], function)) + 1
-    where = {"module": path.relative_to(PACKAGE).as_posix(), "function": f"{owner}.{name}" if owner else name, "line": line}
-    return where | {"mutant": mutant, "before": " ".join(before), "after": " ".join(after)}
+    module = path.relative_to(PACKAGE)
+    where = {"room": module.parts[0], "module": module.as_posix(), "line": line}
+    what = {"function": f"{owner}.{name}" if owner else name, "mutant": mutant}
+    return where | what | {"before": " ".join(before), "after": " ".join(after)}
 
 
 def draw(seed, size):
@@ -78,21 +81,19 @@ def draw(seed, size):
     return pd.DataFrame(rows)
 
 
-def shorten_tests(sample):
-    """Of the tests that cover a mutant keep what takes `SECONDS` together.
-
-    Tests of the mutant's own module go first, then those of its room, then others, the quickest first.
-    """
+def run(mutants, room):
+    """Run mutants of one room against those tests of the room that cover them, the quickest up to `SECONDS` together."""
+    config().pytest_add_cli_args_test_selection = [f"tests/{room}"]
+    Path("mutants/mutmut-stats.json").unlink(missing_ok=True)
     durations, covering = state().duration_by_test, state().tests_by_mangled_function_name
-    for module, mutant in zip(sample["module"], sample["mutant"], strict=True):
-        room, own = f"tests/{Path(module).parent}/", f"tests/{Path(module).parent}/test_{Path(module).name}"
-        ranks = {
-            test: (not test.startswith(own), not test.startswith(room), durations[test], test)
-            for test in covering[mangled_name_from_mutant_name(mutant)]
-        }
-        tests = pd.Series({test: durations[test] for test in sorted(ranks, key=ranks.get)}, dtype=float)
-        covering[mangled_name_from_mutant_name(mutant)] = set(tests.index[:1]) | set(tests.index[tests.cumsum() <= SECONDS])
+    durations.clear()
+    covering.clear()
+    collect_or_load_stats(get_mutant_runner())
+    for function in {mangled_name_from_mutant_name(mutant) for mutant in mutants}:
+        tests = pd.Series({test: state().duration_by_test[test] for test in covering[function]}, dtype=float).sort_values()
+        covering[function] = set(tests.index[:1]) | set(tests.index[tests.cumsum() <= SECONDS])
     save_stats()
+    _run(mutants, max_children=1)
 
 
 def scores(sample):
@@ -107,15 +108,16 @@ def scores(sample):
 
 
 if __name__ == "__main__":
-    seed, size = map(int, sys.argv[1:]) if sys.argv[1:] else (1, 25)
+    seed, size = map(int, sys.argv[1:3]) if sys.argv[1:] else (1, 25)
     make_mutants()
     sample = draw(seed, size)
+    sample = sample[sample["room"].isin(sys.argv[3:] or sample["room"])]
     copy_also_copy_files()
     setup_source_paths()
-    collect_or_load_stats(get_mutant_runner())
-    shorten_tests(sample)
-    _run(list(sample["mutant"]), max_children=1)
-    codes = {mutant: code for module in sample["module"].unique() for mutant, code in exit_codes(PACKAGE / module).items()}
-    sample["status"] = [status_by_exit_code[codes[mutant]] for mutant in sample["mutant"]]
-    sample.to_csv("reports/mutants.csv", index=False)
-    print(scores(sample).round(2).to_string(index=False))
+    done = []
+    for room, part in sample.groupby("room", sort=False):
+        run(list(part["mutant"]), room)
+        codes = {mutant: code for module in part["module"].unique() for mutant, code in exit_codes(PACKAGE / module).items()}
+        done.append(part.assign(status=[status_by_exit_code[codes[mutant]] for mutant in part["mutant"]]))
+        pd.concat(done).to_csv("reports/mutants.csv", index=False)
+    print(scores(pd.concat(done)).round(2).to_string(index=False))
