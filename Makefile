@@ -3,13 +3,18 @@ PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
 
-.PHONY: paper test lint bench pictures lock clean
+.PHONY: paper test mutants lint bench pictures lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
 test: .venv/ready-for-tests
 	$(BIN)/python -m pytest -q
+
+# How many small faults in the code the tests notice: a random sample, see tests/mutation/sample.py.
+mutants: .venv/ready-for-tests
+	rm -rf mutants
+	OPENBLAS_NUM_THREADS=1 nice -n 19 $(BIN)/python tests/mutation/sample.py $(SAMPLE)
 
 lint: .venv/ready-for-tests
 	$(BIN)/ruff check .
