@@ -77,10 +77,10 @@ def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float,
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
 
-def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> np.ndarray:
+def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> slice:
     """Sizes of the pose error that draws of the fitted one can make likely: its own, and some to either side."""
     place = int(np.argmin(np.abs(pose_error_rad - fitted)))
-    return np.arange(max(place - reach, 0), min(place + reach + 1, len(pose_error_rad)))
+    return slice(max(place - reach, 0), place + reach + 1)
 
 
 def _average_bayes_factors(

@@ -340,9 +340,9 @@ class _Source:
             yield WhiteRows(
                 _flat(part.white(line.sensitivities[..., ~self.found])),
                 _flat(made),
-                part.white(residual).reshape(-1),
+                _flat(part.white(residual)[..., None])[:, 0],
                 _flat(part.white(part.jacobian)),
-                np.repeat(some.cluster, some.rows),
+                np.tile(some.cluster, some.rows),
             )
 
 
@@ -373,8 +373,8 @@ class _Line:
 
 
 def _flat(values: np.ndarray) -> np.ndarray:
-    """Values (M, rows, k) as rows (M * rows, k)."""
-    return values.reshape(-1, values.shape[2])
+    """Values (M, rows, k) as rows (rows * M, k): those of one component after those of another, as effects make them."""
+    return values.swapaxes(0, 1).reshape(-1, values.shape[2])
 
 
 def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:

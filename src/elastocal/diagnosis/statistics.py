@@ -27,6 +27,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
+from elastocal.fitting.observations import members_of
 
 # Of a variance of one, or of the largest eigenvalue: what is less is rounding, what is added is not seen.
 _ROUNDING = 1e-9
@@ -59,8 +60,8 @@ class Statistics:
     log_likelihood: np.ndarray
     freedom: int
 
-    def at(self, chosen: np.ndarray) -> Statistics:
-        """The same at some of the sizes of the pose error only."""
+    def at(self, chosen: np.ndarray | slice) -> Statistics:
+        """The same at some of the sizes of the pose error only; a slice copies nothing."""
         return Statistics(
             self.pose_error_rad[chosen],
             self.gram[chosen],
@@ -189,24 +190,21 @@ def products_of(
     """
     count, width = declared.shape[1], declared.shape[1] + candidates.shape[1] + 1
     scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
-    every = np.zeros((len(scaled), width))
+    # Columns come one after the other, and stay so.
+    every = np.zeros((width, len(scaled))).T
     rows, prior, rest = every[: len(declared)], every[len(declared) :], every[:, count:]
     rows[:, count:-1], rows[:, -1], prior[:, -1] = candidates, residual, -present / prior_std
     norms = np.linalg.norm(scaled, axis=0)
     basis, triangle = np.linalg.qr(scaled / norms)
     projected = basis.T @ rest
-    rest -= basis @ projected
+    rest.T[:] -= projected.T @ basis.T
     every[:, :count] = basis
-    order = np.argsort(pose, kind="stable")
-    sizes = np.bincount(pose)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    joints = jacobian.shape[1]
-    pose_rows, pose_gram = np.empty((len(sizes), joints, every.shape[1])), np.empty((len(sizes), joints, joints))
-    for size in np.unique(sizes):
-        mine = sizes == size
-        members = order[starts[mine][:, None] + np.arange(size)]
-        seen = jacobian[members].transpose(0, 2, 1)
-        pose_rows[mine] = seen @ rows[members]
+    order, joints, poses = np.argsort(pose, kind="stable"), jacobian.shape[1], int(pose.max()) + 1
+    pose_rows, pose_gram = np.empty((poses, joints, width)), np.empty((poses, joints, joints))
+    for places in members_of(pose[order]):
+        members = order[places]
+        mine, seen = pose[members[:, 0]], jacobian[members].transpose(0, 2, 1)
+        pose_rows[mine] = seen @ rows.T[:, members].transpose(1, 2, 0)
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
     white = rows.T @ rows
     freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)

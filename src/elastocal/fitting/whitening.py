@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.noise import measurement_covariances
+from elastocal.fitting.observations import members_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -127,20 +128,13 @@ def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise)
     """
     rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad:
-        for members in _members(observations.state):
+        for members in members_of(observations.state):
             covariance = measurement_covariances(noise, jacobian[members], rows)
             yield members, covariance / repeats[members[:, 0]][:, None, None]
         return
-    for members in _members(observations.cluster):
+    for members in members_of(observations.cluster):
         stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         yield members, alike * measurement_covariances(noise, jacobian[members], rows) + common
-
-
-def _members(group: np.ndarray) -> list[np.ndarray]:
-    """Observations of each state or pose, for each number of them in one: arrays (G, k)."""
-    seen = np.bincount(group)
-    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
-    return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]
