@@ -140,11 +140,7 @@ def linearized(
         grid = grid[pose_errors_within_reach(statistics_of(whole.without_candidates, grid), settings)]
         products: Products | Sums = whole
     else:
-        chosen = spread_poses(observations, SAMPLE_ROWS // observations.rows)
-        some, seen = selected(fitted, observations, chosen)
-        few = replace(source, fitted=some, observations=seen, around=_conditions_of(some, seen))
-        (block,) = few.blocks(few.lines(parts_of(seen, len(seen))))
-        sample = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        sample = products_of(**vars(source.sample()), prior_std=deviation, present=present, joint_rad=still)
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
         products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], sample, deviation, present, grid)
     statistics = statistics_of(products, grid)
@@ -319,7 +315,9 @@ class _Source:
                 line, some = part.line, part.observations
                 squares = (part.white(part.jacobian) ** 2).sum(axis=(1, 2)) / part.jacobian.shape[-1]
                 information.append(np.bincount(some.cluster, squares))
-                yield _flat(part.white(np.concatenate([line.sensitivities[..., ~self.found], line.residual[..., None]], axis=2)))
+                yield _flat(
+                    part.white(np.concatenate([line.sensitivities[..., ~self.found], line.residual[..., None]], axis=2))
+                )
 
         triangle = triangle_of(rows())
         return triangle, float(1.0 / np.sqrt(np.median(np.concatenate(information))))
@@ -327,7 +325,7 @@ class _Source:
     def blocks(self, lines: Iterable[_Line]) -> Iterator[WhiteRows]:
         """`WhiteRows` of each part.
 
-        What errs together is measured in one state, and moved alike by a candidate: columns of the whitened Jacobian are whitened.
+        What errs together is measured in one state, and a candidate displaces a state: the Jacobian is whitened, not its columns.
         """
         sizes = np.concatenate([unit.sizes for unit in self.units])
         # A law has of a candidate what `effect_columns` asks of it, its displacement.
@@ -344,6 +342,14 @@ class _Source:
                 _flat(part.white(part.jacobian)),
                 np.tile(some.cluster, some.rows),
             )
+
+    def sample(self) -> WhiteRows:
+        """Rows of some poses all over the campaign."""
+        chosen = spread_poses(self.observations, SAMPLE_ROWS // self.observations.rows)
+        some, seen = selected(self.fitted, self.observations, chosen)
+        few = replace(self, fitted=some, observations=seen, around=_conditions_of(some, seen))
+        (block,) = few.blocks(few.lines(parts_of(seen, len(seen))))
+        return block
 
 
 @dataclass(frozen=True)

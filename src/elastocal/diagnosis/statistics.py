@@ -178,9 +178,9 @@ def products_of(
 
     Notes
     -----
-    Projection leaves of the basis what rounding does, and the Schur complement of what is left takes that: projected twice, which
-    restores orthogonality to rounding [1]_. What the declared model fits are its effective
-    degrees of freedom, the trace of its hat matrix [2]_.
+    Projection leaves of the basis what rounding does, and the Schur complement of what is left takes that: projected twice,
+    which restores orthogonality to rounding [1]_. What the declared model fits are its effective degrees of freedom, the trace
+    of its hat matrix [2]_.
 
     References
     ----------
@@ -241,9 +241,7 @@ def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Stat
         total, log_det = normal_equations(products, tau)
         log_declared = _marginal(total, products.declared, rest[number])
         logs[number] = -0.5 * log_det - 0.5 * log_declared
-    return Statistics(
-        np.asarray(pose_error_rad), rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom
-    )
+    return Statistics(np.asarray(pose_error_rad), rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
 def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray, float]:

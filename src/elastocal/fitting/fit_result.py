@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
+    from elastocal.fitting.whitening import Scaling, Whitening
 
 
 @dataclass(frozen=True)
