@@ -325,7 +325,7 @@ class _Source:
     def blocks(self, lines: Iterable[_Line]) -> Iterator[WhiteRows]:
         """`WhiteRows` of each part.
 
-        What errs together is measured in one state, and a candidate displaces a state: the Jacobian is whitened, not its columns.
+        What errs together is of one state, and a candidate displaces states: the Jacobian is whitened, not every column.
         """
         sizes = np.concatenate([unit.sizes for unit in self.units])
         # A law has of a candidate what `effect_columns` asks of it, its displacement.
