@@ -9,7 +9,7 @@ paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
 test: .venv/ready-for-tests
-	$(BIN)/python -m pytest -q
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
 
 # How many small faults in the code the tests notice: a random sample, see tests/mutation/sample.py.
 mutants: .venv/ready-for-tests

@@ -122,3 +122,11 @@ def test_the_error_of_a_pose_is_not_averaged_by_repeats(case):
     # Rows of a pose tell one joint's share of a common error of six, however many repeats stand behind them.
     by_pose = np.bincount(seen.cluster, squares)
     assert (by_pose <= 1.0 + 1e-6).all() and by_pose.max() > 0.5
+
+
+def test_sensitivities_to_what_displaces_a_state_are_whitened_through_the_jacobian(case):
+    """As the engine whitens its candidates: what errs together is of one state."""
+    seen, jacobian = case
+    displaced = np.random.default_rng(6).standard_normal((seen.state.max() + 1, jacobian.shape[-1], 4))[seen.state]
+    by = whitening(seen, jacobian, replace(NOISE, pose_rad=1e-4).of_measurements)
+    np.testing.assert_allclose(by.apply(jacobian) @ displaced, by.apply(jacobian @ displaced), rtol=1e-9, atol=1e-6)

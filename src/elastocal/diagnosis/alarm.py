@@ -77,10 +77,10 @@ def alarm_of(problem: Problem, products: Products | Sums, pose_error_rad: float,
     return Alarm(float(p_value), float(found[0]), bool(p_value <= settings.alarm_level))
 
 
-def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> np.ndarray:
+def _near(pose_error_rad: np.ndarray, fitted: float, reach: int) -> slice:
     """Sizes of the pose error that draws of the fitted one can make likely: its own, and some to either side."""
     place = int(np.argmin(np.abs(pose_error_rad - fitted)))
-    return np.arange(max(place - reach, 0), min(place + reach + 1, len(pose_error_rad)))
+    return slice(max(place - reach, 0), place + reach + 1)
 
 
 def _average_bayes_factors(
@@ -102,16 +102,15 @@ def _average_bayes_factors(
     for members, values, vectors, columns in zip(*vars(blocks).values(), strict=True):
         for place, number in enumerate(members):
             turned = (vectors[:, place].transpose(0, 2, 1) @ along[:, columns[place]]) ** 2
-            unit, terms = tested[number], []
+            unit = tested[number]
             first = max(unit.smallest - 1, 0)
-            weights = grid.of(replace(unit, smallest=first))
-            for scale, log_weight in zip(grid.scales[first:], weights[first:], strict=True):
-                widened = 1.0 + scale**2 * values[:, place]
-                gain = ((scale**2 / widened)[:, :, None] * turned).sum(axis=1)
-                occam = -0.5 * np.log(widened).sum(axis=1)[:, None]
-                likelihood = log_likelihood(squares - gain, statistics.freedom)
-                terms.append(log_weight + start + occam + likelihood)
-            total = np.logaddexp(total, log_priors[number] + log_sum_exp(np.concatenate(terms), axis=0))
+            variances = grid.scales[first:, None] ** 2
+            weights = grid.of(replace(unit, smallest=first))[first:]
+            widened = 1.0 + variances * values[:, None, place]
+            left = squares[:, None] - (variances / widened) @ turned
+            known = weights + start - 0.5 * np.log(widened).sum(axis=2)
+            terms = log_likelihood(left, statistics.freedom) + known[..., None]
+            total = np.logaddexp(total, log_priors[number] + log_sum_exp(terms, axis=(0, 1)))
     return total - nothing
 
 

@@ -67,20 +67,23 @@ def nearest_angles(problem: Problem, found: Sequence[int]) -> np.ndarray:
     nearest = np.full(len(problem.units), np.nan)
     if not len(found):
         return nearest
-    gram = problem.statistics.gram[0]
-    mine = [_orthonormal(gram, problem.units[number].columns) for number in found]
-    for number, unit in enumerate(problem.units):
-        basis = _orthonormal(gram, unit.columns)
+    gram, units = problem.statistics.gram[0], problem.units
+    mine = [_orthonormal(gram, units[number].columns) for number in found]
+    widths = np.array([len(unit.columns) for unit in units])
+    for width in np.unique(widths):
+        numbers = np.flatnonzero(widths == width)
+        columns = np.array([units[number].columns for number in numbers])
+        across = _orthonormal(gram, columns).swapaxes(1, 2)
         cosines = [
-            np.linalg.norm(basis.T @ gram[np.ix_(unit.columns, problem.units[other].columns)] @ there, 2)
+            np.linalg.norm(across @ gram[columns[..., None], units[other].columns] @ there, 2, axis=(1, 2))
             for other, there in zip(found, mine, strict=True)
-            if basis.size and there.size
         ]
-        nearest[number] = np.degrees(np.arccos(min(max(cosines, default=0.0), 1.0)))
+        nearest[numbers] = np.degrees(np.arccos(np.minimum(np.max(cosines, axis=0), 1.0)))
     return nearest
 
 
 def _orthonormal(gram: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    values, vectors = np.linalg.eigh(gram[np.ix_(columns, columns)])
-    kept = values > _ROUNDING * max(values[-1], np.finfo(float).tiny)
-    return vectors[:, kept] / np.sqrt(values[kept])
+    """Coefficients (..., d, d) of orthonormal columns in the spans of some columns (..., d); zero for what is rounding."""
+    values, vectors = np.linalg.eigh(gram[columns[..., :, None], columns[..., None, :]])
+    kept = values > _ROUNDING * np.maximum(values[..., -1:], np.finfo(float).tiny)
+    return vectors * (kept / np.sqrt(np.where(kept, values, 1.0)))[..., None, :]

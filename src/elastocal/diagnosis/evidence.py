@@ -45,18 +45,18 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.statistics import Statistics
 
 
-def log_sum_exp(values: np.ndarray, axis: int | None = None) -> np.ndarray:
+def log_sum_exp(values: np.ndarray, axis: int | tuple[int, ...] | None = None) -> np.ndarray:
     """ln of the sum of exponentials, as scipy's logsumexp without its cost on small arrays.
 
     Parameters
     ----------
     values : ndarray
-    axis : int, optional
+    axis : int or tuple of int, optional
 
     Returns
     -------
     ndarray
-        Without that axis; of no dimension where all are summed.
+        Without these axes; of no dimension where all are summed.
     """
     highest = np.max(values, axis=axis, keepdims=True)
     highest = np.where(np.isfinite(highest), highest, 0.0)
@@ -440,30 +440,34 @@ class Joint:
     def profiles(self) -> list[np.ndarray]:
         """Log density over the sizes of each unit, the others as they are, for size zero first; list of ndarray (1 + S,)."""
         found: dict[int, np.ndarray] = {}
-        for number, seen in self._given_the_others():
-            density, _, _ = self._profile(number, *seen)
-            found[number] = log_sum_exp(density, axis=1) + self._log_weights_of(number)
+        for numbers, *seen in self._given_the_others():
+            density, _, _, _ = self._profile(numbers, *seen)
+            total = log_sum_exp(density, axis=1)
+            found |= {number: total[:, place] + self._log_weights_of(number) for place, number in enumerate(numbers.tolist())}
         return [found[number] for number in range(len(self.units))]
 
     def moments(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Mean and variance of the coefficients of each unit, averaged over its sizes and tau; list of two ndarray (d,)."""
         found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        for number, seen in self._given_the_others():
-            density, mean, variance = self._profile(number, *seen)
-            log_weights = density[1:] + self._log_weights_of(number)[1:, None]
-            weights = np.exp(log_weights - log_sum_exp(log_weights))[..., None]
-            center = (weights * mean).sum(axis=(0, 1))
-            found[number] = center, (weights * (variance + (mean - center) ** 2)).sum(axis=(0, 1))
+        for numbers, *seen in self._given_the_others():
+            density, means, variances, widths = self._profile(numbers, *seen)
+            for place, number in enumerate(numbers.tolist()):
+                log_weights = density[1:, :, place] + self._log_weights_of(number)[1:, None]
+                weights = np.exp(log_weights - log_sum_exp(log_weights))[..., None]
+                mean, variance = means[:, :, place], variances[:, :, place] * widths[:, :, place, None]
+                center = (weights * mean).sum(axis=(0, 1))
+                found[number] = center, (weights * (variance + (mean - center) ** 2)).sum(axis=(0, 1))
         return [found[number] for number in range(len(self.units))]
 
     def _log_weights_of(self, number: int) -> np.ndarray:
         """Prior weights of all sizes as they are, but for those of one unit: none for size zero, and all of its grid."""
-        others = np.delete(self.log_weights, number).sum()
+        others = self.log_weights.sum() - self.log_weights[number]
         return np.concatenate([[0.0], self.weights[number]]) + others
 
-    def _given_the_others(self) -> Iterator[tuple[int, tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]]:
-        """What each unit sees with the others integrated out: number, and eigenvalues and eigenvectors of its Gram matrix, its
-        products with the measurements along these, squares and ln |I + D^1/2 G D^1/2| without it."""
+    def _given_the_others(self) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """What the u units of one width d see with the others integrated out: numbers, and eigenvalues (T, u, d) and
+        eigenvectors of their Gram matrices, products with the measurements along these (T, u, d), squares and
+        ln |I + D^1/2 G D^1/2| (T, u) without them."""
         widths = np.diff(self.starts)
         for width in np.unique(widths):
             numbers = np.flatnonzero(widths == width)
@@ -476,31 +480,33 @@ class Joint:
             log_det = self.log_det[:, None] - np.linalg.slogdet(precision)[1]
             values, vectors = np.linalg.eigh((precision - np.eye(width)) / scales[..., None] ** 2)
             turned = (vectors.swapaxes(-1, -2) @ along[..., None])[..., 0]
-            for place, number in enumerate(numbers):
-                seen = np.clip(values[:, place], 0.0, None), vectors[:, place], turned[:, place]
-                yield int(number), (*seen, squares[:, place], log_det[:, place])
+            yield numbers, np.clip(values, 0.0, None), vectors, turned, squares, log_det
 
     def _profile(
         self,
-        number: int,
+        numbers: np.ndarray,
         values: np.ndarray,
         vectors: np.ndarray,
         turned: np.ndarray,
         squares: np.ndarray,
         log_det: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Log density (1 + S, T) over the sizes of a unit, zero first; mean and variance (S, T, d) of its coefficients."""
-        unit = self.units[number]
-        variances = np.concatenate([[0.0], self.grid.scales**2])[:, None, None]
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Log density (1 + S, T, u) over the sizes of units of one width, zero first; mean and variance (S, T, u, d) of their
+        coefficients, the latter at unit noise, and the variance of the noise (S, T, u)."""
+        variances = np.concatenate([[0.0], self.grid.scales**2])[:, None, None, None]
         widened = 1.0 + variances * values
         left = squares - (variances * turned**2 / widened).sum(axis=-1)
-        density = self.base - 0.5 * (log_det + np.log(widened).sum(axis=-1)) + log_likelihood(left, self.freedom)
-        density = density + self.sign_factors.sum(axis=0) - self.sign_factors[number]
+        occam = -0.5 * (log_det + np.log(widened).sum(axis=-1))
+        density = self.base[:, None] + occam + log_likelihood(left, self.freedom)
+        density += (self.sign_factors.sum(axis=0) - self.sign_factors[numbers]).T
         mean = (vectors @ (variances * turned / widened)[1:, ..., None])[..., 0]
         variance = (vectors**2 @ (variances / widened)[1:, ..., None])[..., 0]
-        if unit.signs.any():
-            density[1:] += _log_sign_factor(mean, variance, unit.signs, left[1:], self.freedom)
-        return density, mean, variance * np.maximum(left[1:] / self.freedom, 1.0)[..., None]
+        for place, number in enumerate(numbers.tolist()):
+            signs = self.units[number].signs
+            if signs.any():
+                seen = mean[:, :, place], variance[:, :, place], signs, left[1:, :, place]
+                density[1:, :, place] += _log_sign_factor(*seen, self.freedom)
+        return density, mean, variance, np.maximum(left[1:] / self.freedom, 1.0)
 
 
 def _log_sign_factor(

@@ -22,7 +22,7 @@ from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+    from collections.abc import Collection, Iterable, Iterator, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Model as FittedModel
     from elastocal.fitting.observations import Observations, States
-    from elastocal.fitting.whitening import Whitening
+    from elastocal.fitting.whitening import Scaling, Whitening
     from elastocal.mechanics.sites import Sites
 
 # Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
@@ -126,26 +126,23 @@ def linearized(
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
     parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
-    triangle, unit_rad = source.declared_part(parts_of(observations, rows_at_once(int((~found).sum()) + 60)))
+    larger_parts = parts_of(observations, rows_at_once(int((~found).sum()) + 60))
+    lines = [*source.lines(parts)] if held else []
+    triangle, unit_rad = source.declared_part(lines if held else source.lines(larger_parts))
     rows = len(observations) * observations.rows
     size = declared_size(fitted, parameters, owners[~found], triangle, rows, present, settings)
     deviation = prior_deviations(fitted, parameters, owners[~found], size)
     still = np.zeros(sites.joints)
     grid = unit_rad * np.array(settings.pose_steps)
     if held:
-        (block,) = source.blocks(parts)
+        (block,) = source.blocks(lines)
         whole = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
         grid = grid[pose_errors_within_reach(statistics_of(whole.without_candidates, grid), settings)]
         products: Products | Sums = whole
     else:
-        chosen = spread_poses(observations, SAMPLE_ROWS // observations.rows)
-        some, seen = selected(fitted, observations, chosen)
-        (block,) = replace(source, fitted=some, observations=seen, around=_conditions_of(some, seen)).blocks(
-            parts_of(seen, len(seen))
-        )
-        sample = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        sample = products_of(**vars(source.sample()), prior_std=deviation, present=present, joint_rad=still)
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
-        products = summed(source.blocks(parts), triangle[:-1, :-1], sample, deviation, present, grid)
+        products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], sample, deviation, present, grid)
     statistics = statistics_of(products, grid)
     smallest = smallest_shown(statistics, units, settings)
     shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n < len(settings.scales))
@@ -300,54 +297,89 @@ class _Source:
     found: np.ndarray
     values: np.ndarray
 
-    def lines(
-        self, parts: Iterable[tuple[slice, slice]]
-    ) -> Iterator[tuple[Linearization, Observations, np.ndarray, Callable[[np.ndarray], np.ndarray]]]:
-        """Linearization, conditions, states and whitening of each part."""
+    def lines(self, parts: Iterable[tuple[slice, slice]]) -> Iterator[_Line]:
+        """Each part about the fit."""
         fitted = self.fitted
         for states, seen in parts:
             some = part_at(self.observations, states, seen)
             line = linearize(fitted.model, fitted.estimate, some, at_states(self.around, states))
             jacobian, root = fitted.jacobian_at(line, seen), np.sqrt(fitted.weights[seen])
-            yield line, some, jacobian, _white(whitening(some, jacobian, fitted.noise.of_measurements), root)
+            yield _Line(line, some, jacobian, whitening(some, jacobian, fitted.noise.of_measurements), root)
 
-    def declared_part(self, parts: Iterable[tuple[slice, slice]]) -> tuple[np.ndarray, float]:
+    def declared_part(self, lines: Iterable[_Line]) -> tuple[np.ndarray, float]:
         """Triangular factor of declared sensitivities and residual; standard error with which one pose tells a joint."""
         information: list[np.ndarray] = []
 
         def rows() -> Iterator[np.ndarray]:
-            for line, some, jacobian, white in self.lines(parts):
-                squares = (white(jacobian) ** 2).sum(axis=1) / jacobian.shape[-1]
-                information.append(np.bincount(np.repeat(some.cluster, some.rows), squares))
-                yield np.column_stack([white(line.sensitivities[..., ~self.found]), white(line.residual)])
+            for part in lines:
+                line, some = part.line, part.observations
+                squares = (part.white(part.jacobian) ** 2).sum(axis=(1, 2)) / part.jacobian.shape[-1]
+                information.append(np.bincount(some.cluster, squares))
+                yield _flat(
+                    part.white(np.concatenate([line.sensitivities[..., ~self.found], line.residual[..., None]], axis=2))
+                )
 
         triangle = triangle_of(rows())
         return triangle, float(1.0 / np.sqrt(np.median(np.concatenate(information))))
 
-    def blocks(self, parts: Iterable[tuple[slice, slice]]) -> Iterator[WhiteRows]:
-        """`WhiteRows` of each part."""
+    def blocks(self, lines: Iterable[_Line]) -> Iterator[WhiteRows]:
+        """`WhiteRows` of each part.
+
+        What errs together is of one state, and a candidate displaces states: the Jacobian is whitened, not every column.
+        """
         sizes = np.concatenate([unit.sizes for unit in self.units])
-        for line, some, jacobian, white in self.lines(parts):
-            around = line.conditions
-            laws: list[tuple[Displacing, tuple[float, ...]]] = [*self.tested, *((law, ()) for law in self.against)]
-            made = effect_columns(laws, around, line.coordinate_jacobian, some.state)
+        laws: list[tuple[Displacing, tuple[float, ...]]] = [*self.tested, *((law, ()) for law in self.against)]
+        for part in lines:
+            line, some = part.line, part.observations
+            made = effect_columns(laws, line.conditions, part.white(line.coordinate_jacobian), some.state)
             made *= sizes
             residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]
             yield WhiteRows(
-                white(line.sensitivities[..., ~self.found]),
-                white(made),
-                white(residual),
-                white(jacobian),
-                np.repeat(some.cluster, some.rows),
+                _flat(part.white(line.sensitivities[..., ~self.found])),
+                _flat(made),
+                _flat(part.white(residual)[..., None])[:, 0],
+                _flat(part.white(part.jacobian)),
+                np.tile(some.cluster, some.rows),
             )
 
+    def sample(self) -> WhiteRows:
+        """Rows of some poses all over the campaign."""
+        chosen = spread_poses(self.observations, SAMPLE_ROWS // self.observations.rows)
+        some, seen = selected(self.fitted, self.observations, chosen)
+        few = replace(self, fitted=some, observations=seen, around=_conditions_of(some, seen))
+        (block,) = few.blocks(few.lines(parts_of(seen, len(seen))))
+        return block
 
-def _white(whitener: Whitening, root: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    def white(values: np.ndarray) -> np.ndarray:
-        weighted = values * root.reshape(-1, *[1] * (values.ndim - 1))
-        return whitener.apply(weighted).reshape(values.shape[0] * values.shape[1], *values.shape[2:])
 
-    return white
+@dataclass(frozen=True)
+class _Line:
+    """A part of the measurements about a fit.
+
+    Attributes
+    ----------
+    line : Linearization
+    observations : Observations
+    jacobian : ndarray (M, rows, n)
+        With respect to the joints.
+    whitening : Whitening or Scaling
+    root : ndarray (M,)
+        Square roots of the weights.
+    """
+
+    line: Linearization
+    observations: Observations
+    jacobian: np.ndarray
+    whitening: Whitening | Scaling
+    root: np.ndarray
+
+    def white(self, values: np.ndarray) -> np.ndarray:
+        """Weighted and whitened values (M, rows, ...)."""
+        return self.whitening.apply(values * self.root.reshape(-1, *[1] * (values.ndim - 1)))
+
+
+def _flat(values: np.ndarray) -> np.ndarray:
+    """Values (M, rows, k) as rows (rows * M, k): those of one component after those of another, as effects make them."""
+    return values.swapaxes(0, 1).reshape(values.shape[0] * values.shape[1], values.shape[2])
 
 
 def searched_part(fitted: Fit, observations: Observations, settings: Settings) -> tuple[Fit, Observations]:

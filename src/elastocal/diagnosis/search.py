@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+from bisect import bisect
 from dataclasses import dataclass
 from functools import cached_property
 from heapq import nlargest
@@ -254,14 +255,14 @@ class _Searcher:
             self.keep_likely_pose_errors(by_pose_error, total)
         prior, here = self.problem.prior, self.met[model]
         mechanisms = {units[n].mechanism: sum(units[m].mechanism == units[n].mechanism for m in model) for n in open_units}
+        best, gained = self.grid.scales[found.argmax(axis=1)], (total + (here - alone)).tolist()
         for number in open_units:
-            odds = here + total[number] - alone + prior.added(units[number], mechanisms[units[number].mechanism])
-            key = tuple(sorted((*model, number)))
+            odds = gained[number] + prior.added(units[number], mechanisms[units[number].mechanism])
+            place = bisect(model, number)
+            key = (*model[:place], number, *model[place:])
             if odds > self.met.get(key, -np.inf):
-                self.met[key] = float(odds)
-                place = key.index(number)
-                best = self.grid.scales[np.argmax(found[number])]
-                self.sizes[key] = np.concatenate([sizes[:place], [best], sizes[place:]])
+                self.met[key] = odds
+                self.sizes[key] = np.concatenate([sizes[:place], best[number : number + 1], sizes[place:]])
 
     def keep_likely_pose_errors(self, by_pose_error: np.ndarray, total: np.ndarray) -> None:
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""

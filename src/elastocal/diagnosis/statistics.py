@@ -27,6 +27,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
+from elastocal.fitting.observations import members_of
 
 # Of a variance of one, or of the largest eigenvalue: what is less is rounding, what is added is not seen.
 _ROUNDING = 1e-9
@@ -59,8 +60,8 @@ class Statistics:
     log_likelihood: np.ndarray
     freedom: int
 
-    def at(self, chosen: np.ndarray) -> Statistics:
-        """The same at some of the sizes of the pose error only."""
+    def at(self, chosen: np.ndarray | slice) -> Statistics:
+        """The same at some of the sizes of the pose error only; a slice copies nothing."""
         return Statistics(
             self.pose_error_rad[chosen],
             self.gram[chosen],
@@ -177,8 +178,9 @@ def products_of(
 
     Notes
     -----
-    Projection is repeated once, which restores orthogonality to rounding [1]_. What the declared model fits are its effective
-    degrees of freedom, the trace of its hat matrix [2]_.
+    Projection leaves of the basis what rounding does, and the Schur complement of what is left takes that: projected twice,
+    which restores orthogonality to rounding [1]_. What the declared model fits are its effective degrees of freedom, the trace
+    of its hat matrix [2]_.
 
     References
     ----------
@@ -186,34 +188,25 @@ def products_of(
        Computers & Mathematics with Applications 50, 2005.
     .. [2] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
     """
-    count = declared.shape[1]
-    prior_rows = np.diag(1.0 / prior_std)
-    scaled = np.concatenate([declared, prior_rows])
-    rest = np.zeros((len(scaled), candidates.shape[1] + 1))
-    rest[: len(declared), :-1], rest[: len(declared), -1] = candidates, residual
-    rest[len(declared) :, -1] = -present / prior_std
+    count, width = declared.shape[1], declared.shape[1] + candidates.shape[1] + 1
+    scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
+    # Columns come one after the other, and stay so.
+    every = np.zeros((width, len(scaled))).T
+    rows, prior, rest = every[: len(declared)], every[len(declared) :], every[:, count:]
+    rows[:, count:-1], rows[:, -1], prior[:, -1] = candidates, residual, -present / prior_std
     norms = np.linalg.norm(scaled, axis=0)
     basis, triangle = np.linalg.qr(scaled / norms)
-    projected = np.zeros((count, rest.shape[1]))
-    # Twice is enough: the second pass removes the rounding of the first.
-    for _ in range(2):
-        taken = basis.T @ rest
-        rest -= basis @ taken
-        projected += taken
-    every = np.concatenate([basis, rest], axis=1)
-    rows = every[: len(declared)]
-    order = np.argsort(pose, kind="stable")
-    sizes = np.bincount(pose)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    joints = jacobian.shape[1]
-    pose_rows, pose_gram = np.empty((len(sizes), joints, every.shape[1])), np.empty((len(sizes), joints, joints))
-    for size in np.unique(sizes):
-        mine = sizes == size
-        members = order[starts[mine][:, None] + np.arange(size)]
-        seen = jacobian[members].transpose(0, 2, 1)
-        pose_rows[mine] = seen @ rows[members]
+    projected = basis.T @ rest
+    rest.T[:] -= projected.T @ basis.T
+    every[:, :count] = basis
+    order, joints, poses = np.argsort(pose, kind="stable"), jacobian.shape[1], int(pose.max()) + 1
+    pose_rows, pose_gram = np.empty((poses, joints, width)), np.empty((poses, joints, joints))
+    for places in members_of(pose[order]):
+        members = order[places]
+        mine, seen = pose[members[:, 0]], jacobian[members].transpose(0, 2, 1)
+        pose_rows[mine] = seen @ rows.T[:, members].transpose(1, 2, 0)
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
-    prior, white = every[len(declared) :], rows.T @ rows
+    white = rows.T @ rows
     freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
     return Products(
@@ -242,17 +235,13 @@ def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Stat
     -------
     Statistics
     """
-    grams, alongs, squares, logs = [], [], [], []
-    for tau in pose_error_rad:
+    count = products.gram.shape[0] - products.declared
+    rest, logs = np.empty((len(pose_error_rad), count, count)), np.empty(len(pose_error_rad))
+    for number, tau in enumerate(pose_error_rad):
         total, log_det = normal_equations(products, tau)
-        gram, along, rest, log_declared = _marginal(total, products.declared)
-        grams.append(gram)
-        alongs.append(along)
-        squares.append(rest)
-        logs.append(-0.5 * log_det - 0.5 * log_declared)
-    return Statistics(
-        np.asarray(pose_error_rad), np.array(grams), np.array(alongs), np.array(squares), np.array(logs), products.freedom
-    )
+        log_declared = _marginal(total, products.declared, rest[number])
+        logs[number] = -0.5 * log_det - 0.5 * log_declared
+    return Statistics(np.asarray(pose_error_rad), rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
 def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray, float]:
@@ -272,7 +261,7 @@ def normal_equations(products: Products | Sums, tau: float) -> tuple[np.ndarray,
         place = int(np.argmin(np.abs(products.pose_error_rad - tau)))
         return products.totals[place], products.log_dets[place]
     rows, log_det = _pose_factor(products, tau)
-    return products.gram - rows.T @ rows, log_det
+    return (products.gram - rows.T @ rows if len(rows) else products.gram), log_det
 
 
 def null_draws(
@@ -304,21 +293,21 @@ def null_draws(
        1997.
     """
     if isinstance(products, Sums):
-        gram = _marginal(normal_equations(products, tau)[0], products.declared)[0]
+        gram = statistics_of(products, np.array([tau])).gram[0]
         along, squares = null_draws_of(products, gram, count, stream)
         return along[None], squares[None]
     poses, joints, width = products.pose_rows.shape
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
     # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
-    kept, inverse, root = _pseudo_inverse(products.pose_gram)
+    kept, inverse_root, root = _pseudo_inverse(products.pose_gram)
     white = stream.standard_normal((poses, joints, count)) * kept[..., None]
     seen = root @ white
-    known = inverse @ products.pose_rows[..., :-1]
+    known = (inverse_root @ products.pose_rows[..., :-1]).reshape(flat.shape)
     scale = np.sqrt(np.clip(np.diag(products.white_gram), 1e-300, None))
-    left = (products.white_gram - flat.T @ known.reshape(flat.shape)) / np.outer(scale, scale)
+    left = (products.white_gram - known.T @ known) / np.outer(scale, scale)
     factor = _root(left, products.rows)
     rest = stream.standard_normal((factor.shape[1], count))
-    along = known.reshape(flat.shape).T @ seen.reshape(-1, count)
+    along = known.T @ white.reshape(-1, count)
     along += scale[:, None] * (factor @ rest)
     freedom = max(products.rows - int(kept.sum()) - len(rest), 1)
     squares = (white**2).sum(axis=(0, 1)) + (rest**2).sum(axis=0) + stream.chisquare(freedom, count)
@@ -328,20 +317,20 @@ def null_draws(
     squares = squares + (common * moved).sum(axis=(0, 1))
     along = along + flat.T @ common.reshape(-1, count)
     seen = seen + moved
-    found_along, found_squares = [], []
-    for size_rad in pose_error_rad:
-        inverse = _pose_inverse(products, size_rad)
-        solved = inverse @ seen
+    found_along = np.empty((len(pose_error_rad), flat.shape[1] - products.declared, count))
+    found_squares = np.empty((len(pose_error_rad), count))
+    for number, size_rad in enumerate(pose_error_rad):
+        solved = _pose_inverse(products, size_rad) @ seen
         these = along - flat.T @ solved.reshape(-1, count)
         left = squares - (seen * solved).sum(axis=(0, 1))
-        total, _ = normal_equations(products, size_rad)
-        declared = slice(0, products.declared)
-        factor = np.linalg.cholesky(total[declared, declared])
-        fitted = solve_triangular(factor, these[declared], lower=True)
-        cross = solve_triangular(factor, total[declared, products.declared : -1], lower=True)
-        found_along.append(these[products.declared :] - cross.T @ fitted)
-        found_squares.append(left - (fitted**2).sum(axis=0))
-    return np.array(found_along), np.array(found_squares)
+        rows, _ = _pose_factor(products, size_rad)
+        total = products.gram[: products.declared, :-1] - rows[:, : products.declared].T @ rows[:, :-1]
+        factor = np.linalg.cholesky(total[:, : products.declared])
+        fitted = solve_triangular(factor, these[: products.declared], lower=True)
+        cross = solve_triangular(factor, total[:, products.declared :], lower=True)
+        np.subtract(these[products.declared :], cross.T @ fitted, out=found_along[number])
+        found_squares[number] = left - (fitted**2).sum(axis=0)
+    return found_along, found_squares
 
 
 def _root(covariance: np.ndarray, rows: int) -> np.ndarray:
@@ -361,12 +350,15 @@ def _root(covariance: np.ndarray, rows: int) -> np.ndarray:
 
 
 def _pseudo_inverse(grams: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions that are not rounding (G, n), Moore-Penrose inverse and root (G, n, n), of symmetric positive matrices."""
+    """Of symmetric positive matrices: directions that are not rounding (G, n), and two matrices (G, n, n) of each.
+
+    One times its transpose is the matrix, the transpose of the other times that is the Moore-Penrose inverse.
+    """
     values, vectors = np.linalg.eigh(grams)
     kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
     values = np.where(kept, values, 1.0)
-    inverse = (vectors * (kept / values)[:, None]) @ vectors.transpose(0, 2, 1)
-    return kept, inverse, vectors * (kept * np.sqrt(values))[:, None]
+    inverse_root = (kept / np.sqrt(values))[..., None] * vectors.transpose(0, 2, 1)
+    return kept, inverse_root, vectors * (kept * np.sqrt(values))[:, None]
 
 
 def _joint_deviations(products: Products, tau: float) -> np.ndarray:
@@ -393,9 +385,10 @@ def _pose_factor(products: Products, tau: float) -> tuple[np.ndarray, float]:
     return rows.reshape(-1, width), float(log_det)
 
 
-def _marginal(total: np.ndarray, declared: int) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Schur complement of the declared columns: W'MW, W'My, y'My and ln |X'Sigma^-1 X|."""
+def _marginal(total: np.ndarray, declared: int, rest: np.ndarray) -> float:
+    """Schur complement of the declared columns, [W'MW W'My; y'MW y'My], into `rest`; and ln |X'Sigma^-1 X|."""
     factor = np.linalg.cholesky(total[:declared, :declared])
     cross = solve_triangular(factor, total[:declared, declared:], lower=True)
-    rest = total[declared:, declared:] - cross.T @ cross
-    return rest[:-1, :-1], rest[:-1, -1], rest[-1, -1], float(2.0 * np.log(np.diag(factor)).sum())
+    np.matmul(cross.T, cross, out=rest)
+    np.subtract(total[declared:, declared:], rest, out=rest)
+    return float(2.0 * np.log(np.diag(factor)).sum())

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from elastocal.fitting.observations import members_of
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
@@ -47,7 +49,6 @@ class WhiteRows:
     residual : ndarray (R,)
     jacobian : ndarray (R, n)
     pose : ndarray of int (R,)
-        Rising.
     """
 
     declared: np.ndarray
@@ -196,12 +197,11 @@ def summed(
 
 def _whitened(every: np.ndarray, jacobian: np.ndarray, pose: np.ndarray, tau: float) -> Iterator[tuple[np.ndarray, float]]:
     """Rows with (I + tau^2 J J')^-1/2 applied, and ln |I + tau^2 J J'|, for each number of rows in a pose."""
-    sizes = np.bincount(pose)
-    starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-    for size in np.unique(sizes):
-        members = starts[sizes == size][:, None] + np.arange(size)
+    order = np.argsort(pose, kind="stable")
+    for places in members_of(pose[order]):
+        members = order[places]
         seen = tau * jacobian[members]
-        factor = np.linalg.cholesky(np.eye(size) + seen @ seen.transpose(0, 2, 1))
+        factor = np.linalg.cholesky(np.eye(members.shape[1]) + seen @ seen.transpose(0, 2, 1))
         white = np.linalg.inv(factor) @ every[members]
         yield white.reshape(-1, every.shape[1]), 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
 

@@ -14,7 +14,7 @@ from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.parameters import parameters
-from elastocal.fitting.whitening import Whitening, whitening
+from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.linearization import Linearization
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations
+    from elastocal.fitting.whitening import Scaling, Whitening
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Fit:
         priors as in Laplace's approximation [1]_. Zero where held.
     weights : ndarray (M,)
         Robust weight of each observation.
-    whitener : Whitening
+    whitener : Whitening or Scaling
     residual : ndarray (M, rows)
         m and rad, base axes.
     joint_jacobian : ndarray (M, rows, n) or None
@@ -64,7 +65,7 @@ class Fit:
     held: np.ndarray
     covariance: np.ndarray
     weights: np.ndarray
-    whitener: Whitening
+    whitener: Whitening | Scaling
     residual: np.ndarray
     joint_jacobian: np.ndarray | None
     conditions: Conditions | None

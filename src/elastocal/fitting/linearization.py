@@ -128,11 +128,13 @@ def effect_columns(
 
 
 def _columns(laws: Sequence[Mapping[int, np.ndarray]], coordinate_jacobian: np.ndarray, state: np.ndarray) -> np.ndarray:
-    columns = np.empty((coordinate_jacobian.shape[1], len(laws), len(state)))
-    jacobian = np.moveaxis(coordinate_jacobian, 0, -1)
-    for number, law in enumerate(laws):
-        columns[:, number] = sum(jacobian[:, coordinate] * values[state] for coordinate, values in law.items())
-    return np.moveaxis(columns, -1, 0)
+    # The observations of each column lie side by side.
+    columns = np.zeros((len(laws), coordinate_jacobian.shape[1], len(state)))
+    jacobian = coordinate_jacobian.transpose(2, 1, 0)
+    for column, law in zip(columns, laws, strict=True):
+        for coordinate, values in law.items():
+            column += jacobian[coordinate] * values[state]
+    return columns.transpose(2, 1, 0)
 
 
 def _target_columns(rotation: np.ndarray, mask: np.ndarray, rows: int) -> np.ndarray:

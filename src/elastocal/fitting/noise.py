@@ -127,7 +127,8 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
     if total < FEWEST_FOR_JOINTS:
         return sensor
-    data, nothing = (contrasts, jacobians, rows), np.full(joints, np.log(_SMALLEST_RAD))
+    data = ([_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)],)
+    nothing = np.full(joints, np.log(_SMALLEST_RAD))
     both = [np.log(position), np.log(orientation)][: rows // 3]
     start = np.concatenate([both, np.full(joints, np.log(0.3 * position))])
     bounds = [(value - 7, value + 1) for value in both] + [(np.log(_SMALLEST_RAD), np.log(_LARGEST_RAD))] * joints
@@ -239,23 +240,64 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     return [np.concatenate(parts) for parts in contrasts.values()], [np.concatenate(parts) for parts in jacobians.values()]
 
 
-def _negative_log_likelihood(
-    logs: np.ndarray, contrasts: Sequence[np.ndarray], jacobians: Sequence[np.ndarray], rows: int
-) -> tuple[float, np.ndarray]:
-    """Minus the logarithm of the restricted likelihood, and its derivatives by the logarithms of the deviations."""
-    values = np.exp(logs)
+@dataclass(frozen=True)
+class _Seen:
+    """What contrasts v (G, k * rows) of one number k of targets say of the noise, Jacobians S (G, k * rows, n) beside them.
+
+    Attributes
+    ----------
+    count : int
+        Numbers of one sensor's part, of positions or of orientations, in v.
+    squares : ndarray (s,)
+        v'v of each sensor's part, of all groups.
+    along : ndarray (G, s, n)
+        S'v of each.
+    gram : ndarray (G, s, n, n)
+        S'S of each.
+    """
+
+    count: int
+    squares: np.ndarray
+    along: np.ndarray
+    gram: np.ndarray
+
+
+def _seen(contrasts: np.ndarray, jacobians: np.ndarray) -> _Seen:
+    groups, targets, rows, joints = jacobians.shape
     sensors = rows // 3
-    noise = Noise("", values[0], values[sensors - 1], values[sensors:])
-    total, slope = 0.0, np.zeros(len(values))
-    for vectors, jacobian in zip(contrasts, jacobians, strict=True):
-        groups, targets = jacobian.shape[:2]
-        inverse = np.linalg.inv(measurement_covariances(noise, jacobian, rows))
-        told = (inverse @ vectors[..., None])[..., 0]
-        total += 0.5 * ((vectors * told).sum() - np.linalg.slogdet(inverse)[1].sum())
-        # By an element of the covariance: half of (inverse - told told^T).
-        sensor = (np.diagonal(inverse, axis1=1, axis2=2) - told**2).reshape(groups, targets, sensors, 3).sum(axis=(0, 1, 3))
-        slope[:sensors] += values[:sensors] ** 2 * sensor
-        stacked = jacobian.reshape(groups, targets * rows, -1)
-        joint = (stacked * (inverse @ stacked)).sum(axis=1) - (told[:, None] @ stacked)[:, 0] ** 2
-        slope[sensors:] += values[sensors:] ** 2 * joint.sum(axis=0)
+    stacked = jacobians.reshape(groups, targets, sensors, 3, joints).swapaxes(1, 2).reshape(groups, sensors, -1, joints)
+    vectors = contrasts.reshape(groups, targets, sensors, 3).swapaxes(1, 2).reshape(groups, sensors, -1)
+    across = stacked.swapaxes(2, 3)
+    along = (across @ vectors[..., None])[..., 0]
+    return _Seen(groups * targets * 3, (vectors**2).sum(axis=(0, 2)), along, across @ stacked)
+
+
+def _negative_log_likelihood(logs: np.ndarray, parts: Sequence[_Seen]) -> tuple[float, np.ndarray]:
+    """Minus the logarithm of the restricted likelihood, and its derivatives by the logarithms of the deviations.
+
+    With D the variances of the sensors and L those of the joints, Sigma = D + S L S' has the determinant |D| |I + L C| and the
+    inverse D^-1 - D^-1 S A S' D^-1, C = S' D^-1 S and A = (I + L C)^-1 L, by Woodbury's identity [1]_.
+
+    References
+    ----------
+    .. [1] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
+    """
+    sensors = len(logs) - parts[0].along.shape[2]
+    precision, deviation = np.exp(-2.0 * logs[:sensors]), np.exp(logs[sensors:])
+    total, slope = 0.0, np.zeros(len(logs))
+    for part in parts:
+        along, gram = precision @ part.along, (precision[:, None, None] * part.gram).sum(axis=1)
+        inner = np.eye(len(deviation)) + deviation[:, None] * gram * deviation
+        left = deviation[:, None] * np.linalg.inv(inner) * deviation
+        told = (left @ along[..., None])[..., 0]
+        total += part.count * logs[:sensors].sum() + 0.5 * (precision @ part.squares - (along * told).sum())
+        total += 0.5 * np.linalg.slogdet(inner)[1].sum()
+        # S' times what the inverse makes of v; of each sensor's part, what the joints explain of its squares and its variance.
+        rest = along - (gram @ told[..., None])[..., 0]
+        explained = 2.0 * (part.along @ told[..., None])[..., 0]
+        explained -= ((part.gram @ told[:, None, :, None])[..., 0] * told[:, None]).sum(axis=2)
+        explained -= (left[:, None] * part.gram).sum(axis=(2, 3))
+        slope[:sensors] += part.count + precision * (explained.sum(axis=0) - part.squares)
+        variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)
+        slope[sensors:] += deviation**2 * (variance - rest**2).sum(axis=0)
     return total, slope

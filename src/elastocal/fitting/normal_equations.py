@@ -13,7 +13,7 @@ from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import held_at_once, kept_conditions, observations_at_once
 from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
-from elastocal.fitting.whitening import Whitening, whitening
+from elastocal.fitting.whitening import joined, whitening
 
 if TYPE_CHECKING:
     from elastocal.effects.conditions import Conditions
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
+    from elastocal.fitting.whitening import Scaling, Whitening
 
 
 class Parts:
@@ -54,7 +55,7 @@ class Parts:
         if not self.whole and around is not None:
             self.around = [at_states(around, states) for states, _ in self.slices]
         self.coordinates: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-        self.whiteners: dict[int, Whitening] = {}
+        self.whiteners: dict[int, Whitening | Scaling] = {}
         # Of so many states that conditions are not kept neither is this.
         shape = len(observations), observations.rows, model.sites.joints
         self.jacobian = None if around is None else np.zeros(shape)
@@ -138,13 +139,7 @@ class Parts:
             self.linearize(estimate)
             residual = self.residual
             around = kept_conditions(model, estimate, self.observations)
-        whitener = Whitening(
-            tuple(
-                (members + edges[1].start, factor)
-                for edges, found in zip(self.slices, self.whiteners.values(), strict=True)
-                for members, factor in found.blocks
-            )
-        )
+        whitener = joined([*self.whiteners.values()], [seen.start for _, seen in self.slices])
         return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, self.jacobian, around, converged)
 
     def _around(self, number: int, estimate: Estimate | None = None) -> Conditions:

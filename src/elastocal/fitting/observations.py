@@ -104,6 +104,23 @@ def state_clusters(states: States | Measurements) -> np.ndarray:
     return groups_of(np.column_stack([states.session, states.pose]))[1]
 
 
+def members_of(group: np.ndarray) -> list[np.ndarray]:
+    """Places of each group, for each number of places in one.
+
+    Parameters
+    ----------
+    group : ndarray of int (M,)
+        Rising, such as the states or the poses of observations.
+
+    Returns
+    -------
+    list of ndarray of int (G, k)
+    """
+    seen = np.bincount(group)
+    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
+    return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]
+
+
 def averaged(measurements: Measurements) -> Observations:
     """Observations with the repeats averaged that were approached alike.
 

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.noise import measurement_covariances
+from elastocal.fitting.observations import members_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
 
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
@@ -47,7 +48,49 @@ class Whitening:
         return whitened
 
 
-def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening:
+@dataclass(frozen=True)
+class Scaling:
+    """What turns rows into ones of unit variance where nothing is correlated.
+
+    Attributes
+    ----------
+    precision : ndarray (rows,)
+        Of one measurement: one over its standard deviation.
+    root : ndarray (M,)
+        Square root of the number of measurements of which each observation is the average.
+    """
+
+    precision: np.ndarray
+    root: np.ndarray
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """As `Whitening.apply`."""
+        scale = self.root[:, None] * self.precision
+        return values * scale.reshape(*scale.shape, *[1] * (values.ndim - 2))
+
+
+def joined(parts: Sequence[Whitening | Scaling], starts: Sequence[int]) -> Whitening | Scaling:
+    """Whitening of observations of which there is one for each part.
+
+    Parameters
+    ----------
+    parts : sequence of Whitening or of Scaling
+    starts : sequence of int
+        The first observation of each.
+
+    Returns
+    -------
+    Whitening or Scaling
+    """
+    scalings = [part for part in parts if isinstance(part, Scaling)]
+    if scalings:
+        return Scaling(scalings[0].precision, np.concatenate([part.root for part in scalings]))
+    correlated = [part for part in parts if isinstance(part, Whitening)]
+    pairs = zip(correlated, starts, strict=True)
+    return Whitening(tuple((members + start, factor) for part, start in pairs for members, factor in part.blocks))
+
+
+def whitening(observations: Observations, jacobian: np.ndarray | None, noise: Noise) -> Whitening | Scaling:
     """Whitening of averaged observations.
 
     For generalized least squares [1]_: inverse Cholesky factors of the covariance of what errs together.
@@ -62,7 +105,7 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
 
     Returns
     -------
-    Whitening
+    Whitening or Scaling
 
     References
     ----------
@@ -70,20 +113,12 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
        55, 1935.
     """
     if not noise.pose_rad and not noise.joint_rad.any():
-        return Whitening(tuple(_of_sensor_alone(observations, noise)))
+        precision = 1.0 / np.repeat([noise.position_m, noise.orientation_rad], 3)[: observations.rows]
+        return Scaling(precision, np.sqrt(observations.states.repeats[observations.state]))
     # Where joints err, it takes a Jacobian to see it.
     assert jacobian is not None
     blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise)]
     return Whitening(tuple(blocks))
-
-
-def _of_sensor_alone(observations: Observations, noise: Noise) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Blocks where nothing is correlated: one factor for all that are averages of as many repeats, held once."""
-    precision = np.diag(1.0 / np.repeat([noise.position_m, noise.orientation_rad], 3)[: observations.rows])
-    repeats = observations.states.repeats[observations.state]
-    for number in np.unique(repeats):
-        members = np.flatnonzero(repeats == number)[:, None]
-        yield members, np.broadcast_to(np.sqrt(number) * precision, (len(members), *precision.shape))
 
 
 def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -93,20 +128,13 @@ def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise)
     """
     rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad:
-        for members in _members(observations.state):
+        for members in members_of(observations.state):
             covariance = measurement_covariances(noise, jacobian[members], rows)
             yield members, covariance / repeats[members[:, 0]][:, None, None]
         return
-    for members in _members(observations.cluster):
+    for members in members_of(observations.cluster):
         stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
         yield members, alike * measurement_covariances(noise, jacobian[members], rows) + common
-
-
-def _members(group: np.ndarray) -> list[np.ndarray]:
-    """Observations of each state or pose, for each number of them in one: arrays (G, k)."""
-    seen = np.bincount(group)
-    start = np.concatenate([[0], np.cumsum(seen)[:-1]])
-    return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]
