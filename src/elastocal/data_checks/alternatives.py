@@ -273,9 +273,9 @@ class _Winner:
         for change in self.tried.changes:
             detail, parameters, decisive = change.detail, change.parameters, True
             if change.placement == "frame":
-                detail, parameters, decisive = _frame_told(self.placement.estimate, before, self.after)
+                detail, parameters, decisive = _frame_fault(self.placement.estimate, before, self.after)
             if change.placement == "targets":
-                detail, parameters = _targets_told(self.tried.campaign.targets, written.estimate, self.placement.estimate)
+                detail, parameters = _target_fault(self.tried.campaign.targets, written.estimate, self.placement.estimate)
             parameters = (*parameters, Value("poses compared", float(len(np.unique(measurements.pose))), "–"))
             alike = self.alike if len(self.tried.changes) == 1 else ()
             found.append(Fault(change.name, change.joints, detail, parameters, self.evidence, (), decisive, alike))
@@ -421,7 +421,7 @@ def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
     ways.sort(key=lambda matrix: np.abs(matrix - np.eye(3)).sum())
     found = []
     for matrix in ways[1:]:
-        detail = f"the axes are exchanged: measurements fit with {_axes_told(matrix)}"
+        detail = f"the axes are exchanged: measurements fit with {_axes_in_words(matrix)}"
         found.append(Change("swapped_axes", detail, _with_positions(matrix)))
         handed = np.linalg.det(matrix)
         for sign in sorted({1.0, handed}) if oriented else ():
@@ -431,15 +431,15 @@ def _axes(mirrored_only: bool, oriented: bool) -> list[Change]:
     return found
 
 
-def _axes_told(matrix: np.ndarray) -> str:
+def _axes_in_words(matrix: np.ndarray) -> str:
     """Such as ``x = -y, y = x``: what is to be read for the axes that change."""
-    told = []
+    written_axes = []
     for axis, row in zip("xyz", matrix, strict=True):
         source = int(np.argmax(np.abs(row)))
         written = f"{'-' if row[source] < 0 else ''}{'xyz'[source]}"
         if written != axis:
-            told.append(f"{axis} = {written}")
-    return ", ".join(told)
+            written_axes.append(f"{axis} = {written}")
+    return ", ".join(written_axes)
 
 
 def _with_angles(matrix: np.ndarray) -> Callable[[Campaign, Measurements], tuple[Campaign, Measurements]]:
@@ -489,7 +489,7 @@ def _with_offsets(names: Iterable[str], factor: float) -> Callable[[Campaign, Me
     return correct
 
 
-def _frame_told(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:
+def _frame_fault(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str, tuple[Value, ...], bool]:
     """Sentence and numbers of a base that stands elsewhere, and whether that is too far for physics."""
     parameters, away, turned = [], 0.0, 0.0
     for session, position, rotation in zip(estimate.sessions, estimate.frame_position, estimate.frame_rotation, strict=True):
@@ -508,7 +508,7 @@ def _frame_told(estimate: Estimate, before: Misfit, after: Misfit) -> tuple[str,
     return f"measurements would fit {better:.0f} times better if the base stood {where}", tuple(parameters), False
 
 
-def _targets_told(targets: Sequence[Target], written: Estimate, fitted: Estimate) -> tuple[str, tuple[Value, ...]]:
+def _target_fault(targets: Sequence[Target], written: Estimate, fitted: Estimate) -> tuple[str, tuple[Value, ...]]:
     parameters, farthest, turned = [], ("", 0.0), 0.0
     for number, target in enumerate(targets):
         offset = fitted.target_offset[number]

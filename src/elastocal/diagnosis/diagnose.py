@@ -160,7 +160,7 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
         conclusion = concluded(problem.problem, found, alarm)
         named, taken = conclusion.best.named, about.noise
         model = found.models[conclusion.best.model] if named else found.nothing
-        tell(_told(conclusion, alarm))
+        tell(_summary_of(conclusion, alarm))
         noise = remaining_noise(problem.problem, model, taken, declared.noise)
         off = noise.position_m > settings.relinearize_noise * taken.position_m
         small = not named or alarm.statistic < settings.relinearize_above
@@ -212,7 +212,7 @@ def _document(
     untestable: dict[str, str] = {}
     misfit: dict[str, float] | None = None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
-    said = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
+    remarks = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
     if found:
         problem, conclusion = found.linearized.problem, found.conclusion
         verdict, untestable = conclusion.verdict, found.linearized.untestable
@@ -225,14 +225,14 @@ def _document(
         )
         entries = [entry | {"adopted": found.adopted} for entry in entries]
         if entries and not found.adopted:
-            said.append("what was found is too uncertain to make predictions better: the model stays as declared")
-        said += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
+            remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
+        remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found)
-        said += _pose_error_warnings(final.noise, found.linearized)
-    said += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
+        remarks += _pose_error_warnings(final.noise, found.linearized)
+    remarks += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
-            said.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
+            remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
     tested = {unit.candidate.key for unit in found.linearized.problem.units if unit.candidate} if found else set()
     return {
         "campaign": case.campaign.name,
@@ -247,12 +247,12 @@ def _document(
         "candidates_tested": len(tested),
         "untestable": untestable,
         "converged": {"declared": declared.converged, "final": final.converged},
-        "warnings": said,
+        "warnings": remarks,
         "settings": settings.document(),
     }
 
 
-def _told(conclusion: Conclusion, alarm: Alarm) -> str:
+def _summary_of(conclusion: Conclusion, alarm: Alarm) -> str:
     best = " + ".join(conclusion.best.mechanisms) or "nothing"
     return f"{conclusion.verdict}: {best}, probability {conclusion.best.probability:.2f}, alarm p {alarm.p_value:.3f}"
 
@@ -280,8 +280,8 @@ def _noise_warnings(measured: Noise, left: Noise, settings: Settings) -> list[st
     factor = left.position_m / measured.position_m
     if factor < settings.relinearize_noise:
         return []
-    said = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {said}"]
+    reference = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
+    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {reference}"]
 
 
 def _pose_error_warnings(left: Noise, linearized: Linearized) -> list[str]:

@@ -177,8 +177,8 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
         }
         for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
-    told = final.model.identifies_compliance or member.family != "gravity"
-    return entries if told else [_product(entry, final.model) if entry["unit"] in _OF_MASS else entry for entry in entries]
+    as_masses = final.model.identifies_compliance or member.family != "gravity"
+    return entries if as_masses else [_product(entry, final.model) if entry["unit"] in _OF_MASS else entry for entry in entries]
 
 
 def _product(entry: dict[str, Any], model: Model) -> dict[str, Any]:

@@ -198,9 +198,9 @@ def _searched(
     entries, information = entries.at(chosen), information[chosen]
     for radius in _RADII:
         tried = new_states.near(reach, entries, _NEIGHBOURS, radius, stream)
-        told = instrument.information(tried, every)
+        gained = instrument.information(tried, every)
         numbers = np.arange(poses)
-        both, known = entries.then(tried), np.concatenate([information, told])
+        both, known = entries.then(tried), np.concatenate([information, gained])
         for place in range(poses):
             mine = np.append(place, poses + _NEIGHBOURS * place + np.arange(_NEIGHBOURS))
             rest = known[np.delete(numbers, place)].sum(axis=0)
@@ -237,7 +237,7 @@ def _without_idle_targets(
     for point in instrument.extra_points:
         fewer = [target for target in targets if target != point]
         less = instrument.information(entries, fewer)
-        with_it, without = (criterion.left(told.sum(axis=0)[None])[0] for told in (information, less))
+        with_it, without = (criterion.left(each.sum(axis=0)[None])[0] for each in (information, less))
         if without - with_it < _WORTH_A_TARGET * (start - with_it):
             targets, information = fewer, less
     return entries, information, targets

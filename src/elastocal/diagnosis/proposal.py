@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 NOT_DISTINGUISHABLE = "not distinguishable with this robot and tracker"
 NOTHING_MISSING, NOTHING_AMBIGUOUS = "nothing is missing", "nothing is ambiguous"
 DATA_AT_FAULT, NOTHING_TESTABLE = "the data are at fault", "the measurements can test no mechanism"
-# Poses after which nobody goes on: some two days with a tracker. Fewer are said to be needed, or none.
+# Poses after which nobody goes on: some two days with a tracker. Fewer are stated to be needed, or none.
 MOST_POSES = 100
 WANTED_PROBABILITY = 0.9
 

@@ -191,7 +191,7 @@ def in_words(text: str) -> str:
     names = "|".join(sorted(effects(), key=len, reverse=True))
 
     def worded(found: re.Match[str]) -> str:
-        # Names that are common words, such as payload, are meant only as keys or where something is said of them.
+        # Names that are common words, such as payload, are meant only as keys or where something is stated of them.
         plain = "_" not in found["effect"] and not (found["joints"] or found["detail"] or text[found.end() :].startswith(":"))
         return found.group() if plain else candidate_words(found.group())
 

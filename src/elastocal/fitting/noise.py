@@ -212,10 +212,10 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
     targets[observations.state, np.arange(len(observations)) - start[observations.state]] = observations.target
     alike = (targets == targets[first[repeated]]).all(axis=1)
     number = np.bincount(repeated, alike).astype(int)
-    told = (number - 1) * seen[first] * model.rows
+    degrees = (number - 1) * seen[first] * model.rows
     # As many as tell, of states spread over the campaign.
     wanted = np.flatnonzero(number > 1)
-    share = told.sum() / MOST
+    share = degrees.sum() / MOST
     wanted = wanted[np.linspace(0, len(wanted) - 1, int(len(wanted) / share)).astype(int)] if share > 1 else wanted
     chosen = alike & np.isin(repeated, wanted)
     if not chosen.any():
@@ -289,13 +289,13 @@ def _negative_log_likelihood(logs: np.ndarray, parts: Sequence[_Seen]) -> tuple[
         along, gram = precision @ part.along, (precision[:, None, None] * part.gram).sum(axis=1)
         inner = np.eye(len(deviation)) + deviation[:, None] * gram * deviation
         left = deviation[:, None] * np.linalg.inv(inner) * deviation
-        told = (left @ along[..., None])[..., 0]
-        total += part.count * logs[:sensors].sum() + 0.5 * (precision @ part.squares - (along * told).sum())
+        solved = (left @ along[..., None])[..., 0]
+        total += part.count * logs[:sensors].sum() + 0.5 * (precision @ part.squares - (along * solved).sum())
         total += 0.5 * np.linalg.slogdet(inner)[1].sum()
         # S' times what the inverse makes of v; of each sensor's part, what the joints explain of its squares and its variance.
-        rest = along - (gram @ told[..., None])[..., 0]
-        explained = 2.0 * (part.along @ told[..., None])[..., 0]
-        explained -= ((part.gram @ told[:, None, :, None])[..., 0] * told[:, None]).sum(axis=2)
+        rest = along - (gram @ solved[..., None])[..., 0]
+        explained = 2.0 * (part.along @ solved[..., None])[..., 0]
+        explained -= ((part.gram @ solved[:, None, :, None])[..., 0] * solved[:, None]).sum(axis=2)
         explained -= (left[:, None] * part.gram).sum(axis=(2, 3))
         slope[:sensors] += part.count + precision * (explained.sum(axis=0) - part.squares)
         variance = np.diagonal(gram, axis1=1, axis2=2) - (gram * (gram @ left)).sum(axis=2)

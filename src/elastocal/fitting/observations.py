@@ -175,13 +175,13 @@ def without_outlying_repeats(measurements: Measurements) -> Measurements:
     """
     group = groups_of(np.column_stack([_approached_alike(measurements), measurements.target]))[1]
     off = np.abs(measurements.position - _medians(measurements.position, group)[group])
-    telling = np.bincount(group)[group] > 2
-    if not telling.any():
+    repeated = np.bincount(group)[group] > 2
+    if not repeated.any():
         return measurements
-    apart = off[telling]
+    apart = off[repeated]
     # The middle one of an odd number is not off at all, and tells nothing of the others.
     usual = np.median(apart[apart > 0]) if apart.any() else 0.0
-    return measurements.select(np.flatnonzero(~(telling & (off > _WILD * usual).any(axis=1))))
+    return measurements.select(np.flatnonzero(~(repeated & (off > _WILD * usual).any(axis=1))))
 
 
 def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:

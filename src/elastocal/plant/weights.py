@@ -13,8 +13,8 @@ from elastocal.plant.structure import Mass
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-# Mass of an arm by rated load (kg) times reach (m): m = 3.2 (P R)^0.92 goes through an arm of 30 kg for 14 kg at 0.82 m and one
-# of 1130 kg for 270 kg at 2.7 m, and is within a quarter of the data sheets of those between.
+# Mass of an arm by rated load (kg) times reach (m): m = 3.2 (P R)^0.92 goes through an arm of 30 kg for 14 kg at 0.82 m and has
+# 1380 kg for 270 kg at 2.7 m, where a data sheet has 1130: a size to be expected, not the mass of one machine.
 _SCALE_KG, _POWER = 3.2, 0.92
 # Of it in the foot and in the carousel with its motors; the rest halves from link to link.
 _FOOT, _CAROUSEL, _FALL = 0.18, 0.27, 0.5
