@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import SEVEN_JOINTS, robot_of
-from synthetic import circumstances_on, made_states
+from synthetic import conditions_on, made_states
 
 from elastocal.diagnosis.other import (
     BASE_M,
@@ -33,7 +33,7 @@ EVERY = AT_A_JOINT + AT_THE_BASE
 
 def around(count=60, force=500.0, **changes):
     robot = robot_of(SEVEN_JOINTS)
-    return circumstances_on(robot, replace(made_states(7, count, seed=1, force=force), **changes))
+    return conditions_on(robot, replace(made_states(7, count, seed=1, force=force), **changes))
 
 
 def displacements(states, competitor, features, campaign=None):
@@ -181,7 +181,7 @@ def test_own_law_and_neighbours_go_by_the_torque_and_the_place_by_where_the_end_
         assert np.abs(one - other)[: FEATURES // 2].max() > 0.02 * JOINT_RAD
     turned = states.joint_angles.copy()
     turned[:, 1] += 0.3
-    moved = circumstances_on(robot_of(SEVEN_JOINTS), replace(made_states(7, 60, seed=1), joint_angles=turned))
+    moved = conditions_on(robot_of(SEVEN_JOINTS), replace(made_states(7, 60, seed=1), joint_angles=turned))
     one, other = (waves(displacements(each, Competitor((), PLACE), FEATURES, states)) for each in (states, moved))
     assert np.abs(one - other).max() > 0.02 * BASE_RAD
 
@@ -233,9 +233,9 @@ def test_a_torque_of_rounding_is_neither_an_input_nor_a_load():
     """The axis of joint 1 stands upright by way of a turn: the weight that hangs on it turns it by rounding alone."""
     upright = "Ry(90deg) Tx(-0.4) Rx(q1) Tz(0.1) Ry(q2) Tx(-0.7) Ry(q3) Tx(-0.6) [hand]"
     robot = replace(robot_of(upright), masses=(Mass(2, 80.0, (0.3, 0.0, 0.1), 0.1),))
-    states = circumstances_on(robot, made_states(3, 60, seed=2, force=0.0))
+    states = conditions_on(robot, made_states(3, 60, seed=2, force=0.0))
     torque = np.abs(states.total[:, 0])
     assert 0 < torque.max() < 1e-9 and np.abs(states.total[:, 1]).max() > 10.0
-    weightless = circumstances_on(robot_of(upright), made_states(3, 60, seed=2, force=0.0))
+    weightless = conditions_on(robot_of(upright), made_states(3, 60, seed=2, force=0.0))
     one, other = (waves(displacements(each, Competitor((1,), OWN), FEATURES)) for each in (states, weightless))
     np.testing.assert_array_equal(one, other)

@@ -8,7 +8,7 @@ from support import OTHER_CHAINS, chain_of
 from synthetic import (
     NOISE,
     candidate_on,
-    circumstances_on,
+    conditions_on,
     displacements,
     equipped,
     made_estimate,
@@ -90,7 +90,7 @@ def test_motor_turns_the_joint_once_and_twice_per_turn_of_its_own(fanuc):
     known = candidates_on(sites)
     assert [key for key in known if key.startswith("motor_eccentricity")] == ["motor_eccentricity@2", "motor_eccentricity@5"]
     states = made_states(6, 5, seed=2)
-    around = replace(circumstances_on(fanuc, states), sites=sites)
+    around = replace(conditions_on(fanuc, states), sites=sites)
     made = displacements(known["motor_eccentricity@5"], around)
     turn = 80.5 * states.joint_angles[:, 4]
     np.testing.assert_allclose(made[:, :, 4], [np.cos(turn), np.sin(turn), np.cos(2 * turn), np.sin(2 * turn)], atol=1e-12)
@@ -110,7 +110,7 @@ def test_order_may_lie_anywhere_between_two_integers_and_away_from_both(fanuc):
         np.testing.assert_array_equal(shape.values(3), [above + 0.5])
         assert band.distinct_angles == 4 * (above + 1)
     assert len(bands) == 17 and len({band.location for band in bands}) == 17
-    around = circumstances_on(fanuc, states)
+    around = conditions_on(fanuc, states)
     made = displacements(bands[1], around, 2.7)
     angle = states.joint_angles[:, 2]
     np.testing.assert_allclose(made[:, :, 2], [np.cos(2.7 * angle), np.sin(2.7 * angle)], rtol=1e-13)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support import ODD_CHAINS, OTHER_CHAINS, chain_of, refused
 from synthetic import (
-    circumstances_on,
+    conditions_on,
     displacements,
     equipped,
     made_estimate,
@@ -124,7 +124,7 @@ def test_places_on_the_fanuc(fanuc, effect, places):
     ],
 )
 def test_small_form_of_a_large_effect_is_some_of_its_parameters(fanuc, whole, part, kept):
-    around, by_key = circumstances_on(fanuc.chain, made_states(6, 8, seed=11)), candidates_on(equipped(fanuc.chain))
+    around, by_key = conditions_on(fanuc.chain, made_states(6, 8, seed=11)), candidates_on(equipped(fanuc.chain))
     large, small = by_key[whole], by_key[part]
     assert (small.effect, small.family, small.joints, small.needs) == (large.effect, large.family, large.joints, large.needs)
     assert small.parameters == tuple(large.parameters[number] for number in kept)
@@ -154,7 +154,7 @@ def test_a_law_that_needs_distinct_angles_says_of_which_joints(chain):
 
 
 def test_plausible_sizes_move_the_end_by_what_a_deviation_can(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 30, seed=1), fanuc.compliance)
+    around = conditions_on(fanuc.chain, made_states(6, 30, seed=1), fanuc.compliance)
     model, states = made_model(fanuc.chain), made_states(6, 30, seed=1)
     estimate = made_estimate(model)
     jacobian = linearize(model, estimate, seen_exactly(model, estimate, states), around).coordinate_jacobian
@@ -204,7 +204,7 @@ def test_displacement_is_that_of_each_state_by_itself(chain):
     whole = made_states(chain.coordinates, 12, seed=6)
     kept = np.arange(12) > 4
     part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
-    some, every = circumstances_on(chain, part), circumstances_on(chain, whole)
+    some, every = conditions_on(chain, part), conditions_on(chain, whole)
     for candidate in candidates_on(every.sites).values():
         if candidate.family == "drift":
             continue
@@ -216,14 +216,14 @@ def test_displacement_is_that_of_each_state_by_itself(chain):
 def test_effects_that_need_a_load_do_nothing_without_and_the_others_do_something(chain):
     states = made_states(chain.coordinates, 6, seed=7)
     states.wrench[:] = 0.0
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     for candidate in candidates_on(around.sites).values():
         made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
         assert made.any() != ("load" in candidate.needs), candidate.key
 
 
 def test_needs_are_those_covariates_that_the_displacement_reads(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 5, seed=8))
+    around = conditions_on(fanuc.chain, made_states(6, 5, seed=8))
     for candidate in candidates_on(around.sites).values():
         for name, attribute in (("approach", "approach"), ("time", "time_s"), ("temperature", "temperature_c")):
             without = replace(around, **{attribute: None})
@@ -239,7 +239,7 @@ def test_odd_effects_turn_their_sign_with_the_load(fanuc):
     states = made_states(6, 5, seed=9)
     other = made_states(6, 5, seed=9)
     other.wrench[:] *= -1
-    one, opposite = circumstances_on(fanuc.chain, states), circumstances_on(fanuc.chain, other)
+    one, opposite = conditions_on(fanuc.chain, states), conditions_on(fanuc.chain, other)
     for candidate in candidates_on(one.sites).values():
         start = [shape.start for shape in candidate.shapes]
         # A bias has the same sign wherever there is a load.
@@ -252,7 +252,7 @@ def test_odd_effects_turn_their_sign_with_the_load(fanuc):
 def test_only_gearboxes_are_not_linear_in_the_load(fanuc, family):
     states, double = made_states(6, 5, seed=10), made_states(6, 5, seed=10)
     double.wrench[:] *= 2
-    one, two = circumstances_on(fanuc.chain, states), circumstances_on(fanuc.chain, double)
+    one, two = conditions_on(fanuc.chain, states), conditions_on(fanuc.chain, double)
     for candidate in candidates_on(one.sites).values():
         if candidate.family != family or "load" not in candidate.needs or candidate.effect == "force_bias":
             continue

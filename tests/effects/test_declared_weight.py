@@ -9,7 +9,7 @@ from scipy.stats import chi2
 from support import ODD_CHAINS, OTHER_CHAINS, PinocchioPoint, robot_of
 from synthetic import (
     NOISE,
-    circumstances_on,
+    conditions_on,
     displacements,
     made_estimate,
     made_model,
@@ -70,7 +70,7 @@ def carried(chain, link):
 def test_gravity_on_the_joints_is_that_of_pinocchio_on_the_robots_own_chain(name, fanuc):
     robot = weighed(robots(fanuc)[name])
     states = made_states(robot.joints, 4, seed=1, span=3.0)
-    found = circumstances_on(robot, states).gravity[:, : robot.joints]
+    found = conditions_on(robot, states).gravity[:, : robot.joints]
     expected = sum(
         gravity_by_pinocchio(robot.chain, carried(robot.chain, m.link), m.mass_kg, m.centre_m, TILTED, states.joint_angles)
         for m in robot.masses
@@ -146,7 +146,7 @@ def test_masses_and_compliances_have_exact_sensitivities_with_all_that_they_load
 
 def test_torques_of_masses_are_slopes_of_the_gravity(fanuc):
     robot = weighed(fanuc)
-    around = circumstances_on(robot, made_states(6, 5, seed=6))
+    around = conditions_on(robot, made_states(6, 5, seed=6))
     for number in range(len(around.mass_corrections)):
         step = np.zeros(len(around.mass_corrections))
         step[number] = 0.5
@@ -170,7 +170,7 @@ def test_priors_are_those_of_the_robot_file(fanuc):
 
 def test_robot_without_masses_bears_the_external_load_alone(fanuc):
     states = made_states(6, 4, seed=7)
-    around = circumstances_on(fanuc, states)
+    around = conditions_on(fanuc, states)
     assert around.total is around.load and around.mass_torques.shape[0] == 0
     unloaded = replace(states, wrench=np.zeros((4, 6)))
     assert "load" in offered(around.sites, states) and "load" not in offered(around.sites, unloaded)
@@ -180,7 +180,7 @@ def test_robot_without_masses_bears_the_external_load_alone(fanuc):
 def test_gears_of_an_arm_without_an_external_load_are_loaded_by_its_weight(fanuc):
     robot, states = weighed(fanuc), made_states(6, 6, seed=8)
     states.wrench[:] = 0.0
-    around, known = circumstances_on(robot, states), candidates_on(sites_of(robot))
+    around, known = conditions_on(robot, states), candidates_on(sites_of(robot))
     for key in (
         "stiffening@2",
         "lost_motion@3",
@@ -210,8 +210,7 @@ def test_weights_hang_along_the_gravity_of_the_robot_file(key, fanuc):
         "Ry(90deg) Tz(0.670) Rz(q1) Tx(0.312) Ry(q2) Tx(1.075) Ry(q3) Tz(0.225) Tx(1.280) Rx(q4) Ry(q5) Rx(q6) Tx(0.215) [6DoF]"
     )
     found, expected = (
-        displacements(candidates_on(sites_of(robot))[key], circumstances_on(robot, states))[..., :6]
-        for robot in (hanging, turned)
+        displacements(candidates_on(sites_of(robot))[key], conditions_on(robot, states))[..., :6] for robot in (hanging, turned)
     )
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10)
     assert found.any()
@@ -270,7 +269,7 @@ def test_gravity_on_odd_robots_is_the_slope_of_their_potential(name):
     """Of carriages and of passive joints too: minus the change of m g h, by central differences."""
     robot = weighed(robot_of(ODD_CHAINS[name]))
     states = made_states(robot.joints, 4, seed=21)
-    found = circumstances_on(robot, states).gravity[:, : robot.joints]
+    found = conditions_on(robot, states).gravity[:, : robot.joints]
 
     def work(q):
         frames = [MeasuringPoint("m", carried(robot.chain, m.link), m.centre_m) for m in robot.masses]

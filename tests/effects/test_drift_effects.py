@@ -9,7 +9,7 @@ from support import OTHER_CHAINS, chain_of
 from synthetic import (
     NOISE,
     candidate_on,
-    circumstances_on,
+    conditions_on,
     displacements,
     made_estimate,
     made_model,
@@ -81,7 +81,7 @@ def test_frame_drifts_by_a_rigid_motion_in_proportion_to_the_time(fanuc):
 def test_frame_drift_is_zero_when_the_time_begins_in_any_order(fanuc):
     states = made_states(6, 5, seed=4)
     states.time_s[:] = states.time_s[[3, 1, 0, 4, 2]] - states.time_s.min()
-    made = displacements(candidate_on(fanuc.chain, "frame_drift"), circumstances_on(fanuc.chain, states))
+    made = displacements(candidate_on(fanuc.chain, "frame_drift"), conditions_on(fanuc.chain, states))
     assert not made[:, 2].any() and made[:, [0, 1, 3, 4]].any(axis=(0, 2)).all()
 
 
@@ -91,13 +91,13 @@ def test_drift_of_a_state_does_not_hang_on_the_other_states(key, fanuc):
     part = type(whole)(**{name: value[kept] for name, value in vars(whole).items()})
     candidate = candidate_on(fanuc.chain, key)
     start = [shape.start for shape in candidate.shapes]
-    expected = displacements(candidate, circumstances_on(fanuc.chain, whole), *start)[:, kept]
-    found = displacements(candidate, circumstances_on(fanuc.chain, part), *start)
+    expected = displacements(candidate, conditions_on(fanuc.chain, whole), *start)[:, kept]
+    found = displacements(candidate, conditions_on(fanuc.chain, part), *start)
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
 def test_drift_needs_its_covariate(fanuc):
-    known = candidates_on(circumstances_on(fanuc.chain, made_states(6, 2)).sites)
+    known = candidates_on(conditions_on(fanuc.chain, made_states(6, 2)).sites)
     needs = {key: candidate.needs for key, candidate in known.items() if candidate.family == "drift"}
     assert {key: need for key, need in needs.items() if "gradient" not in key} == {
         "thermal_growth[temperature]": {"temperature"},
@@ -141,7 +141,7 @@ def test_link_that_is_warmer_on_one_side_bends_to_an_arc():
 
 
 def test_links_bend_about_axes_square_to_them(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 3, seed=13))
+    around = conditions_on(fanuc.chain, made_states(6, 3, seed=13))
     for link in (1, 2, 3, 6):
         made = displacements(candidate_on(fanuc.chain, f"temperature_gradient@{link}[time]"), around, 3600.0)
         shift, turn = np.split(made[..., list(around.sites.link_end[link])], 2, axis=-1)
@@ -154,7 +154,7 @@ def test_links_bend_about_axes_square_to_them(fanuc):
 def test_gradient_along_the_arm_makes_its_far_links_longer_and_not_the_arm():
     chain = chain_of("Tz(1) Rz(q1) Tx(2) Ry(q2) Tx(1) [end]")
     states = made_states(2, 3, seed=14)
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     made = displacements(candidate_on(chain, "temperature_gradient[along temperature]"), around)[0]
     warmer = states.temperature_c - 20.0
     # Middles at 0.5, 2 and 3.5 m, whose mean by length is 2 m: shares -1.5, 0 and 1.5.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from support import OTHER_CHAINS, PinocchioPoint, chain_of
-from synthetic import candidate_on, circumstances_on, displacements, made_states
+from synthetic import candidate_on, conditions_on, displacements, made_states
 
 from elastocal.effects.catalogue import candidates_on
 from elastocal.mechanics.chain import MeasuringPoint
@@ -47,7 +47,7 @@ def joint_torques_by_pinocchio(chain, states):
 
 def test_link_elasticity_is_the_extended_model_without_its_stretching(kuka_extended):
     states = made_states(6, 5, seed=1)
-    around = circumstances_on(kuka_extended.chain, states)
+    around = conditions_on(kuka_extended.chain, states)
     chain = extended_chain(kuka_extended)
     coordinates = np.concatenate([states.joint_angles, np.zeros((5, 30))], axis=1)
     load = generalized_forces(poses_and_jacobians(chain, coordinates, chain.end_effector)[2], states.wrench)
@@ -79,7 +79,7 @@ def test_links_bend_by_the_formulas_of_the_cantilever():
     states = made_states(1, 4)
     states.joint_angles[:] = 0.0
     states.wrench[:] = [[0, 10, 0, 0, 0, 0], [0, 0, 10, 0, 0, 0], [0, 0, 0, 3, 0, 5], [7, 0, 0, 0, 0, 0]]
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     made = displacements(candidate_on(chain, "link_elasticity@1"), around, 0.0)[..., list(around.sites.link_end[1])]
     bent = [
         [0, 10 * 8 / 3, 0, 0, 0, 10 * 4 / 2],
@@ -101,7 +101,7 @@ def test_links_that_get_thinner_bend_as_the_equation_of_the_beam_integrated(tape
     states = made_states(1, 3)
     states.joint_angles[:] = 0.0
     states.wrench[:] = [[0, 10, 0, 0, 0, 0], [0, 0, 0, 0, 0, 5], [0, 0, 0, 3, 0, 0]]
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     made = displacements(candidate_on(chain, "link_elasticity@1"), around, taper)[..., list(around.sites.link_end[1])]
 
     def softer(place):
@@ -126,7 +126,7 @@ def test_links_that_bend_are_those_with_a_length(name, fanuc):
 
 
 def test_links_of_one_section_bend_all_as_each_by_itself(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 5, seed=10))
+    around = conditions_on(fanuc.chain, made_states(6, 5, seed=10))
     known = candidates_on(around.sites)
     each = [known[key] for key in ("link_elasticity[column]", *(f"link_elasticity@{link}" for link in (1, 2, 3, 6)))]
     found = displacements(known["link_elasticity@1+2+3+6[one section]"], around, 0.2)
@@ -137,7 +137,7 @@ def test_links_of_one_section_bend_all_as_each_by_itself(fanuc):
 def test_tilt_is_the_moment_at_the_joint_across_its_axis(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=2)
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     for joint in range(chain.coordinates):
         candidate = candidate_on(chain, f"joint_tilt@{joint + 1}")
         moment = wrench_at(chain, states, behind_joint(chain, joint))[:, 3:]
@@ -156,7 +156,7 @@ def test_tilt_of_a_bearing_drops_the_end_of_an_arm_as_calculated_by_hand():
     chain = chain_of("Tz(1) Rz(q1) Tx(2) [end]")
     states = made_states(1, 1)
     states.joint_angles[:], states.wrench[:] = 0.0, [[0, 0, -100, 0, 0, 0]]
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     made = 1e-6 * displacements(candidate_on(chain, "joint_tilt@1"), around)
     end = around.sites.chain.end_effector
     jacobian = poses_and_jacobians(around.sites.chain, np.zeros(around.sites.chain.coordinates), end)[2]
@@ -165,7 +165,7 @@ def test_tilt_of_a_bearing_drops_the_end_of_an_arm_as_calculated_by_hand():
 
 def test_base_gives_under_the_force_and_the_tilting_moment_at_the_foot(fanuc):
     states = made_states(6, 5, seed=3)
-    around = circumstances_on(fanuc.chain, states)
+    around = conditions_on(fanuc.chain, states)
     end = poses(fanuc.chain, states.joint_angles, fanuc.chain.end_effector)[0]
     force = states.wrench[:, :3]
     moment = states.wrench[:, 3:] + np.cross(end, force)
@@ -180,7 +180,7 @@ def test_base_gives_under_the_force_and_the_tilting_moment_at_the_foot(fanuc):
 def test_cross_compliance_turns_each_joint_by_the_torque_of_the_other(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=4)
-    around, torque = circumstances_on(chain, states), joint_torques_by_pinocchio(chain, states)
+    around, torque = conditions_on(chain, states), joint_torques_by_pinocchio(chain, states)
     pairs = [c for c in candidates_on(around.sites).values() if c.effect == "cross_compliance"]
     assert len(pairs) == chain.coordinates * (chain.coordinates - 1) // 2
     for candidate in pairs:
@@ -194,7 +194,7 @@ def test_cross_compliance_turns_each_joint_by_the_torque_of_the_other(name, fanu
 def test_joint_dependent_stiffness_is_the_torque_times_cosine_and_sine(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=5)
-    around, torque = circumstances_on(chain, states), joint_torques_by_pinocchio(chain, states)
+    around, torque = conditions_on(chain, states), joint_torques_by_pinocchio(chain, states)
     for joint in range(chain.coordinates):
         made = displacements(candidate_on(chain, f"joint_dependent_stiffness@{joint + 1}"), around)
         for column, wave in zip(made, (np.cos, np.sin), strict=True):
@@ -205,7 +205,7 @@ def test_joint_dependent_stiffness_is_the_torque_times_cosine_and_sine(name, fan
 
 def test_compensator_stiffens_the_shoulder_as_an_angle_dependent_stiffness_would_and_by_twice_the_angle(fanuc):
     states = made_states(6, 5, seed=6)
-    around = circumstances_on(fanuc.chain, states)
+    around = conditions_on(fanuc.chain, states)
     ours, alias = (candidate_on(fanuc.chain, f"{name}@2") for name in ("compensator_stiffness", "joint_dependent_stiffness"))
     made = displacements(ours, around)
     np.testing.assert_array_equal(made[:2], displacements(alias, around))
@@ -221,7 +221,7 @@ def test_elastic_effects_are_reciprocal(effect, name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     one, other = made_states(chain.coordinates, 5, seed=7), made_states(chain.coordinates, 5, seed=7)
     other.wrench[:] = np.random.default_rng(8).standard_normal((5, 6))
-    first, second = circumstances_on(chain, one), circumstances_on(chain, other)
+    first, second = conditions_on(chain, one), conditions_on(chain, other)
     for candidate in candidates_on(first.sites).values():
         if candidate.effect == effect:
             start = [shape.start for shape in candidate.shapes]
@@ -233,7 +233,7 @@ def test_elastic_effects_are_reciprocal(effect, name, fanuc):
 
 @pytest.mark.parametrize("effect", ["link_elasticity", "joint_tilt", "base_compliance", "flange_flexibility"])
 def test_loads_do_work_on_what_gives_way(effect, fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 30, seed=9))
+    around = conditions_on(fanuc.chain, made_states(6, 30, seed=9))
     for candidate in candidates_on(around.sites).values():
         if candidate.effect == effect:
             made = displacements(candidate, around, *[shape.start for shape in candidate.shapes])
@@ -244,7 +244,7 @@ def test_loads_do_work_on_what_gives_way(effect, fanuc):
 def test_flange_gives_under_the_load_seen_along_its_axes(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=11)
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     seen = wrench_at(chain, states, MeasuringPoint("end", chain.end_effector.after))
     made = displacements(candidate_on(chain, "flange_flexibility"), around)
     for number, coordinate in enumerate(around.sites.link_end[-1]):

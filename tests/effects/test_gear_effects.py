@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from support import OTHER_CHAINS, TRACK, PinocchioPoint, chain_of
-from synthetic import candidate_on, circumstances_on, displacements, equipped, made_states
+from synthetic import candidate_on, conditions_on, displacements, equipped, made_states
 
+from elastocal.effects import transmission_harmonic
 from elastocal.effects.catalogue import candidates_on
+from elastocal.mechanics.sites import sites_of
 
 COUNT = 6
 
@@ -19,7 +21,7 @@ def case(request, fanuc):
     states = made_states(chain.coordinates, COUNT, seed=1, force=100.0)
     model = PinocchioPoint(chain, chain.end_effector)
     torque = [model.pose_and_jacobian(q)[2].T @ w for q, w in zip(states.joint_angles, states.wrench, strict=True)]
-    return chain, circumstances_on(chain, states), np.array(torque)
+    return chain, conditions_on(chain, states), np.array(torque)
 
 
 def assert_only(made, joint, expected):
@@ -85,7 +87,7 @@ def test_lost_motion_is_crossed_where_the_torque_changes_its_sign(case, taken_up
 
 
 def test_lost_motion_is_never_more_than_half_its_play_either_way(fanuc):
-    around = circumstances_on(fanuc.chain, made_states(6, 20, force=1e5))
+    around = conditions_on(fanuc.chain, made_states(6, 20, force=1e5))
     made = displacements(candidate_on(fanuc.chain, "lost_motion@2"), around, 5.0)[0, :, 1]
     np.testing.assert_allclose(np.abs(made), 1.0, atol=1e-6)
 
@@ -137,7 +139,7 @@ def under(torques, approach=None):
     wrench = np.zeros((len(torques), 6))
     wrench[:, 5] = torques
     sense = states.approach if approach is None else np.asarray(approach, float)[:, None]
-    return circumstances_on(chain, replace(states, wrench=wrench, approach=sense))
+    return conditions_on(chain, replace(states, wrench=wrench, approach=sense))
 
 
 def law_of(key, torques, *shapes):
@@ -231,3 +233,10 @@ def test_a_track_has_friction_in_metres_and_no_gear_that_turns():
     for effect, count in (("lost_motion", 1), ("stiffening", 2)):
         joints = [c.joints for c in found.values() if c.effect == effect]
         assert joints == [(2,), (3,), (4,)] * count
+
+
+def test_bands_of_orders_of_one_gear_are_different_locations(kuka):
+    """Two bands are two terms of one mechanism and may both be there, which alternatives of one location may not."""
+    found = transmission_harmonic.candidates(sites_of(kuka))
+    assert len({candidate.location for candidate in found}) == len(found)
+    assert {candidate.location[0] for candidate in found} == {1, 2, 3, 4, 5, 6}

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from support import OTHER_CHAINS, PinocchioPoint, chain_of, robot_of
-from synthetic import candidate_on, circumstances_on, displacements, made_estimate, made_model, made_states, seen_exactly
+from synthetic import candidate_on, conditions_on, displacements, made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
@@ -44,7 +44,7 @@ def test_link_weight_is_the_gravity_of_point_masses_by_pinocchio(name, fanuc):
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=1, span=3.0)
     compliance = 1e-6 * np.arange(1, chain.coordinates + 1)
-    around = circumstances_on(chain, states, compliance)
+    around = conditions_on(chain, states, compliance)
     found = [c for c in candidates_on(around.sites).values() if c.effect == "link_weight"]
     assert {bool(candidate.joints) for candidate in found} == {True, False}
     for candidate in found:
@@ -112,7 +112,7 @@ def test_arm_stretched_out_sags_by_its_weight_as_calculated_by_hand():
     chain = chain_of("Ry(q1) Tx(2) [end]")
     states = made_states(1, 1)
     states.joint_angles[:] = 0.0
-    around = circumstances_on(chain, states)
+    around = conditions_on(chain, states)
     made = displacements(candidate_on(chain, "link_weight@1"), around)
     np.testing.assert_allclose(made[0, 0, 0], 2 * GRAVITY, rtol=1e-14)
 
@@ -122,7 +122,7 @@ def test_payload_is_the_gravity_of_a_body_at_the_flange_by_pinocchio(name, fanuc
     chain = fanuc.chain if name == "fanuc" else chain_of(OTHER_CHAINS[name])
     states = made_states(chain.coordinates, 5, seed=2, span=3.0)
     compliance = 1e-6 * np.arange(1, chain.coordinates + 1)
-    around = circumstances_on(chain, states, compliance)
+    around = conditions_on(chain, states, compliance)
     mass, centre = 7.5, np.array([0.12, -0.07, 0.3])
     made = np.tensordot([mass, *(mass * centre)], displacements(candidate_on(chain, "payload"), around), axes=1)
     torque = gravity_torques(chain, states.joint_angles, chain.end_effector.after, mass, centre)
@@ -134,7 +134,7 @@ def test_payload_is_the_gravity_of_a_body_at_the_flange_by_pinocchio(name, fanuc
 def test_payload_hangs_at_the_flange_whatever_target_sits_there(fanuc):
     moved = replace(fanuc.chain, points=tuple(replace(p, offset_m=(0.2, 0.3, 0.4)) for p in fanuc.chain.points))
     states = made_states(6, 5, seed=3)
-    ours, theirs = (displacements(candidate_on(c, "payload"), circumstances_on(c, states)) for c in (moved, fanuc.chain))
+    ours, theirs = (displacements(candidate_on(c, "payload"), conditions_on(c, states)) for c in (moved, fanuc.chain))
     np.testing.assert_array_equal(ours, theirs)
 
 
@@ -165,7 +165,7 @@ def compensator(q, stiffness, crank, length, rest, start):
 @pytest.mark.parametrize("start", [0.0, 0.7, 2.5])
 def test_compensator_torque_spans_the_formula_of_a_spring_with_a_short_crank(start, fanuc):
     states = made_states(6, 60, seed=4)
-    around = circumstances_on(fanuc.chain, states)
+    around = conditions_on(fanuc.chain, states)
     made = displacements(candidate_on(fanuc.chain, "compensator_torque@2"), around)
     assert not np.delete(made, 1, axis=2).any()
     columns = made[:, :, 1].T
@@ -185,7 +185,7 @@ def test_compensator_torque_is_in_waves_of_the_shoulder(fanuc):
     q = states.joint_angles[:, 1]
     expected = [np.cos(q), np.sin(q), np.cos(2 * q), np.sin(2 * q)]
     assert [p.name for p in candidate.parameters] == ["cos_1q", "sin_1q", "cos_2q", "sin_2q"]
-    made = displacements(candidate, circumstances_on(fanuc.chain, states))
+    made = displacements(candidate, conditions_on(fanuc.chain, states))
     np.testing.assert_allclose(made[:, :, 1], expected, atol=1e-15)
 
 

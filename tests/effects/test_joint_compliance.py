@@ -2,7 +2,7 @@
 
 import numpy as np
 from support import ODD_CHAINS, PinocchioPoint, chain_of, robot_of
-from synthetic import circumstances_on, displacements, made_estimate, made_model, made_states
+from synthetic import conditions_on, displacements, made_estimate, made_model, made_states
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
@@ -23,7 +23,7 @@ def test_carriage_yields_to_the_force_along_its_track():
 
 def test_each_spring_turns_its_joint_by_the_torque_of_the_load_by_pinocchio(fanuc):
     states = made_states(6, 5, seed=1)
-    made = displacements(joint_compliance(sites_of(fanuc.chain)), circumstances_on(fanuc.chain, states))
+    made = displacements(joint_compliance(sites_of(fanuc.chain)), conditions_on(fanuc.chain, states))
     model = PinocchioPoint(fanuc.chain, fanuc.chain.end_effector)
     torque = [model.pose_and_jacobian(q)[2].T @ w for q, w in zip(states.joint_angles, states.wrench, strict=True)]
     expected = np.zeros_like(made)

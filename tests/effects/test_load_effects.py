@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, PinocchioPoint, chain_of
-from synthetic import candidate_on, circumstances_on, displacements, made_states
+from synthetic import candidate_on, conditions_on, displacements, made_states
 
 COMPLIANCE = 1e-6 * np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
 
@@ -27,7 +27,7 @@ def case(request, fanuc):
 
 
 def made_by(chain, key, values, states):
-    made = displacements(candidate_on(chain, key), circumstances_on(chain, states, COMPLIANCE[: chain.coordinates]))
+    made = displacements(candidate_on(chain, key), conditions_on(chain, states, COMPLIANCE[: chain.coordinates]))
     assert not made[:, :, chain.coordinates :].any()
     return np.tensordot(values, made, axes=1)[:, : chain.coordinates]
 

@@ -102,4 +102,6 @@ def test_coverage_is_a_dot_with_its_interval_on_an_axis_that_holds_it():
 
 
 def test_coverage_of_no_interval_is_a_note():
-    assert texts(coverage_by_effect(covered(pd.DataFrame()))) == ["This run has no interval that a true value can be compared with."]
+    assert texts(coverage_by_effect(covered(pd.DataFrame()))) == [
+        "This run has no interval that a true value can be compared with."
+    ]

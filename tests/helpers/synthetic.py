@@ -136,7 +136,7 @@ def made_measurements(model, rng, poses_count, repeats, sensor_m, joint_rad, sen
     )
 
 
-def circumstances_on(holder, states, compliance=None):
+def conditions_on(holder, states, compliance=None):
     """Conditions of some states on a chain or a robot."""
     sites = equipped(holder)
     compliance = 1e-6 * np.arange(1, sites.joints + 1) if compliance is None else compliance
