@@ -1,11 +1,13 @@
-"""How far a campaign had come in each state."""
+"""What the states of a campaign have that effects may need, and how far it had come in each."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from synthetic import made_states
 
-from elastocal.effects.conditions import progress_of
+from elastocal.effects.conditions import offered, progress_of
+from elastocal.mechanics.sites import sites_of
 
 
 def test_progress_counts_rows_of_the_campaign_or_else_poses():
@@ -17,3 +19,20 @@ def test_progress_counts_rows_of_the_campaign_or_else_poses():
     np.testing.assert_allclose(progress_of(without), np.arange(5) / 4)
     # What is to be measured comes after all rows.
     np.testing.assert_array_equal(progress_of(without, (1, 21)), np.ones(5))
+
+
+@pytest.mark.parametrize(("column", "name"), [("time_s", "time"), ("temperature_c", "temperature")])
+def test_time_and_temperature_are_there_where_they_change(kuka, column, name):
+    sites, states = sites_of(kuka), made_states(6, 5, seed=1)
+    assert name in offered(sites, replace(states, **{column: np.arange(5.0)}))
+    assert name not in offered(sites, replace(states, **{column: np.full(5, 20.0)}))
+    assert name not in offered(sites, replace(states, **{column: None}))
+
+
+def test_an_approach_is_there_where_it_is_known_of_a_joint(kuka):
+    sites, states = sites_of(kuka), made_states(6, 5, seed=1)
+    known = np.zeros((5, 6))
+    assert "approach" not in offered(sites, replace(states, approach=known))
+    known[2, 3] = -1
+    assert "approach" in offered(sites, replace(states, approach=known))
+    assert "approach" not in offered(sites, replace(states, approach=None))
