@@ -109,6 +109,15 @@ def test_parquet_that_cannot_be_read_is_refused(cell):
         read_campaign(cell.folder, cell.robots)
 
 
+def test_a_column_that_parquet_has_twice_is_refused_with_the_file_named(cell):
+    cell.write("parquet")
+    path = cell.folder / "measurements.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.append_column("x", table["x"]), path)
+    with refused(path.as_posix(), "header", "column 'x' twice", "each column once"):
+        read_campaign(cell.folder, cell.robots)
+
+
 def test_parquet_whose_text_is_no_utf8_is_refused(cell):
     cell.write("parquet")
     names = pa.array([b"\xd8"] * len(cell.table["pose"]), pa.binary())
