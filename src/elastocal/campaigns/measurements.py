@@ -145,11 +145,12 @@ def _read_csv(path: str) -> tuple[dict[str, tuple[str, ...]], np.ndarray]:
 
 def _read_parquet(path: str) -> tuple[dict[str, Sequence[Any] | np.ndarray], np.ndarray]:
     try:
+        # pyarrow's own complaint of a column that is there twice is a list of all columns.
+        _check_header(path, pq.read_schema(path).names)
         table = pq.read_table(path)
         columns = [(name, _cells(column)) for name, column in zip(table.column_names, table.columns, strict=True)]
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    _check_header(path, table.column_names)
     return dict(columns), np.arange(1, table.num_rows + 1, dtype=np.int32)
 
 
