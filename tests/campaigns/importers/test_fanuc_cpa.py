@@ -2,16 +2,11 @@
 
 import numpy as np
 import pytest
-from made_fanuc_sources import POSES, assert_holds, cpa_source
+from made_fanuc_sources import POSES, assert_holds
 from support import refused
 
 from elastocal.campaigns.importers import fanuc_cpa
 from elastocal.campaigns.reading import read_campaign
-
-
-@pytest.fixture
-def cpa(fanuc, tmp_path):
-    return cpa_source(fanuc, tmp_path)
 
 
 def test_cpa_source_becomes_a_campaign_of_the_controllers_angles(cpa, config_folder, tmp_path):

@@ -1,22 +1,11 @@
 """Both sessions of the FANUC as one campaign of one robot."""
 
 import numpy as np
-import pytest
-from made_fanuc_sources import POSES, REPEATS, assert_holds, cpa_source, static_source
+from made_fanuc_sources import POSES, REPEATS, assert_holds
 from support import refused
 
 from elastocal.campaigns.importers import fanuc_joint
 from elastocal.campaigns.reading import read_campaign
-
-
-@pytest.fixture
-def static(fanuc, tmp_path):
-    return static_source(fanuc, tmp_path)
-
-
-@pytest.fixture
-def cpa(fanuc, tmp_path):
-    return cpa_source(fanuc, tmp_path)
 
 
 def test_joint_campaign_holds_both_as_sessions_of_one_robot(static, cpa, config_folder, tmp_path):

@@ -1,22 +1,10 @@
 """Both FANUC sources beside each other: each can test the other, and both are one robot."""
 
 import numpy as np
-import pytest
-from made_fanuc_sources import cpa_source, static_source
 
 from elastocal.campaigns.holdout import split
 from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static
 from elastocal.campaigns.reading import held_out_campaign, read_campaign
-
-
-@pytest.fixture
-def static(fanuc, tmp_path):
-    return static_source(fanuc, tmp_path)
-
-
-@pytest.fixture
-def cpa(fanuc, tmp_path):
-    return cpa_source(fanuc, tmp_path)
 
 
 def test_each_session_can_test_the_other(static, cpa, config_folder, tmp_path):

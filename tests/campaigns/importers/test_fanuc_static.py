@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 import scipy.io
-from made_fanuc_sources import POSES, REPEATS, assert_holds, static_source
+from made_fanuc_sources import POSES, REPEATS, assert_holds
 from support import refused
 
 from elastocal.campaigns.importers import fanuc_static
 from elastocal.campaigns.reading import read_campaign
-
-
-@pytest.fixture
-def static(fanuc, tmp_path):
-    return static_source(fanuc, tmp_path)
 
 
 def test_static_source_becomes_a_campaign_with_repeats(static, config_folder, tmp_path):

@@ -11,7 +11,7 @@ import numpy as np
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
 _DECIMAL_WORDS = {",": "a number with a decimal comma", ".": "a number"}
@@ -86,3 +86,23 @@ def numbers(path: str | Path, name: str, cells: Sequence[str], decimal: str = ".
         if not np.isfinite(values[index]):
             raise InputError(path, f"row {index + 1}, column {name}", repr(cell), _DECIMAL_WORDS[decimal])
     return values
+
+
+def table(path: str | Path, cells: Mapping[str, Sequence[str]], names: Iterable[str], decimal: str = ".") -> np.ndarray:
+    """Numbers of some columns, ndarray (N, k).
+
+    Parameters
+    ----------
+    path : str or Path
+    cells : dict of str to sequence of str
+        From `read_columns`.
+    names : iterable of str
+        Of the columns.
+    decimal : {".", ","}
+
+    Raises
+    ------
+    InputError
+        As `numbers`.
+    """
+    return np.column_stack([numbers(path, name, cells[name], decimal) for name in names])

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.importers.csv_columns import numbers, read_columns
+from elastocal.campaigns.importers.csv_columns import read_columns, table
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
     from pathlib import Path
     from typing import Any
 
@@ -57,11 +57,8 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     if joints not in ROBOTS or not set(names) <= set(cells):
         found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
         raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOTS))}")
-
-    def table(names: Iterable[str]) -> np.ndarray:
-        return np.column_stack([numbers(path, name, cells[name]) for name in names])
-
-    return np.radians(table(names)), 1e-3 * (table(COMMANDED) + table(DIFFERENCE))
+    angles, commanded, difference = (table(path, cells, columns) for columns in (names, COMMANDED, DIFFERENCE))
+    return np.radians(angles), 1e-3 * (commanded + difference)
 
 
 def write_campaign(

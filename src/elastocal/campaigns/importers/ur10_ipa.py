@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.importers.csv_columns import numbers, read_columns
+from elastocal.campaigns.importers.csv_columns import numbers, read_columns, table
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.writing import write_campaign as write_folder
@@ -61,14 +61,11 @@ def read(path: str | Path) -> dict[str, np.ndarray]:
         No file, a column that is missing, something that is no number.
     """
     cells = read_columns(path, ";", (*ANGLES, *POSITION, *ORIENTATION), "a series of ipa-robot-accuracy")
-
-    def table(names: Iterable[str]) -> np.ndarray:
-        return np.column_stack([numbers(path, name, cells[name], ",") for name in names])
-
+    angles, position, orientation = (table(path, cells, names, ",") for names in (ANGLES, POSITION, ORIENTATION))
     found = {
-        "joint_angles": table(ANGLES),
-        "position": 1e-3 * table(POSITION),
-        "rotation_vector": Rotation.from_euler(_EULER, table(ORIENTATION), degrees=True).as_rotvec(),
+        "joint_angles": angles,
+        "position": 1e-3 * position,
+        "rotation_vector": Rotation.from_euler(_EULER, orientation, degrees=True).as_rotvec(),
     }
     if TEMPERATURE in cells:
         found["temperature_c"] = numbers(path, TEMPERATURE, cells[TEMPERATURE], ",")
