@@ -1,7 +1,20 @@
-"""What is written on a figure, and whether all of it lies on the page."""
+"""What is written on a figure, whether all of it lies on the page, and files of empty figures for the reports."""
+
+import shutil
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
+
+from elastocal.figures.style import panels
+
+
+def empty_pictures(folder, names):
+    """A PDF of nothing for each name; their paths."""
+    paths = [f"{folder}/{name}.pdf" for name in names]
+    panels(1, 1, 20)[0].savefig(paths[0])
+    for path in paths[1:]:
+        shutil.copy(paths[0], path)
+    return paths
 
 
 def texts(figure):

@@ -1,14 +1,12 @@
 """The pages of the blind proof compile with and without robots of the proof, and keep within their margins."""
 
-import shutil
-
 import pytest
 import typst
+from drawn_figures import empty_pictures
 from made_blind_documents import oracle, silence, truth
 from made_blind_facts import MEASURED, PROOF, facts_of
 from matplotlib.image import imread
 
-from elastocal.figures.style import panels
 from elastocal.report.blind_pages import write_blind_report
 
 FIGURES = ("targets", "power", "reliability", "confusion", "errors", "coverage", "sweep")
@@ -17,11 +15,7 @@ MARGIN_OF_PAGE = 20 / 210
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("figures")
-    panels(1, 1, 20)[0].savefig(folder / "empty.pdf")
-    for name in FIGURES:
-        shutil.copy(folder / "empty.pdf", folder / f"{name}.pdf")
-    return [f"{folder}/{name}.pdf" for name in FIGURES]
+    return empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES)
 
 
 @pytest.mark.parametrize(

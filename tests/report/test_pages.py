@@ -1,12 +1,10 @@
 """The pages of the study's report compile from its facts and tables, with the robots that were studied."""
 
-import shutil
-
 import pytest
 import typst
+from drawn_figures import empty_pictures
 from made_study_tables import facts
 
-from elastocal.figures.style import panels
 from elastocal.report.pages import write_report
 
 FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
@@ -21,11 +19,7 @@ HEAD = {
 
 @pytest.fixture(scope="module")
 def pictures(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("figures")
-    panels(1, 1, 20)[0].savefig(folder / "empty.pdf")
-    for name in FIGURES:
-        shutil.copy(folder / "empty.pdf", folder / f"{name}.pdf")
-    return [f"{folder}/{name}.pdf" for name in FIGURES]
+    return empty_pictures(tmp_path_factory.mktemp("figures"), FIGURES)
 
 
 def tables(figures):
