@@ -9,7 +9,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from elastocal.campaigns.campaign import Measurements
-from elastocal.fitting.observations import averaged, each_approach, select_states, state_clusters, without_outlying_repeats
+from elastocal.fitting.observations import (
+    averaged,
+    each_approach,
+    groups_by_size,
+    select_states,
+    state_clusters,
+    without_outlying_repeats,
+)
 
 
 def measurements(keys, position=None, **others):
@@ -258,3 +265,13 @@ def test_wild_repeats_leave_in_any_order_of_the_rows():
     taken.position[[2, 40, 91]] += 50.0
     shuffled = taken.select(np.random.default_rng(10).permutation(len(taken)))
     assert rows_lost(shuffled) == rows_lost(taken) == [3, 41, 92]
+
+
+@pytest.mark.parametrize("group", [[0, 0, 1, 3, 3, 4], [3, 0, 4, 3, 0, 1]], ids=["rising", "in any order"])
+def test_groups_of_one_size_stand_together_with_their_places_rising(group):
+    group = np.array(group)
+    single, pairs = groups_by_size(group)
+    np.testing.assert_array_equal(group[single], [[1], [4]])
+    np.testing.assert_array_equal(group[pairs], [[0, 0], [3, 3]])
+    assert (np.diff(pairs, axis=1) > 0).all()
+    assert sorted([*single.ravel(), *pairs.ravel()]) == list(range(6))

@@ -126,9 +126,10 @@ def linearized(
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
     parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
-    larger_parts = parts_of(observations, rows_at_once(int((~found).sum()) + 60))
-    lines = [*source.lines(parts)] if held else []
-    triangle, unit_rad = source.declared_part(lines if held else source.lines(larger_parts))
+    # Held, one linearisation serves the declared part and the candidates; else the declared part alone takes larger parts.
+    larger_parts = parts if held else parts_of(observations, rows_at_once(int((~found).sum()) + 60))
+    lines = [*source.lines(parts)] if held else source.lines(larger_parts)
+    triangle, unit_rad = source.declared_part(lines)
     rows = len(observations) * observations.rows
     size = declared_size(fitted, parameters, owners[~found], triangle, rows, present, settings)
     deviation = prior_deviations(fitted, parameters, owners[~found], size)
@@ -337,7 +338,7 @@ class _Source:
             yield WhiteRows(
                 _flat(part.white(line.sensitivities[..., ~self.found])),
                 _flat(made),
-                _flat(part.white(residual)[..., None])[:, 0],
+                part.white(residual).T.ravel(),
                 _flat(part.white(part.jacobian)),
                 np.tile(some.cluster, some.rows),
             )

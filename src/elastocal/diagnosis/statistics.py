@@ -27,7 +27,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
-from elastocal.fitting.observations import members_of
+from elastocal.fitting.observations import groups_by_size
 
 # Of a variance of one, or of the largest eigenvalue: what is less is rounding, what is added is not seen.
 _ROUNDING = 1e-9
@@ -199,10 +199,9 @@ def products_of(
     projected = basis.T @ rest
     rest.T[:] -= projected.T @ basis.T
     every[:, :count] = basis
-    order, joints, poses = np.argsort(pose, kind="stable"), jacobian.shape[1], int(pose.max()) + 1
+    joints, poses = jacobian.shape[1], int(pose.max()) + 1
     pose_rows, pose_gram = np.empty((poses, joints, width)), np.empty((poses, joints, joints))
-    for places in members_of(pose[order]):
-        members = order[places]
+    for members in groups_by_size(pose):
         mine, seen = pose[members[:, 0]], jacobian[members].transpose(0, 2, 1)
         pose_rows[mine] = seen @ rows.T[:, members].transpose(1, 2, 0)
         pose_gram[mine] = seen @ seen.transpose(0, 2, 1)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from elastocal.fitting.observations import members_of
+from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -176,11 +176,12 @@ def summed(
         every[:, count:-1] += block.candidates
         every[:, -1] += block.residual
         rows += len(every)
+        poses = groups_by_size(block.pose)
         for number, tau in enumerate(pose_error_rad):
             if not tau:
                 totals[number] += every.T @ every
                 continue
-            for white, log_det in _whitened(every, block.jacobian, block.pose, tau):
+            for white, log_det in _whitened(every, block.jacobian, poses, tau):
                 totals[number] += white.T @ white
                 log_dets[number] += log_det
     rest = -prior @ explained
@@ -195,11 +196,11 @@ def summed(
     return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
 
 
-def _whitened(every: np.ndarray, jacobian: np.ndarray, pose: np.ndarray, tau: float) -> Iterator[tuple[np.ndarray, float]]:
+def _whitened(
+    every: np.ndarray, jacobian: np.ndarray, poses: Iterable[np.ndarray], tau: float
+) -> Iterator[tuple[np.ndarray, float]]:
     """Rows with (I + tau^2 J J')^-1/2 applied, and ln |I + tau^2 J J'|, for each number of rows in a pose."""
-    order = np.argsort(pose, kind="stable")
-    for places in members_of(pose[order]):
-        members = order[places]
+    for members in poses:
         seen = tau * jacobian[members]
         factor = np.linalg.cholesky(np.eye(members.shape[1]) + seen @ seen.transpose(0, 2, 1))
         white = np.linalg.inv(factor) @ every[members]

@@ -104,21 +104,22 @@ def state_clusters(states: States | Measurements) -> np.ndarray:
     return groups_of(np.column_stack([states.session, states.pose]))[1]
 
 
-def members_of(group: np.ndarray) -> list[np.ndarray]:
+def groups_by_size(group: np.ndarray) -> list[np.ndarray]:
     """Places of each group, for each number of places in one.
 
     Parameters
     ----------
     group : ndarray of int (M,)
-        Rising, such as the states or the poses of observations.
+        Such as the states or the poses of observations.
 
     Returns
     -------
     list of ndarray of int (G, k)
+        Groups by their numbers, the places of each rising.
     """
-    seen = np.bincount(group)
+    order, seen = np.argsort(group, kind="stable"), np.bincount(group)
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
-    return [start[seen == count][:, None] + np.arange(count) for count in np.unique(seen[seen > 0])]
+    return [order[start[seen == count][:, None] + np.arange(count)] for count in np.unique(seen[seen > 0])]
 
 
 def averaged(measurements: Measurements) -> Observations:

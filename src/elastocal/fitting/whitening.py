@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.noise import measurement_covariances
-from elastocal.fitting.observations import members_of
+from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -128,11 +128,11 @@ def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise)
     """
     rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad:
-        for members in members_of(observations.state):
+        for members in groups_by_size(observations.state):
             covariance = measurement_covariances(noise, jacobian[members], rows)
             yield members, covariance / repeats[members[:, 0]][:, None, None]
         return
-    for members in members_of(observations.cluster):
+    for members in groups_by_size(observations.cluster):
         stacked = jacobian[members].reshape(len(members), members.shape[1] * rows, -1)
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
