@@ -1,0 +1,27 @@
+"""The application of all subcommands; bad input ends in one line."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from elastocal.command.diagnose import diagnose
+from elastocal.errors import InputError
+
+app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.command()(diagnose)
+
+
+@app.callback()
+def elastocal() -> None:
+    """From a robot and a tracker to a corrected robot."""
+
+
+def main() -> None:
+    """Run the command; exit code 1 with one line on standard error where the input is wrong."""
+    try:
+        app()
+    except InputError as error:
+        print(error, file=sys.stderr)
+        sys.exit(1)

@@ -1,0 +1,23 @@
+from pathlib import Path
+
+import pytest
+
+from elastocal.command import main
+from elastocal.errors import InputError
+
+
+def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch, capsys):
+    def refuse():
+        raise InputError("robot.yaml", "chain", "'X'", "Tz(l1)")
+
+    monkeypatch.setattr(main, "app", refuse)
+    with pytest.raises(SystemExit) as stopped:
+        main.main()
+    assert stopped.value.code == 1
+    assert capsys.readouterr().err == "robot.yaml: chain: found 'X'; allowed: Tz(l1)\n"
+
+
+def test_every_module_of_a_subcommand_is_registered():
+    modules = {p.stem for p in Path(main.__file__).parent.glob("*.py")} - {"__init__", "main", "checkout"}
+    registered = {command.callback.__module__.rpartition(".")[2] for command in main.app.registered_commands}
+    assert modules == registered
