@@ -1,20 +1,46 @@
-import subprocess
+"""The subcommand hands a campaign to its Snakemake target and shows what that says."""
 
+import io
+
+import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
+from elastocal.command import diagnose
 from elastocal.command.main import app
 
+LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign cell7\n", "cell7: [bold] is missing\n"]
 
-def test_diagnose_runs_the_target_of_the_campaign_in_the_checkout(tmp_path, monkeypatch):
-    calls = []
 
-    def run(words, cwd, check):
-        calls.append((words, cwd))
-        return subprocess.CompletedProcess(words, 3)
+@pytest.mark.parametrize("code", [0, 3])
+def test_the_target_of_the_campaign_runs_in_the_checkout_and_its_exit_code_counts(tmp_path, monkeypatch, code):
+    (tmp_path / "Snakefile").write_text("")
+    (tmp_path / "workflow").mkdir()
+    # In place of Python: shows its arguments and where it runs.
+    stand_in = tmp_path / "python"
+    stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\nexit {code}\n')
+    stand_in.chmod(0o755)
+    monkeypatch.setattr(diagnose.sys, "executable", str(stand_in))
+    monkeypatch.setattr(diagnose, "checkout", lambda: tmp_path)
+    result = CliRunner().invoke(app, ["diagnose", str(tmp_path / "cell7"), "-j", "1"])
+    assert result.exit_code == code
+    said = f"{tmp_path} -m snakemake -j1 diagnose --config campaign={tmp_path}/cell7"
+    assert result.stderr.strip() == said
 
-    monkeypatch.setattr(subprocess, "run", run)
-    result = CliRunner().invoke(app, ["diagnose", str(tmp_path), "-j", "1"])
-    assert result.exit_code == 3
-    ((words, cwd),) = calls
-    assert words[1:] == ["-m", "snakemake", "-j1", "diagnose", "--config", f"campaign={tmp_path}"]
-    assert (cwd / "Snakefile").is_file()
+
+def shown(terminal):
+    text = io.StringIO()
+    diagnose.follow(LINES, Console(file=text, force_terminal=terminal, width=120))
+    return text.getvalue()
+
+
+def test_without_a_terminal_every_line_stands_as_it_is():
+    assert shown(False) == "".join(LINES)
+
+
+def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
+    text = shown(True)
+    assert "judge_campaign cell7" in text
+    assert "1 of 3" in text
+    assert "3 jobs" not in text
+    assert "[bold] is missing" in text

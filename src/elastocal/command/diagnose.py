@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from elastocal.command.checkout import checkout
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# What `snakemake_logger_plugin_elastocal` writes when a job starts.
+_JOB = re.compile(r"(\d+) of (\d+): (.+)")
+_JOBS = re.compile(r"\d+ jobs")
 
 
 def diagnose(
@@ -18,4 +28,27 @@ def diagnose(
 ) -> None:
     """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
     words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={folder.resolve()}"]
-    raise typer.Exit(subprocess.run([sys.executable, *words], cwd=checkout(), check=False).returncode)
+    with subprocess.Popen(
+        [sys.executable, *words], cwd=checkout(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    ) as run:
+        follow(run.stdout or (), Console(stderr=True))
+    raise typer.Exit(run.returncode)
+
+
+def follow(lines: Iterable[str], console: Console) -> None:
+    """Show the lines of a run as they come: a job as the state of a bar, where there is a terminal, any other as it is.
+
+    Parameters
+    ----------
+    lines : iterable of str
+    console : Console
+    """
+    columns = TextColumn("{task.description}"), BarColumn(), TextColumn("{task.completed:.0f} of {task.total:.0f}")
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task("reading", total=1)
+        for line in map(str.rstrip, lines):
+            job = _JOB.fullmatch(line)
+            if job and console.is_terminal:
+                progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
+            elif not (_JOBS.fullmatch(line) and console.is_terminal):
+                console.print(line, markup=False, highlight=False, soft_wrap=True)

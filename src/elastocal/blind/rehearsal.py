@@ -1,0 +1,198 @@
+"""A physical robot with hidden defects stands in for a real one: it fills a measurement sheet, and goes where it is commanded.
+
+To rehearse a calibration, from the robot's file to the corrected robot, before a tracker is hired.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from elastocal.errors import InputError
+from elastocal.mechanics.components import WRENCH
+from elastocal.plant.arm import arm_from_file
+from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, with_defects
+from elastocal.plant.drives import Repeatability
+from elastocal.plant.physical_robot import PhysicalRobot, Schedule, seen_poses, specimen
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.tracker import rotation_vector
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+    from typing import Any
+
+    from elastocal.plant.arm import Arm
+
+# What every arm has that was never calibrated, at each of its joints, beside other gears and weights than its file says.
+ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
+# 10 µm at the end of an arm of 2 m.
+_JOINT_REPEATABILITY_RAD = 5e-6
+_SECONDS_PER_STATE = 25.0
+_STATE = ["pose", "load", "repeat"]
+_WRENCH = [name for name, _, _ in WRENCH]
+
+
+def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ()) -> tuple[PhysicalRobot, list[Defect]]:
+    """The robot that stands in.
+
+    Parameters
+    ----------
+    robot_file : str or Path
+        Of which it is a specimen.
+    seed : int
+    effects : sequence of str, optional
+        Keys of `defects.KINDS`, each at a joint that is drawn; one effect that is drawn by default.
+
+    Returns
+    -------
+    robot : PhysicalRobot
+    defects : list of Defect
+        For whoever wants to compare them with the verdict afterwards.
+
+    Raises
+    ------
+    InputError
+        An effect that this arm cannot have.
+    """
+    arm = arm_from_file(robot_file)
+    possible = sorted(
+        name
+        for name, kind in KINDS.items()
+        if not kind.needs and not name.startswith(OUTSIDE) and name not in ERRORS_OF_GEOMETRY and kind.locations(arm)
+    )
+    for name in effects:
+        if name not in possible:
+            raise InputError("rehearsal", "effects", repr(name), ", ".join(possible))
+    chosen = tuple(effects) or (possible[stream(seed, "hidden effect").integers(len(possible))],)
+    defects = [*_errors_of_geometry(arm, seed), *(drawn_defect(name, arm, seed) for name in chosen)]
+    robot = specimen(arm, seed)
+    robot = replace(robot, drives=(*robot.drives, Repeatability((_JOINT_REPEATABILITY_RAD,) * arm.joints)))
+    return with_defects(robot, defects), defects
+
+
+def filled_sheet(
+    sheet: pd.DataFrame, document: Mapping[str, Any], robot: PhysicalRobot, seed: int, source: str = "measurements.csv"
+) -> pd.DataFrame:
+    """A measurement sheet with what a tracker reads.
+
+    Parameters
+    ----------
+    sheet : pandas.DataFrame
+        Columns of measurements.csv but for those of the tracker, which may be there and empty.
+    document : mapping
+        Of campaign.yaml.
+    robot : PhysicalRobot
+    seed : int
+        Of the noise, and of where reflectors sit whose offset is unknown.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    pandas.DataFrame
+        The same rows.
+
+    Raises
+    ------
+    InputError
+        A moment that is not that of the row's force at a lever.
+    """
+    states = sheet.drop_duplicates(_STATE)
+    number = pd.MultiIndex.from_frame(states[_STATE]).get_indexer(pd.MultiIndex.from_frame(sheet[_STATE]))
+    schedule = _schedule(robot.arm, states, seed, source)
+    position, rotation = seen_poses(robot, schedule)
+    names = list(document["targets"])
+    at = [robot.arm.points.index(document["targets"][name]["point"]) for name in names]
+    offsets = np.array([_offset(name, document["targets"][name]["offset_m"], seed) for name in names])
+    position = position[:, at] + (rotation[:, at] @ offsets[..., None])[..., 0]
+    position, rotation, _ = robot.tracker.read(position, rotation[:, at], stream(seed, "readings"))
+    if document["frame"] == "tracker":
+        position, rotation = robot.tracker.in_own_frame(position, rotation)
+    seen = number, pd.Index(names).get_indexer(sheet["target"])
+    measured = dict(zip("xyz", position[seen].T, strict=True))
+    if document["measured"] == "pose":
+        measured |= dict(zip(("rx", "ry", "rz"), rotation_vector(rotation[seen]).T, strict=True))
+    return sheet.assign(**measured)
+
+
+def reached(
+    robot: PhysicalRobot, shown: np.ndarray, wrench: np.ndarray, seed: int, source: str = "commands"
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector comes to rest.
+
+    Parameters
+    ----------
+    robot : PhysicalRobot
+    shown : ndarray (N, n)
+        Commanded joint angles as the controller shows them, rad; each is approached afresh.
+    wrench : ndarray (N, 6)
+        At the last measuring point, base axes; N, N m.
+    seed : int
+        Of the repeatability of the drives.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    position : ndarray (N, 3)
+        m, base frame; without the tracker's noise.
+    rotation : ndarray (N, 3, 3)
+
+    Raises
+    ------
+    InputError
+        As in `filled_sheet`.
+    """
+    columns = dict(zip([*(f"q{j + 1}" for j in range(shown.shape[1])), *_WRENCH], [*shown.T, *wrench.T], strict=True))
+    rows = pd.DataFrame(columns | {"pose": np.arange(len(shown)), "load": 0, "repeat": 0})
+    position, rotation = seen_poses(robot, _schedule(robot.arm, rows, seed, source))
+    return position[:, -1], rotation[:, -1]
+
+
+def _errors_of_geometry(arm: Arm, seed: int) -> list[Defect]:
+    draws = stream(seed, "errors of geometry")
+    return [
+        Defect(name, joints, KINDS[name].plausible_on(arm) * draws.uniform(), seed + 1 + place)
+        for name in ERRORS_OF_GEOMETRY
+        for place, joints in enumerate(KINDS[name].locations(arm))
+    ]
+
+
+def _schedule(arm: Arm, states: pd.DataFrame, seed: int, source: str) -> Schedule:
+    shown = states[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)
+    force, moment = np.split(states[_WRENCH].to_numpy(float), 2, axis=1)
+    square = (force**2).sum(axis=1, keepdims=True)
+    lever = np.divide(np.cross(force, moment), square, out=np.zeros_like(force), where=square > 0)
+    wrong = np.abs(np.cross(lever, force) - moment).max(axis=1) > 1e-6 * (1.0 + np.abs(moment).max(axis=1))
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise InputError(source, f"moment of row {row + 1}", str(moment[row].tolist()), "the moment of the force at a lever")
+    count = len(states)
+    approach = [f"approach{j}" for j in range(1, arm.joints + 1)]
+    drawn = stream(seed, "approaches").choice([-1, 1], (count, arm.joints))
+    sense = states[approach].fillna(0).to_numpy(int) if set(approach) <= set(states) else np.zeros_like(drawn)
+    return Schedule(
+        arm.angles_shown_as(shown),
+        force,
+        lever,
+        states["pose"].to_numpy(int),
+        states["load"].to_numpy(int),
+        states["repeat"].to_numpy(int),
+        np.arange(count),
+        np.where(sense == 0, drawn, sense),
+        np.full(count, -1),
+        _SECONDS_PER_STATE * np.arange(1, count + 1),
+        np.ones(count, bool),
+        seed,
+    )
+
+
+def _offset(name: str, stated: str | Sequence[float], seed: int) -> np.ndarray:
+    """Where a reflector sits on its point, m; within 0.1 m where the campaign does not know."""
+    if isinstance(stated, str):
+        return stream(seed, f"reflector {name}").uniform(-0.1, 0.1, 3)
+    return np.array(stated, float)

@@ -1,0 +1,128 @@
+"""The robot that stands in for a real one: what it writes into a measurement sheet, and where it goes."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS
+from scipy.spatial.transform import Rotation
+
+from elastocal.blind.rehearsal import filled_sheet, hidden_robot, reached
+from elastocal.errors import InputError
+from elastocal.io.documents import read_document
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.robot_file import robot_from_document
+
+UR10 = ROBOTS / "ur10.yaml"
+POINT = "6DoF"
+WRENCH = ["fx", "fy", "fz", "mx", "my", "mz"]
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return hidden_robot(UR10, 4, ["joint_tilt"])[0]
+
+
+def sheet_of(angles, targets=("T",), forces=None):
+    rows = []
+    for pose, q in enumerate(angles):
+        for load, force in enumerate(forces or [(0, 0, 0)]):
+            for target in targets:
+                wrench = dict(zip(WRENCH, (*force, 0, 0, 0), strict=True))
+                joints = {f"q{j + 1}": angle for j, angle in enumerate(q)}
+                rows.append({"pose": pose, "load": load, "repeat": 0, "target": target} | joints | wrench)
+    return pd.DataFrame(rows)
+
+
+def document(point, frame="base", offset=(0.0, 0.0, 0.0), measured="pose"):
+    return {"targets": {"T": {"point": point, "offset_m": offset}}, "frame": frame, "measured": measured}
+
+
+@pytest.fixture(scope="module")
+def angles():
+    return np.random.default_rng(1).uniform(-1, 1, (5, 6))
+
+
+@pytest.fixture(scope="module")
+def declared():
+    return robot_from_document(read_document(UR10))
+
+
+def test_a_sheet_is_filled_near_where_the_declared_robot_is(robot, angles, declared):
+    point = declared.chain.end_effector
+    filled = filled_sheet(sheet_of(angles), document(point.name), robot, 1)
+    position, rotation = poses(declared.chain, declared.model_angles(angles), point)
+    off = np.linalg.norm(filled[["x", "y", "z"]].to_numpy() - position, axis=1)
+    assert off.max() < 0.02
+    assert off.min() > 1e-5
+    turn = Rotation.from_rotvec(filled[["rx", "ry", "rz"]].to_numpy()) * Rotation.from_matrix(rotation).inv()
+    assert turn.magnitude().max() < 0.05
+
+
+def test_the_same_seed_fills_in_the_same_and_another_one_other_noise(robot, angles, declared):
+    name = declared.chain.end_effector.name
+    one, again, other = (filled_sheet(sheet_of(angles), document(name), robot, seed) for seed in (1, 1, 2))
+    pd.testing.assert_frame_equal(one, again)
+    assert 1e-6 < np.abs(one["x"] - other["x"]).max() < 1e-3
+
+
+def test_rows_of_one_state_are_read_of_one_arm_at_rest(robot, angles, declared):
+    """Two targets of known distance keep it but for the noise, in whatever order the rows come."""
+    name = declared.chain.end_effector.name
+    targets = {"A": {"point": name, "offset_m": [0.1, 0, 0]}, "B": {"point": name, "offset_m": [0, 0, 0]}}
+    filled = filled_sheet(
+        sheet_of(angles, ("A", "B")).sample(frac=1, random_state=3),
+        {"targets": targets, "frame": "base", "measured": "position"},
+        robot,
+        1,
+    )
+    both = filled.pivot(index="pose", columns="target", values=["x", "y", "z"])
+    apart = np.linalg.norm(both.xs("A", axis=1, level=1) - both.xs("B", axis=1, level=1), axis=1)
+    np.testing.assert_allclose(apart, 0.1, atol=5e-4)
+    assert "rx" not in filled
+
+
+def test_a_reflector_of_unknown_offset_sits_at_one_place_within_a_decimetre(robot, angles, declared):
+    point = declared.chain.end_effector
+    known, unknown = (filled_sheet(sheet_of(angles), document(point.name, offset=o), robot, 1) for o in ([0, 0, 0], "unknown"))
+    turn = Rotation.from_rotvec(known[["rx", "ry", "rz"]].to_numpy())
+    apart = turn.inv().apply((unknown[["x", "y", "z"]] - known[["x", "y", "z"]]).to_numpy())
+    np.testing.assert_allclose(apart, np.broadcast_to(apart[0], apart.shape), atol=5e-4)
+    assert 0.01 < np.abs(apart[0]).max() < 0.1
+
+
+def test_readings_in_the_frame_of_the_tracker_keep_distances(robot, angles, declared):
+    name = declared.chain.end_effector.name
+    base, own = (
+        filled_sheet(sheet_of(angles), document(name, frame), robot, 1)[["x", "y", "z"]] for frame in ("base", "tracker")
+    )
+    np.testing.assert_allclose(np.linalg.norm(own.diff(), axis=1)[1:], np.linalg.norm(base.diff(), axis=1)[1:], atol=1e-12)
+    assert np.linalg.norm(own - base, axis=1).min() > 1.0
+
+
+def test_a_load_deflects_the_arm_along_it(robot, angles, declared):
+    name = declared.chain.end_effector.name
+    filled = filled_sheet(sheet_of(angles, forces=[(0, 0, 0), (0, 0, -100)]), document(name), robot, 1)
+    z = filled.pivot(index="pose", columns="load", values="z")
+    assert (z[1] - z[0]).mean() < -1e-4
+
+
+def test_commands_reach_what_a_sheet_reads_but_for_noise(robot, angles, declared):
+    filled = filled_sheet(sheet_of(angles), document(declared.chain.end_effector.name), robot, 1)
+    position, _ = reached(robot, angles, np.zeros((5, 6)), 9)
+    off = filled[["x", "y", "z"]].to_numpy() - position
+    assert 1e-6 < np.abs(off).max() < 5e-4
+
+
+def test_a_moment_without_its_force_is_refused_with_its_row(robot, angles, declared):
+    sheet = sheet_of(angles)
+    sheet.loc[2, "mz"] = 3.0
+    with pytest.raises(InputError, match="moment of row 3"):
+        filled_sheet(sheet, document(declared.chain.end_effector.name), robot, 1)
+
+
+def test_the_hidden_effect_follows_from_the_seed_or_is_named(tmp_path):
+    drawn = {hidden_robot(UR10, seed)[1][-1].effect for seed in range(12)}
+    assert len(drawn) > 3
+    assert hidden_robot(UR10, 3)[1] == hidden_robot(UR10, 3)[1]
+    with pytest.raises(InputError, match="rust"):
+        hidden_robot(UR10, 3, ["rust"])
