@@ -28,4 +28,4 @@ def candidates(sites: Sites) -> list[Candidate]:
     def displacement(conditions: Conditions) -> Displacements:
         return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}), of_instruments=True)]

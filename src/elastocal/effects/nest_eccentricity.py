@@ -51,4 +51,8 @@ def candidates(sites: Sites) -> list[Candidate]:
         ]
 
     distinct = _SAMPLES_PER_PERIOD * _ORDER
-    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, distinct_angles=distinct, turning=(last + 1,))]
+    return [
+        Candidate(
+            NAME, FAMILY, (), "", parameters, displacement, distinct_angles=distinct, turning=(last + 1,), of_instruments=True
+        )
+    ]

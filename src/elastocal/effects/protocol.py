@@ -151,6 +151,9 @@ class Candidate:
         location are variants of its law, of which only one can hold.
     turning : tuple of int
         Joints with whose angles the law goes, counted from 1, where it belongs to no joint.
+    of_instruments : bool
+        Whether it is a fault of the tracker, of a reflector or of the load cell: part of the measurements and not of where the
+        robot's end effector is.
     """
 
     effect: str
@@ -165,6 +168,7 @@ class Candidate:
     location_name: str = ""
     of_setup: bool = False
     turning: tuple[int, ...] = ()
+    of_instruments: bool = False
 
     @property
     def location(self) -> tuple[int | str, ...]:

@@ -38,4 +38,4 @@ def candidates(sites: Sites) -> list[Candidate]:
         travels = {joint: conditions.joint_angles[:, joint] for joint, slides in enumerate(sites.prismatic) if slides}
         return [longer(sites, np.ones(len(conditions.joint_angles))) | travels]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, of_instruments=True)]

@@ -1,0 +1,175 @@
+"""Corrected joint targets: what to command so that the loaded, sagging, imperfect robot comes to rest at the wanted poses.
+
+Newton's method on the forward model of the calibrated robot. The Jacobian is that of the rigid chain, a simplified Newton
+method [1]_: it errs by what the robot deviates over its reach, some 1 / 500, and each step leaves so much less. The error of a
+target that is commanded as the rigid robot of the file would have it is predicted beside it [2]_.
+
+References
+----------
+.. [1] Deuflhard, P., Newton Methods for Nonlinear Problems, section 2.1.2, Springer, 2011.
+.. [2] Mooring, B. W., Roth, Z. S. and Driels, M. R., Fundamentals of Manipulator Calibration, chapter 7, Wiley, 1991.
+"""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import STATES_AT_ONCE, Commands, coordinates_at_rest, end_effector, prediction_covariance
+from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits, reach_m, refined, within_turns
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.pose_differences import pose_differences
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.mechanics.robot import Robot
+
+OK, OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "ok", "outside limits", "unreachable", "singular"
+# Newton's steps: each leaves a five-hundredth, and more near singular postures.
+_STEPS = 8
+# What may be left of a corrected target: far below any robot's repeatability.
+_CORRECTED_M = 1e-9
+# A correction turns joints by milliradians. Where one must turn by this much (rad, or m) the robot stands so near a singular
+# posture that the correction is another posture.
+_LARGEST_CORRECTION = 0.1
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Joint targets for N wanted poses; lengths in m, angles in rad.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (N, n)
+        To command, as the controller counts them.
+    uncorrected : ndarray (N, n)
+        What the rigid robot of the file would be commanded.
+    error_before, error_after : ndarray (N, 6)
+        Wanted less predicted pose, displacement and rotation vector in base axes: uncorrected, and with the correction.
+    std_m, std_rad : ndarray (N,)
+        Root mean square length of what the uncertainty of the parameters leaves of position and orientation.
+    repeatability_m : ndarray (N,)
+        Root mean square distance of repeated approaches by the joints' repeatability, as far as the campaign shows it.
+    status : ndarray of str (N,)
+        "ok", "outside limits", "unreachable" or "singular".
+    """
+
+    joint_angles: np.ndarray
+    uncorrected: np.ndarray
+    error_before: np.ndarray
+    error_after: np.ndarray
+    std_m: np.ndarray
+    std_rad: np.ndarray
+    repeatability_m: np.ndarray
+    status: np.ndarray
+
+
+def corrected(
+    calibrated: CalibratedRobot,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    loads: Commands,
+    start: np.ndarray | None = None,
+    progress: Callable[[int], object] = lambda done: None,
+) -> Correction:
+    """Joint targets that bring the end effector to wanted poses.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+        Of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
+    position, rotation : ndarray (N, 3), (N, 3, 3)
+        Wanted pose of the last measuring point, m, base axes.
+    loads : Commands
+        Under which each target is reached; its joint angles count for nothing.
+    start : ndarray (N, n), optional
+        Joint angles near which each target lies, as the controller reports them, rad: they choose the posture. Without, the
+        posture is chosen for the path as a whole, see `along_path`.
+    progress : callable, optional
+        Called with the number of targets that are done.
+
+    Returns
+    -------
+    Correction
+    """
+    robot = calibrated.robot
+    if start is None:
+        nominal, left = along_path(robot, position, rotation)
+    else:
+        near = robot.model_angles(start)
+        nominal, left = refined(robot, position, rotation, near)
+        nominal = within_turns(robot, nominal, near)
+    slices = [slice(first, first + STATES_AT_ONCE) for first in range(0, len(position), STATES_AT_ONCE)]
+
+    def of(part: slice) -> Correction:
+        return _corrected(calibrated, position[part], rotation[part], loads.at(part), nominal[part], left[part])
+
+    parts = []
+    with ThreadPoolExecutor(2) as pool:
+        for found in pool.map(of, slices):
+            parts.append(found)
+            progress(sum(len(part.status) for part in parts))
+    return Correction(*(np.concatenate([getattr(part, name) for part in parts]) for name in vars(parts[0])))
+
+
+def _corrected(
+    calibrated: CalibratedRobot,
+    position: np.ndarray,
+    rotation: np.ndarray,
+    loads: Commands,
+    nominal: np.ndarray,
+    left: np.ndarray,
+) -> Correction:
+    robot, joints = calibrated.robot, calibrated.robot.joints
+    reached = left <= SOLVED_M
+    length = reach_m(robot)
+    scale = np.array([1.0, 1.0, 1.0, length, length, length])
+    uncorrected = robot.reported_angles(nominal)
+    coordinates = coordinates_at_rest(calibrated, loads.with_angles(uncorrected))
+    before = pose_differences(position, rotation, *end_effector(calibrated, coordinates))
+    inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
+    angles, off = nominal.copy(), before.copy()
+    singular = np.zeros(len(angles), bool)
+    # Rows that need another step: near singular postures more than elsewhere.
+    moving = np.flatnonzero(reached)
+    for _ in range(_STEPS):
+        step = (inverse[moving] @ off[moving, :, None])[..., 0]
+        far = np.abs(angles[moving] + step - nominal[moving]).max(axis=1) > _LARGEST_CORRECTION
+        singular[moving[far]] = True
+        moving, step = moving[~far], step[~far]
+        angles[moving] += step
+        coordinates[moving, :joints] += step
+        commands = loads.at(moving).with_angles(robot.reported_angles(angles[moving]))
+        coordinates[moving] = coordinates_at_rest(calibrated, commands, coordinates[moving])
+        reached_pose = end_effector(calibrated, coordinates[moving])
+        off[moving] = pose_differences(position[moving], rotation[moving], *reached_pose)
+        moving = moving[np.linalg.norm(off[moving] * scale, axis=1) > _CORRECTED_M]
+        if not len(moving):
+            break
+    singular[moving] = True
+    status = np.full(len(angles), OK, dtype="U14")
+    status[singular] = SINGULAR
+    status[beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
+    status[~reached] = UNREACHABLE
+    commands = loads.with_angles(robot.reported_angles(angles))
+    variances = np.diagonal(prediction_covariance(calibrated, commands, coordinates), axis1=1, axis2=2)
+    return Correction(
+        commands.joint_angles,
+        uncorrected,
+        before,
+        off,
+        np.sqrt(variances[:, :3].sum(axis=1)),
+        np.sqrt(variances[:, 3:].sum(axis=1)),
+        _repeatability(robot, angles, calibrated.noise.joint_rad),
+        status,
+    )
+
+
+def _repeatability(robot: Robot, angles: np.ndarray, joint_rad: np.ndarray) -> np.ndarray:
+    spread = jacobians(robot.chain, angles, robot.chain.end_effector)[:, :3] * joint_rad
+    return np.sqrt((spread**2).sum(axis=(1, 2)))
