@@ -1,105 +1,146 @@
-"""Where a calibrated robot comes to rest, against the rigid robot, closed forms and draws of its parameters."""
+"""The calibrated robot: what it keeps, where it takes the end effector, and how sure that is."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from calibrated_robots import drawn_commands, made_calibrated
+from made_calibrated import USUAL, made_calibrated, plain_estimate, plain_model
+from scipy.spatial.transform import Rotation
+from support import PinocchioPoint, random_angles, robot_of
+from synthetic import NOISE, made_estimate, made_states, seen_exactly
 
-from elastocal.application.calibrated import Commands, forward, nominal_forward, prediction_covariance, unloaded
+from elastocal.application.calibrated import (
+    OperatingConditions,
+    assumptions,
+    calibrated_from,
+    calibrated_of,
+    forward,
+    moves_robot,
+    prediction_covariance,
+)
+from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
-from elastocal.mechanics.kinematics import jacobians
-from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import Model
+from elastocal.fitting.parameters import stepped
+from elastocal.mechanics.robot import Mass
 from elastocal.mechanics.sites import sites_of
 
-# What each effect of the catalogue is a fault of, if not of the robot itself.
-OF_INSTRUMENTS = {"tracker_scale", "nest_eccentricity", "force_bias", "force_scale", "force_misalignment", "application_point"}
-OF_SETUP = {"frame_drift", "setup_step"}
+ONE_JOINT = "Tz(0.5) Ry(q1) Tx(0.8) [hand]"
 
 
-@pytest.fixture(scope="module")
-def with_effects():
-    return made_calibrated("gp180", ("joint_offset", "link_geometry", "link_weight@2", "transmission_harmonic@1["))
+def test_what_belongs_to_the_instruments_and_the_set_up_is_left_out_with_its_covariance(fanuc):
+    keys = ("force_bias[base axes]", "joint_offset@2", "tracker_scale", "frame_drift", "lost_motion@3", "nest_eccentricity")
+    model = plain_model(fanuc, *keys)
+    rng = np.random.default_rng(1)
+    counts = [len(effect.parameters) + len(effect.shapes) for effect in model.effects]
+    root = rng.standard_normal((sum(counts), sum(counts)))
+    estimate = plain_estimate(model, [rng.standard_normal(len(effect.parameters)) for effect in model.effects])
+    found = calibrated_of(fanuc, model, estimate, root @ root.T, NOISE)
+    assert [effect.key for effect in found.model.effects] == ["joint_compliance", "joint_offset@2", "lost_motion@3"]
+    np.testing.assert_array_equal(found.estimate.coefficients[1], estimate.coefficients[2])
+    np.testing.assert_array_equal(found.estimate.shapes[2], estimate.shapes[5])
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    rows = np.concatenate([np.arange(starts[n], starts[n + 1]) for n in (0, 2, 5)])
+    np.testing.assert_array_equal(found.covariance, (root @ root.T)[np.ix_(rows, rows)])
 
 
-@pytest.mark.parametrize("name", ["gp180", "fanuc", "wam"])
-def test_candidates_say_whether_they_are_of_the_robot_or_of_what_measured_it(name):
-    candidates = candidates_on(made_calibrated(name).model.sites).values()
-    assert {c.effect for c in candidates if c.of_instruments} <= OF_INSTRUMENTS
-    assert {c.effect for c in candidates if c.of_setup} <= OF_SETUP
-    assert not [c.key for c in candidates if c.effect in OF_INSTRUMENTS and not c.of_instruments]
+def test_drift_of_the_tracker_does_not_move_the_robot_and_growth_of_the_arm_does(fanuc):
+    found = candidates_on(sites_of(fanuc))
+    assert not moves_robot(found["frame_drift"]) and moves_robot(found["thermal_growth[time]"])
 
 
-def test_effects_of_instruments_and_set_up_are_left_out_with_their_parameters():
-    whole = made_calibrated("ur10", ("joint_offset@2", "tracker_scale", "frame_drift", "force_bias"))
-    assert [e.effect for e in whole.model.effects if e.effect not in ("joint_compliance", "declared_weight")] == [
-        "joint_offset"
-    ]
-    assert len(whole.covariance) == sum(len(e.parameters) + len(e.shapes) for e in whole.model.effects)
+def test_a_fit_with_unknown_frames_and_targets_gives_the_robot_in_its_base(fanuc):
+    """Tracker anywhere, target anywhere: neither is part of the robot."""
+    sites = sites_of(fanuc)
+    effects = tuple(candidates_on(sites)[key] for key in ("joint_offset@2", "joint_offset@3"))
+    model = Model(sites, (Target("A", "6DoF", None),), True, 6, fanuc.compliance, effects)
+    true = made_estimate(model)
+    found = calibrated_from(fit(model, seen_exactly(model, true, made_states(6, 40)), NOISE), fanuc)
+    angles = random_angles(np.random.default_rng(0), fanuc.chain, 5)
+    position, rotation = forward(found, angles)
+    moved = angles.copy()
+    moved[:, 1] += true.coefficients[0][0]
+    moved[:, 2] += true.coefficients[1][0]
+    expected = PinocchioPoint(fanuc.chain, fanuc.chain.end_effector)
+    for number, q in enumerate(moved):
+        at = expected.pose_and_jacobian(q)
+        np.testing.assert_allclose(position[number], at[0], atol=1e-8)
+        np.testing.assert_allclose(rotation[number], at[1], atol=1e-8)
 
 
-def test_a_stiff_robot_without_effects_or_load_is_the_rigid_one():
-    stiff = made_calibrated("fanuc_static")
-    stiff = replace(stiff, estimate=replace(stiff.estimate, coefficients=(np.zeros(6),)))
-    commands = drawn_commands(stiff, 50)
-    for found, nominal in zip(forward(stiff, commands), nominal_forward(stiff.robot, commands.joint_angles), strict=True):
-        np.testing.assert_allclose(found, nominal, atol=1e-12)
+def test_spring_and_weight_of_one_joint_are_in_equilibrium():
+    """q + c tau(q') = q' with the torque where the arm has sagged to, not where it was sent."""
+    robot = replace(robot_of(ONE_JOINT, [2e-5]), masses=(Mass(1, 20.0, (0.4, 0.0, 0.1), 0.1),))
+    found = made_calibrated(robot, identified=False, size=0.0)
+    for q, force in ((0.3, 0.0), (-0.7, 300.0)):
+        position, rotation = forward(found, np.array([[q]]), OperatingConditions(np.array([[0, 0, force, 0, 0, 0.0]])))
+        at = q
+        for _ in range(100):
+            weight = -20.0 * 9.80665
+            # About y, r x F: z F_x - x F_z, with the lever of each force turned by the angle.
+            centre = 0.4 * np.cos(at) + 0.1 * np.sin(at)
+            at = q + 2e-5 * (-centre * weight - 0.8 * np.cos(at) * force)
+        assert abs(at - q) > 1e-4
+        np.testing.assert_allclose(position[0], [0.8 * np.cos(at), 0, 0.5 - 0.8 * np.sin(at)], atol=1e-11)
+        np.testing.assert_allclose(Rotation.from_matrix(rotation[0]).as_rotvec(), [0, at, 0], atol=1e-11)
 
 
-def test_a_small_load_deflects_by_compliance_and_jacobian():
-    robot = made_calibrated("ur10")
-    robot = replace(robot, robot=replace(robot.robot, masses=()), model=replace(robot.model, sites=sites_of(robot.robot.chain)))
-    robot = replace(robot, model=replace(robot.model, effects=robot.model.effects[:1]))
-    robot = replace(robot, estimate=replace(robot.estimate, coefficients=robot.estimate.coefficients[:1], shapes=((),)))
-    commands = drawn_commands(robot, 40, force=1e-3)
-    angles = robot.robot.model_angles(commands.joint_angles)
-    jacobian = jacobians(robot.robot.chain, angles, robot.robot.chain.end_effector)
-    joints = robot.estimate.coefficients[0] * (jacobian.transpose(0, 2, 1) @ commands.wrench[..., None])[..., 0]
-    expected = (jacobian @ joints[..., None])[..., 0]
-    moved = pose_differences(*forward(robot, commands), *forward(robot, unloaded(commands.joint_angles)))
-    np.testing.assert_allclose(moved, expected, atol=1e-4 * np.abs(expected).max())
-
-
-def test_parts_of_a_long_list_are_as_single_commands(with_effects, monkeypatch):
-    commands = drawn_commands(with_effects, 23)
-    whole = forward(with_effects, commands), prediction_covariance(with_effects, commands)
-    monkeypatch.setattr("elastocal.application.calibrated.STATES_AT_ONCE", 5)
-    monkeypatch.setattr("elastocal.application.calibrated.observations_at_once", lambda *_: 4)
-    parts = forward(with_effects, commands), prediction_covariance(with_effects, commands)
-    np.testing.assert_allclose(parts[0][0], whole[0][0], atol=1e-14)
-    np.testing.assert_allclose(parts[1], whole[1], rtol=1e-9, atol=1e-20)
-
-
-def test_predicted_covariance_is_that_of_draws_of_the_parameters(with_effects):
-    """1,500 draws: standard errors of the deviations are 1.8 %; the bound is five of them."""
-    commands = drawn_commands(with_effects, 3)
-    draws, deviations = np.random.default_rng(4), np.sqrt(np.diag(with_effects.covariance))
-    sizes = [len(values) for values in with_effects.estimate.coefficients]
-    poses = []
+def test_covariance_is_that_of_poses_over_drawn_parameters(fanuc):
+    """Monte Carlo over the parameters, through the exact model."""
+    found = made_calibrated(fanuc, *USUAL, "transmission_harmonic@2[orders 1-2]", relative_std=0.01)
+    states = made_states(6, 2, seed=4)
+    operating = OperatingConditions(states.wrench)
+    root, rng = np.linalg.cholesky(found.covariance + 1e-24 * np.eye(len(found.covariance))), np.random.default_rng(2)
+    middle, turned = forward(found, states.joint_angles, operating)
+    drawn = []
     for _ in range(1500):
-        step = np.split(deviations * draws.standard_normal(len(deviations)), np.cumsum(sizes)[:-1])
-        values = tuple(value + change for value, change in zip(with_effects.estimate.coefficients, step, strict=True))
-        moved = replace(with_effects, estimate=replace(with_effects.estimate, coefficients=values))
-        poses.append(pose_differences(*forward(moved, commands), *forward(with_effects, commands)))
-    found = np.sqrt((np.array(poses) ** 2).mean(axis=0))
-    predicted = np.sqrt(np.diagonal(prediction_covariance(with_effects, commands), axis1=1, axis2=2))
-    np.testing.assert_allclose(found, predicted, rtol=0.1)
+        moved = replace(found, estimate=stepped(found.model, found.estimate, root @ rng.standard_normal(len(root))))
+        position, rotation = forward(moved, states.joint_angles, operating)
+        turn = Rotation.from_matrix(rotation @ turned.transpose(0, 2, 1)).as_rotvec()
+        drawn.append(np.concatenate([position - middle, turn], axis=1))
+    expected = prediction_covariance(found, states.joint_angles, operating)
+    for number in range(2):
+        sample = np.cov(np.array(drawn)[:, number].T)
+        deviation = np.sqrt(np.diag(expected[number]))
+        np.testing.assert_allclose(
+            sample / np.outer(deviation, deviation), expected[number] / np.outer(deviation, deviation), atol=0.12
+        )
 
 
-def test_covariates_that_are_not_stated_are_where_their_effects_do_nothing():
-    robot = made_calibrated("fanuc", ("thermal_growth[temperature", "hysteresis@2"))
-    assert robot.needing("temperature") == ["thermal_growth[temperature]"]
-    assert robot.needing("approach") == ["hysteresis@2"]
-    commands = drawn_commands(robot, 5)
-    stated = replace(commands, temperature_c=np.full(5, 20.0), approach=np.zeros((5, 6)))
-    np.testing.assert_array_equal(forward(robot, commands)[0], forward(robot, stated)[0])
-    warm = replace(stated, temperature_c=np.full(5, 40.0))
-    assert np.abs(forward(robot, warm)[0] - forward(robot, stated)[0]).max() > 1e-6
+def test_rows_do_not_depend_on_the_part_in_which_they_come(fanuc, monkeypatch):
+    found = made_calibrated(fanuc, *USUAL)
+    states = made_states(6, 7)
+    operating = OperatingConditions(states.wrench, states.approach, states.time_s, states.temperature_c)
+    whole = *forward(found, states.joint_angles, operating), prediction_covariance(found, states.joint_angles, operating)
+    monkeypatch.setattr("elastocal.application.calibrated.AT_ONCE", 3)
+    parts = *forward(found, states.joint_angles, operating), prediction_covariance(found, states.joint_angles, operating)
+    for one, other in zip(whole, parts, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-18)
 
 
-def test_commands_are_taken_apart_with_what_they_do_not_state():
-    commands = Commands(np.arange(12.0).reshape(4, 3), np.zeros((4, 6)), time_s=np.arange(4.0))
-    some = commands.at(np.array([2, 0]))
-    assert (some.time_s == [2.0, 0.0]).all()
-    assert some.approach is None
-    assert len(some.with_angles(np.ones((2, 3)))) == 2
+def test_reported_angles_are_those_of_the_controller(fanuc):
+    matrix = np.eye(6)
+    matrix[2, 1] = 1.0
+    coupled = replace(fanuc, reported_matrix=matrix, reported_offset=np.array([0, 0.1, 0, 0, 0, 0]))
+    angles = random_angles(np.random.default_rng(3), fanuc.chain, 4)
+    plain, other = made_calibrated(fanuc, *USUAL), made_calibrated(coupled, *USUAL)
+    np.testing.assert_allclose(forward(other, coupled.reported_angles(angles))[0], forward(plain, angles)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "given"),
+    [
+        ("hysteresis@2", "approach", OperatingConditions(approach=np.ones((1, 6)))),
+        ("thermal_growth[time]", "time", OperatingConditions(time_s=np.array([3600.0]))),
+        ("thermal_growth[temperature]", "temperature", OperatingConditions(temperature_c=np.array([30.0]))),
+    ],
+)
+def test_what_an_effect_needs_and_is_not_given_is_neutral_and_said(fanuc, key, name, given):
+    found, without = made_calibrated(fanuc, key), made_calibrated(fanuc)
+    angles = random_angles(np.random.default_rng(5), fanuc.chain, 1)
+    np.testing.assert_array_equal(forward(found, angles)[0], forward(without, angles)[0])
+    assert np.linalg.norm(forward(found, angles, given)[0] - forward(without, angles)[0]) > 1e-6
+    (line,) = assumptions(found, OperatingConditions())
+    assert line.startswith(f"{key} needs the {name}")
+    assert assumptions(found, given) == [] == assumptions(without, OperatingConditions())

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from calibrated_robots import made_calibrated
+from analysed_robots import analysed
 
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits, reach_m, refined, within_turns
 from elastocal.mechanics.kinematics import poses
 
 
 def robot_of(name):
-    return made_calibrated(name).robot
+    return analysed(name)
 
 
 def at(robot, angles):

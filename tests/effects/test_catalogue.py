@@ -58,6 +58,15 @@ def test_names_and_families_are_those_of_the_design():
     assert {name: module.FAMILY for name, module in catalogue.effects().items()} == FAMILIES
 
 
+def test_every_effect_says_whether_it_moves_the_robot_or_only_what_was_measured_of_it(fanuc):
+    """A correction must not move the robot by an error of the tracker, its targets, the force sensor or the set-up."""
+    sites = equipped(fanuc.chain)
+    for name, module in catalogue.effects().items():
+        assert isinstance(module.MOVES_ROBOT, bool), name
+        instruments = module.FAMILY == "load" or any(candidate.of_setup for candidate in module.candidates(sites))
+        assert module.MOVES_ROBOT is not (instruments or name in ("nest_eccentricity", "tracker_scale")), name
+
+
 def test_candidates_bear_the_name_and_family_of_their_module(chain):
     sites = equipped(chain)
     for name, module in catalogue.effects().items():
@@ -271,6 +280,7 @@ import numpy as np
 from elastocal.effects.protocol import Candidate, Parameter
 
 NAME, FAMILY = "sinking_foot", "drift"
+MOVES_ROBOT = True
 
 
 def candidates(sites):

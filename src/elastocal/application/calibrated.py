@@ -1,7 +1,7 @@
-"""A calibrated robot: where its end effector comes to rest, for joint angles as the controller reports them and any load.
+"""The robot as it is: the final model of a diagnosis without what belongs to one campaign's set-up and its instruments.
 
-What a campaign found out about the robot, without what belongs to its tracker, reflectors, load cell and set-up. The end
-effector is the last measuring point of the chain; poses are in base axes, as the fitted model has them.
+Poses are those of the end effector's measuring point in the robot's base frame: that of the chain, which the fit placed under
+the tracker. How far tool and work frame are known is another matter, and in no figure here.
 """
 
 from __future__ import annotations
@@ -12,47 +12,43 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.campaign import Target
+from elastocal.effects.catalogue import effects
 from elastocal.fitting.displacement import conditions, displaced_coordinates
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.memory import observations_at_once
-from elastocal.fitting.model import Estimate
 from elastocal.fitting.observations import Observations, States
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
-    from typing import Any
-
+    from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Model
+    from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.noise import Noise
     from elastocal.mechanics.robot import Robot
 
-# Of an effect's needs those that a command may state or not.
-COVARIATES = ("approach", "time", "temperature")
-# Dimensions are stated at this temperature (ISO 1), and at it no effect of warmth acts.
-_REFERENCE_C = 20.0
-# States whose motion along the chain stays in the processor's cache.
-STATES_AT_ONCE = 2000
+# States at a time: what a walk along all sites makes of them stays in the processor's cache.
+AT_ONCE = 1024
+# °C, at which dimensions are stated (ISO 1).
+REFERENCE_C = 20.0
 
 
 @dataclass(frozen=True)
 class CalibratedRobot:
-    """A robot with what was found out about it.
+    """A robot and what a campaign found of it.
 
     Attributes
     ----------
     robot : Robot
-        As its file declares it.
+        As its file declares it; `robot.model_angles(reported)` gives the angles of the chain.
     model : Model
-        The fitted model, with effects of the robot alone.
+        The final model with the effects that move the robot. Its one target is the end effector's measuring point.
     estimate : Estimate
-        Its values; no frame and no target.
+        Its values; the frame is the robot's base.
     covariance : ndarray (P, P)
-        Of the effects' parameters, each effect's linear ones and then its shapes, whatever frames and targets are (marginal).
-        Zero for parameters that were not identifiable.
+        Of the parameters of the effects (linear, then shapes, effect by effect), marginal over frames, targets and all effects
+        that are left out; zero where held.
     noise : Noise
-        Of the campaign; its joint part is the repeatability.
+        Of the campaign, with the repeatability of the joints.
     """
 
     robot: Robot
@@ -61,82 +57,58 @@ class CalibratedRobot:
     covariance: np.ndarray
     noise: Noise
 
-    def needing(self, covariate: str) -> list[str]:
-        """Keys of the effects that go with one of the `COVARIATES`."""
-        return [effect.key for effect in self.model.effects if covariate in effect.needs]
-
 
 @dataclass(frozen=True)
-class Commands:
-    """What a robot is commanded, and under which load it stands; arrays of N.
+class OperatingConditions:
+    """Under what the robot works, row for row as the joint angles, or one row for all of them.
 
     Attributes
     ----------
-    joint_angles : ndarray (N, n)
-        As the controller reports them, rad.
-    wrench : ndarray (N, 6)
-        External wrench at the origin of the last measuring point, base axes; N, N m.
+    wrench : ndarray (N, 6) or None
+        N, N m, at the last measuring point's origin, base axes, beside the weights that the robot file declares; None for none.
     approach : ndarray (N, n) or None
-        Sense in which each joint, as the model has it, is approached: -1, 0 (from either side) or +1; 0 without.
+        Sense in which each joint comes to rest as the controller reports it, -1, 0 or +1; None for unknown, 0.
     time_s : ndarray (N,) or None
-        As the campaign counts it; its first measurement without.
+        On the clock of the campaign; None for its start.
     temperature_c : ndarray (N,) or None
-        20 °C without.
+        None for the 20 °C at which dimensions are stated.
     """
 
-    joint_angles: np.ndarray
-    wrench: np.ndarray
+    wrench: np.ndarray | None = None
     approach: np.ndarray | None = None
     time_s: np.ndarray | None = None
     temperature_c: np.ndarray | None = None
 
-    def __len__(self) -> int:
-        return len(self.joint_angles)
+    def part(self, chosen: slice | np.ndarray) -> OperatingConditions:
+        """Those of some rows."""
 
-    def at(self, chosen: slice | np.ndarray) -> Commands:
-        """Some of them."""
-        some: dict[str, Any] = {name: None if value is None else value[chosen] for name, value in vars(self).items()}
-        return Commands(**some)
+        def of(values: np.ndarray | None) -> np.ndarray | None:
+            return values if values is None or len(values) == 1 else values[chosen]
 
-    def with_angles(self, joint_angles: np.ndarray) -> Commands:
-        """The same loads at other joint angles (N, n)."""
-        return replace(self, joint_angles=joint_angles)
+        return OperatingConditions(of(self.wrench), of(self.approach), of(self.time_s), of(self.temperature_c))
 
 
-def unloaded(joint_angles: np.ndarray) -> Commands:
-    """Commands without an external load.
-
-    Parameters
-    ----------
-    joint_angles : ndarray (N, n)
-        rad.
-
-    Returns
-    -------
-    Commands
-    """
-    return Commands(joint_angles, np.zeros((len(joint_angles), 6)))
+NEUTRAL = OperatingConditions()
 
 
-def calibrated_from(fitted: Fit, robot: Robot) -> CalibratedRobot:
-    """What a fit says of the robot itself.
+def calibrated_from(fit: Fit, robot: Robot) -> CalibratedRobot:
+    """A calibrated robot from the final fit of a diagnosis.
 
     Parameters
     ----------
-    fitted : Fit
+    fit : Fit
     robot : Robot
-        As its file declares it.
+        Of the campaign.
 
     Returns
     -------
     CalibratedRobot
-        Without effects of the set-up and of the instruments.
     """
-    return calibrated_robot(robot, fitted.model, fitted.estimate, fitted.covariance, fitted.noise)
+    return calibrated_of(robot, fit.model, fit.estimate, fit.covariance, fit.noise)
 
 
-def calibrated_robot(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
-    """A robot from a fitted model.
+def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+    """A calibrated robot from a fitted model.
 
     Parameters
     ----------
@@ -150,35 +122,63 @@ def calibrated_robot(robot: Robot, model: Model, estimate: Estimate, covariance:
     Returns
     -------
     CalibratedRobot
-        As by `calibrated_from`.
     """
-    owners = np.array([owner for owner, _ in parameters(model, estimate)], object)
-    kept = [n for n, effect in enumerate(model.effects) if not (effect.of_setup or effect.of_instruments)]
-    effects = tuple(model.effects[n] for n in kept)
-    of_robot = np.isin(owners, [effect.key for effect in effects])
+    kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
+    keys = {model.effects[number].key for number in kept}
+    rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
     end = model.sites.chain.end_effector
-    about = replace(
-        model, targets=(Target("end effector", end.name, tuple(end.offset_m)),), fitted_frames=False, rows=6, effects=effects
+    target = Target("end effector", end.name, end.offset_m)
+    bare = replace(
+        model, targets=(target,), fitted_frames=False, rows=6, effects=tuple(model.effects[number] for number in kept)
     )
-    values = Estimate(
-        (0,),
-        np.eye(3)[None],
-        np.zeros((1, 3)),
-        np.array([end.offset_m]),
-        np.eye(3)[None],
-        tuple(estimate.coefficients[n] for n in kept),
-        tuple(estimate.shapes[n] for n in kept),
+    values = replace(
+        estimate,
+        sessions=(0,),
+        frame_rotation=np.eye(3)[None],
+        frame_position=np.zeros((1, 3)),
+        target_offset=np.array([end.offset_m]),
+        target_rotation=np.eye(3)[None],
+        coefficients=tuple(estimate.coefficients[number] for number in kept),
+        shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    return CalibratedRobot(robot, about, values, covariance[np.ix_(of_robot, of_robot)], noise)
+    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
 
 
-def forward(calibrated: CalibratedRobot, commands: Commands) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector comes to rest.
+def moves_robot(effect: Candidate) -> bool:
+    """Whether an effect moves the robot, as its module says; springs and declared weights, which are no missing effects, do."""
+    module = effects().get(effect.effect)
+    return not effect.of_setup and (module is None or module.MOVES_ROBOT)
+
+
+def assumptions(calibrated: CalibratedRobot, conditions: OperatingConditions) -> list[str]:
+    """What effects of the model need and the conditions do not have, one line for each with what is taken instead."""
+    needs = frozenset[str]().union(*(effect.needs for effect in calibrated.model.effects))
+    taken = {
+        "approach": (conditions.approach, "no joint's sense of approach is known, and hysteresis is left out"),
+        "time": (conditions.time_s, "the time is that of the campaign's first measurement, when nothing had warmed up"),
+        "temperature": (conditions.temperature_c, f"the temperature is {REFERENCE_C:g} °C"),
+    }
+    named = {name: ", ".join(e.key for e in calibrated.model.effects if name in e.needs) for name in taken}
+    return [
+        f"{named[name]} needs the {name}, which is not given: {words}"
+        for name, (values, words) in taken.items()
+        if name in needs and values is None
+    ]
+
+
+def forward(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions = NEUTRAL
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where the robot really is: exact poses of the end effector's measuring point.
+
+    Loads act where the robot has yielded to them, by the fixed-point iteration of `displacement.conditions`.
 
     Parameters
     ----------
     calibrated : CalibratedRobot
-    commands : Commands
+    reported_angles : ndarray (N, n)
+        As the controller reports them, rad (m for prismatic joints).
+    operating : OperatingConditions, optional
 
     Returns
     -------
@@ -186,109 +186,118 @@ def forward(calibrated: CalibratedRobot, commands: Commands) -> tuple[np.ndarray
         m, base axes.
     rotation : ndarray (N, 3, 3)
     """
-    position, rotation = np.empty((len(commands), 3)), np.empty((len(commands), 3, 3))
-    for part in _parts(len(commands), STATES_AT_ONCE):
-        position[part], rotation[part] = end_effector(calibrated, coordinates_at_rest(calibrated, commands.at(part)))
+    position, rotation = np.empty((len(reported_angles), 3)), np.empty((len(reported_angles), 3, 3))
+    for part in _parts(len(reported_angles)):
+        coordinates = coordinates_at_rest(calibrated, reported_angles[part], operating.part(part))
+        position[part], rotation[part] = end_effector(calibrated, coordinates)
     return position, rotation
 
 
-def coordinates_at_rest(calibrated: CalibratedRobot, commands: Commands, near: np.ndarray | None = None) -> np.ndarray:
-    """Where the robot yields to under its loads, as coordinates of its sites.
+def coordinates_at_rest(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, near: np.ndarray | None = None
+) -> np.ndarray:
+    """Where the robot yields to, as coordinates of its sites.
 
     Parameters
     ----------
-    calibrated : CalibratedRobot
-    commands : Commands
+    calibrated, reported_angles, operating
+        As in `forward`.
     near : ndarray (N, C), optional
-        Coordinates at which the loads are taken: those of commands that differ little. Found by iteration without.
+        Coordinates at which the loads are taken, of states that differ little; by fixed-point iteration without.
 
     Returns
     -------
     ndarray (N, C)
     """
-    model, estimate, states = calibrated.model, calibrated.estimate, _states(calibrated, commands)
-    return displaced_coordinates(model, estimate, conditions(model, estimate, states, near))
+    model, estimate = calibrated.model, calibrated.estimate
+    return displaced_coordinates(
+        model, estimate, conditions(model, estimate, states_of(calibrated, reported_angles, operating), near)
+    )
 
 
 def end_effector(calibrated: CalibratedRobot, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Position (N, 3), m, and rotation (N, 3, 3) of the end effector, base axes, at coordinates (N, C) of the sites."""
+    """Position (N, 3), m, and rotation (N, 3, 3) of the end effector in base axes at coordinates (N, C) of the sites."""
     chain = calibrated.model.sites.chain
     return poses(chain, coordinates, chain.end_effector)
 
 
-def nominal_forward(robot: Robot, joint_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector of the robot file is, which is rigid.
+def nominal_forward(robot: Robot, reported_angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector of the robot file is, taken as rigid: position (N, 3), m, and rotation (N, 3, 3), base axes."""
+    return poses(robot.chain, robot.model_angles(reported_angles), robot.chain.end_effector)
+
+
+def prediction_covariance(
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    operating: OperatingConditions = NEUTRAL,
+    at_rest: np.ndarray | None = None,
+) -> np.ndarray:
+    """Covariance of the poses of `forward` by that of the parameters, to first order: G S G^T.
 
     Parameters
     ----------
-    robot : Robot
-    joint_angles : ndarray (N, n)
-        As the controller reports them, rad.
-
-    Returns
-    -------
-    position, rotation : ndarray (N, 3), (N, 3, 3)
-        As by `forward`.
-    """
-    return poses(robot.chain, robot.model_angles(joint_angles), robot.chain.end_effector)
-
-
-def prediction_covariance(calibrated: CalibratedRobot, commands: Commands, at_rest: np.ndarray | None = None) -> np.ndarray:
-    """What the uncertainty of the parameters leaves uncertain of the pose, by linear propagation (JCGM 100).
-
-    Parameters
-    ----------
-    calibrated : CalibratedRobot
-    commands : Commands
+    calibrated, reported_angles, operating
+        As in `forward`.
     at_rest : ndarray (N, C), optional
         As by `coordinates_at_rest`, where they are known.
 
     Returns
     -------
     ndarray (N, 6, 6)
-        Of position (m) and orientation (rad), base axes.
+        m and rad, base axes: displacement and rotation vector.
     """
-    model, estimate, count = calibrated.model, calibrated.estimate, len(calibrated.covariance)
-    covariance = np.zeros((len(commands), 6, 6))
-    if not count:
-        return covariance
-    spread = _square_root(calibrated.covariance)
-    for part in _parts(len(commands), observations_at_once(6, count)):
-        states = _states(calibrated, commands.at(part))
-        here = Observations(
-            states,
-            np.arange(len(states)),
-            np.zeros(len(states), int),
-            np.zeros((len(states), 3)),
-            np.broadcast_to(np.eye(3), (len(states), 3, 3)),
-        )
-        around = conditions(model, estimate, states, None if at_rest is None else at_rest[part])
-        line = linearize(model, estimate, here, around)
-        moved = line.sensitivities @ spread
+    model, estimate, spread = calibrated.model, calibrated.estimate, _square_root(calibrated.covariance)
+    covariance = np.zeros((len(reported_angles), 6, 6))
+    for part in _parts(len(reported_angles)):
+        seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
+        around = conditions(model, estimate, seen.states, None if at_rest is None else at_rest[part])
+        moved = linearize(model, estimate, seen, around).sensitivities @ spread
         covariance[part] = moved @ moved.transpose(0, 2, 1)
     return covariance
 
 
-def _square_root(covariance: np.ndarray) -> np.ndarray:
-    """A factor L with L L' the covariance, singular where parameters were not identifiable."""
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(values.clip(min=0.0))
+def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:
+    """Reported joint angles and operating conditions as states of the model, with the neutral ones for what is not given.
 
+    Parameters
+    ----------
+    calibrated, reported_angles, operating
+        As in `forward`.
 
-def _parts(count: int, at_once: int) -> list[slice]:
-    return [slice(start, min(start + at_once, count)) for start in range(0, count, at_once)]
+    Returns
+    -------
+    States
+    """
+    robot, count = calibrated.robot, len(reported_angles)
 
+    def rows(values: np.ndarray | None, neutral: float, *shape: int) -> np.ndarray:
+        return np.broadcast_to(neutral if values is None else values, (count, *shape))
 
-def _states(calibrated: CalibratedRobot, commands: Commands) -> States:
-    count, nowhere = len(commands), np.zeros(len(commands))
     return States(
         session=np.zeros(count, int),
         pose=np.arange(count),
         load=np.zeros(count, int),
-        joint_angles=calibrated.robot.model_angles(commands.joint_angles),
-        wrench=commands.wrench,
+        joint_angles=robot.model_angles(np.asarray(reported_angles, float)),
+        wrench=rows(operating.wrench, 0.0, 6),
         repeats=np.ones(count, int),
-        approach=np.zeros(commands.joint_angles.shape) if commands.approach is None else commands.approach,
-        time_s=nowhere + calibrated.model.time_zero_s if commands.time_s is None else commands.time_s,
-        temperature_c=nowhere + _REFERENCE_C if commands.temperature_c is None else commands.temperature_c,
+        approach=np.sign(rows(operating.approach, 0.0, robot.joints) @ robot.reported_matrix.T),
+        time_s=rows(operating.time_s, calibrated.model.time_zero_s),
+        temperature_c=rows(operating.temperature_c, REFERENCE_C),
     )
+
+
+def observations_of(states: States) -> Observations:
+    """The end effector in each state, not measured."""
+    count = len(states)
+    nowhere = np.zeros((count, 3)), np.broadcast_to(np.eye(3), (count, 3, 3))
+    return Observations(states, np.arange(count), np.zeros(count, int), *nowhere)
+
+
+def _parts(count: int) -> list[slice]:
+    return [slice(start, min(start + AT_ONCE, count)) for start in range(0, count, AT_ONCE)]
+
+
+def _square_root(covariance: np.ndarray) -> np.ndarray:
+    """A factor L with L L' the covariance, singular where parameters are held."""
+    values, vectors = np.linalg.eigh(covariance)
+    return vectors * np.sqrt(values.clip(min=0.0))

@@ -18,7 +18,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import STATES_AT_ONCE, Commands, coordinates_at_rest, end_effector, prediction_covariance
+from elastocal.application.calibrated import (
+    AT_ONCE,
+    OperatingConditions,
+    coordinates_at_rest,
+    end_effector,
+    prediction_covariance,
+)
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits, reach_m, refined, within_turns
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
@@ -73,7 +79,7 @@ def corrected(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
-    loads: Commands,
+    operating: OperatingConditions,
     start: np.ndarray | None = None,
     progress: Callable[[int], object] = lambda done: None,
 ) -> Correction:
@@ -85,8 +91,8 @@ def corrected(
         Of six joints or more; of more, joints move as little as possible from where the rigid robot would have them.
     position, rotation : ndarray (N, 3), (N, 3, 3)
         Wanted pose of the last measuring point, m, base axes.
-    loads : Commands
-        Under which each target is reached; its joint angles count for nothing.
+    operating : OperatingConditions
+        Under which each target is reached.
     start : ndarray (N, n), optional
         Joint angles near which each target lies, as the controller reports them, rad: they choose the posture. Without, the
         posture is chosen for the path as a whole, see `along_path`.
@@ -104,10 +110,10 @@ def corrected(
         near = robot.model_angles(start)
         nominal, left = refined(robot, position, rotation, near)
         nominal = within_turns(robot, nominal, near)
-    slices = [slice(first, first + STATES_AT_ONCE) for first in range(0, len(position), STATES_AT_ONCE)]
+    slices = [slice(first, first + AT_ONCE) for first in range(0, len(position), AT_ONCE)]
 
     def of(part: slice) -> Correction:
-        return _corrected(calibrated, position[part], rotation[part], loads.at(part), nominal[part], left[part])
+        return _corrected(calibrated, position[part], rotation[part], operating.part(part), nominal[part], left[part])
 
     parts = []
     with ThreadPoolExecutor(2) as pool:
@@ -121,7 +127,7 @@ def _corrected(
     calibrated: CalibratedRobot,
     position: np.ndarray,
     rotation: np.ndarray,
-    loads: Commands,
+    operating: OperatingConditions,
     nominal: np.ndarray,
     left: np.ndarray,
 ) -> Correction:
@@ -130,7 +136,7 @@ def _corrected(
     length = reach_m(robot)
     scale = np.array([1.0, 1.0, 1.0, length, length, length])
     uncorrected = robot.reported_angles(nominal)
-    coordinates = coordinates_at_rest(calibrated, loads.with_angles(uncorrected))
+    coordinates = coordinates_at_rest(calibrated, uncorrected, operating)
     before = pose_differences(position, rotation, *end_effector(calibrated, coordinates))
     inverse = np.linalg.pinv(jacobians(robot.chain, nominal, robot.chain.end_effector))
     angles, off = nominal.copy(), before.copy()
@@ -144,8 +150,8 @@ def _corrected(
         moving, step = moving[~far], step[~far]
         angles[moving] += step
         coordinates[moving, :joints] += step
-        commands = loads.at(moving).with_angles(robot.reported_angles(angles[moving]))
-        coordinates[moving] = coordinates_at_rest(calibrated, commands, coordinates[moving])
+        commands = robot.reported_angles(angles[moving])
+        coordinates[moving] = coordinates_at_rest(calibrated, commands, operating.part(moving), coordinates[moving])
         reached_pose = end_effector(calibrated, coordinates[moving])
         off[moving] = pose_differences(position[moving], rotation[moving], *reached_pose)
         moving = moving[np.linalg.norm(off[moving] * scale, axis=1) > _CORRECTED_M]
@@ -156,10 +162,10 @@ def _corrected(
     status[singular] = SINGULAR
     status[beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
     status[~reached] = UNREACHABLE
-    commands = loads.with_angles(robot.reported_angles(angles))
-    variances = np.diagonal(prediction_covariance(calibrated, commands, coordinates), axis1=1, axis2=2)
+    commands = robot.reported_angles(angles)
+    variances = np.diagonal(prediction_covariance(calibrated, commands, operating, coordinates), axis1=1, axis2=2)
     return Correction(
-        commands.joint_angles,
+        commands,
         uncorrected,
         before,
         off,

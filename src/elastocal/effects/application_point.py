@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "application_point", "load"
+# The wrench was recorded wrongly; one that is declared for a task is right.
+MOVES_ROBOT = False
 WORDS = "wrong load application point"
 _PARAMETERS = tuple(Parameter(f"shift_{axis}", "m", 0.02) for axis in "xyz")
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "base_compliance", "elastic"
+MOVES_ROBOT = True
 WORDS = "elasticity of the foundation"
 _PARAMETERS = (
     Parameter("horizontal", "m/N", 2e-8, sign=1),

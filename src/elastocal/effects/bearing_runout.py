@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "bearing_runout", "transmission"
+MOVES_ROBOT = True
 WORDS = "bearing runout"
 _ORDERS = (1, 2)
 _WAVES = (("cos", np.cos), ("sin", np.sin))

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "compensator_stiffness", "elastic"
+MOVES_ROBOT = True
 WORDS = "stiffness of the gravity compensator"
 _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad/(N m)", 2e-7 / order) for order in (1, 2) for wave in ("cos", "sin"))
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "compensator_torque", "gravity"
+MOVES_ROBOT = True
 WORDS = "torque of the gravity compensator"
 _PARAMETERS = tuple(Parameter(f"{wave}_{order}q", "rad", 1e-3 / order) for order in (1, 2) for wave in ("cos", "sin"))
 

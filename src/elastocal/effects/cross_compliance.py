@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "cross_compliance", "elastic"
+MOVES_ROBOT = True
 WORDS = "elastic coupling"
 _PARAMETERS = (Parameter("compliance", "rad/(N m)", 2e-7),)
 

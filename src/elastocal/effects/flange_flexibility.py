@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "flange_flexibility", "elastic"
+MOVES_ROBOT = True
 WORDS = "flexibility of the flange"
 # A bolted joint of a tool gives some ten micrometres and a tenth of a milliradian under a kilonewton at half a metre.
 _SHIFTS = tuple(Parameter(f"shift_{axis}", "m/N", 2e-8, sign=1) for axis in "xyz")

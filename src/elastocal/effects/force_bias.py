@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_bias", "load"
+# The wrench was recorded wrongly; one that is declared for a task is right.
+MOVES_ROBOT = False
 WORDS = "zero error of the force sensor"
 _PARAMETERS = tuple(Parameter(f"along_{axis}", "N", 10.0) for axis in "xyz")
 

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_misalignment", "load"
+# The wrench was recorded wrongly; one that is declared for a task is right.
+MOVES_ROBOT = False
 WORDS = "misalignment of the force sensor"
 _PARAMETERS = tuple(Parameter(f"about_{axis}", "rad", 0.02) for axis in "xyz")
 

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "force_scale", "load"
+# The wrench was recorded wrongly; one that is declared for a task is right.
+MOVES_ROBOT = False
 WORDS = "scale error of the force sensor"
 _PARAMETERS = (Parameter("scale", "1", 0.02),)
 
@@ -28,4 +30,4 @@ def candidates(sites: Sites) -> list[Candidate]:
     def displacement(conditions: Conditions) -> Displacements:
         return [dict(enumerate(conditions.joint_deflections(conditions.wrench).T))]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}), of_instruments=True)]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, frozenset({"load"}))]

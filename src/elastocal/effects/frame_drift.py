@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "frame_drift", "drift"
+# Tracker and foot drift alike in the measurements, and a task counts from where the foot stands.
+MOVES_ROBOT = False
 WORDS = "drift of the tracker or of the robot's foot"
 _PARAMETERS = (
     *(Parameter(f"d{axis}", "m/h", 2e-4) for axis in "xyz"),

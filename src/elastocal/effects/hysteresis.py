@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "hysteresis", "gearbox"
+MOVES_ROBOT = True
 WORDS = "hysteresis"
 # The nut of a spindle has some hundredths of a millimetre.
 _TURN, _SHIFT = Parameter("half_width", "rad", 1e-4), Parameter("half_width", "m", 2e-5)

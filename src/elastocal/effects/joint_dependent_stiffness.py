@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_dependent_stiffness", "elastic"
+MOVES_ROBOT = True
 WORDS = "angle-dependent stiffness"
 _PARAMETERS = (Parameter("cos_q", "rad/(N m)", 2e-7), Parameter("sin_q", "rad/(N m)", 2e-7))
 

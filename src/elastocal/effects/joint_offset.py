@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_offset", "geometry"
+MOVES_ROBOT = True
 WORDS = "zero offset"
 _TURN, _SHIFT = Parameter("offset", "rad", 1e-3), Parameter("offset", "m", 1e-3)
 

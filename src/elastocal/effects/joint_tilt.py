@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "joint_tilt", "elastic"
+MOVES_ROBOT = True
 WORDS = "bearing tilt"
 
 

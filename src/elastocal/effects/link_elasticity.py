@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_elasticity", "elastic"
+MOVES_ROBOT = True
 WORDS = "elastic bending and torsion"
 PART = "link"
 DETAIL_WORDS = {"one section": "all of one cross-section"}

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_geometry", "geometry"
+MOVES_ROBOT = True
 WORDS = "geometric error"
 PART = "link"
 _PARAMETERS = tuple(Parameter(f"d{axis}", "m", 1e-3) for axis in "xyz") + tuple(

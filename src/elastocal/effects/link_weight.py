@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "link_weight", "gravity"
+MOVES_ROBOT = True
 WORDS = "gravity sag"
 _OFF_THE_LINE, _ALL_LINKS = "off the line", "all links"
 DETAIL_WORDS = {_OFF_THE_LINE: "centre off the line"}

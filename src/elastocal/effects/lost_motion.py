@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "lost_motion", "gearbox"
+MOVES_ROBOT = True
 WORDS = "lost motion (backlash)"
 _PARAMETERS = (Parameter("half_play", "rad", 1e-4, sign=1),)
 # Of the full torque.

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "motor_eccentricity", "transmission"
+MOVES_ROBOT = True
 WORDS = "motor eccentricity"
 _ORDERS = (1, 2)
 # An eccentric of some milliradians at the motor, over a ratio of a hundred.

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "nest_eccentricity", "geometry"
+# The reflector circles in its nest, and the flange does not.
+MOVES_ROBOT = False
 WORDS = "eccentric nest of the reflector"
 _SIZE_M = 5e-5
 _ORDER, _SAMPLES_PER_PERIOD = 2, 4
@@ -51,8 +53,4 @@ def candidates(sites: Sites) -> list[Candidate]:
         ]
 
     distinct = _SAMPLES_PER_PERIOD * _ORDER
-    return [
-        Candidate(
-            NAME, FAMILY, (), "", parameters, displacement, distinct_angles=distinct, turning=(last + 1,), of_instruments=True
-        )
-    ]
+    return [Candidate(NAME, FAMILY, (), "", parameters, displacement, distinct_angles=distinct, turning=(last + 1,))]

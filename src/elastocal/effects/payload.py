@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "payload", "gravity"
+# It hangs on the flange in tasks as in the campaign, until someone takes it off.
+MOVES_ROBOT = True
 WORDS = "weight of an undeclared payload"
 # A cable package or a forgotten gripper: some share of what the robot may carry, with its centre so far from the flange. Where
 # the rated load is not known, an arm carries about a sixth of its own mass; and where that is not known either, this.

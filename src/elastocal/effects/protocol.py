@@ -6,6 +6,8 @@ An effect is a module of this package with
 - ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
   ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
   behind them;
+- ``MOVES_ROBOT``, whether it moves the robot, so that its tasks feel it, or only what was measured of it: instruments, targets,
+  the set-up;
 - ``candidates(sites)``, which lists where on this robot the effect can act.
 
 Nothing else knows the effects by name: a new module is a new effect.
@@ -151,9 +153,6 @@ class Candidate:
         location are variants of its law, of which only one can hold.
     turning : tuple of int
         Joints with whose angles the law goes, counted from 1, where it belongs to no joint.
-    of_instruments : bool
-        Whether it is a fault of the tracker, of a reflector or of the load cell: part of the measurements and not of where the
-        robot's end effector is.
     """
 
     effect: str
@@ -168,7 +167,6 @@ class Candidate:
     location_name: str = ""
     of_setup: bool = False
     turning: tuple[int, ...] = ()
-    of_instruments: bool = False
 
     @property
     def location(self) -> tuple[int | str, ...]:
@@ -188,6 +186,7 @@ class Effect(Protocol):
     NAME: str
     FAMILY: str
     WORDS: str
+    MOVES_ROBOT: bool
 
     def candidates(self, sites: Sites) -> list[Candidate]:
         """Where on this robot the effect can act."""

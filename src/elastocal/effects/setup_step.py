@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "setup_step", "drift"
+# Tracker and foot step alike in the measurements, and a task counts from where the foot stands.
+MOVES_ROBOT = False
 WORDS = "shift of the set-up between rows"
 _PARAMETERS = (
     *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),

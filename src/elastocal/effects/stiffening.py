@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "stiffening", "gearbox"
+MOVES_ROBOT = True
 WORDS = "gear stiffening"
 # The end of the robot moves by so much under the full torque.
 _MOVED_M = 5e-3

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "temperature_gradient", "drift"
+MOVES_ROBOT = True
 WORDS = "temperature gradient"
 PART = "link"
 DETAIL_WORDS = {

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "thermal_growth", "drift"
+MOVES_ROBOT = True
 WORDS = "thermal growth of the links"
 _PARAMETERS = {
     "temperature": Parameter("expansion", "1/K", 3e-5, sign=1),

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "tracker_scale", "geometry"
+# The tracker shows lengths that the robot does not have.
+MOVES_ROBOT = False
 WORDS = "scale error of the tracker"
 # Twenty kelvins or 70 hPa of air that were not entered in the tracker.
 _PARAMETERS = (Parameter("scale", "m/m", 2e-5),)
@@ -38,4 +40,4 @@ def candidates(sites: Sites) -> list[Candidate]:
         travels = {joint: conditions.joint_angles[:, joint] for joint, slides in enumerate(sites.prismatic) if slides}
         return [longer(sites, np.ones(len(conditions.joint_angles))) | travels]
 
-    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement, of_instruments=True)]
+    return [Candidate(NAME, FAMILY, (), "", _PARAMETERS, displacement)]

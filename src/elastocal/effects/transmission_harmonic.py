@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_harmonic", "transmission"
+MOVES_ROBOT = True
 WORDS = "gear transmission error"
 _BANDS = ((1, 2), (3, 6), (7, 12), (13, 18), (19, 24), (25, 30), (31, 36))
 _SAMPLES_PER_PERIOD = 4

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_order", "transmission"
+MOVES_ROBOT = True
 WORDS = "non-integer gear transmission error"
 _HIGHEST = 18
 # Nearer to an integer than this an order is not distinguishable from it.

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from elastocal.mechanics.sites import Sites
 
 NAME, FAMILY = "transmission_ratio", "transmission"
+MOVES_ROBOT = True
 WORDS = "gear ratio or coupling error"
 _WRIST = 3
 

@@ -147,7 +147,7 @@ def _in_both_frames(
         return [dict(enumerate(angles.T)) for angles in turned]
 
     return [
-        Candidate(name, family, (), frame + how, parameters, law, frozenset({"load"}), of_instruments=True)
+        Candidate(name, family, (), frame + how, parameters, law, frozenset({"load"}))
         for frame, law in (("base axes", in_base), ("flange axes", in_flange))
     ]
 
