@@ -15,7 +15,7 @@ from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
 from elastocal.fitting.parameters import parameters
 from elastocal.io.storage import TableSchema, read_table, write_table
-from elastocal.loop.fit_columns import correlation_columns, estimate_from, parameter_columns
+from elastocal.loop.fit_columns import correlation_columns, covariance_from, estimate_from, parameter_columns
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import CORRELATIONS, PARAMETER_COLUMNS
 
@@ -113,3 +113,21 @@ def test_a_target_at_a_known_place_keeps_that_place_and_is_in_no_table():
     np.testing.assert_array_equal(back.target_offset, [[0.1, 0.0, -0.2]])
     np.testing.assert_array_equal(back.frame_rotation, [np.eye(3)])
     assert back.sessions == (3,) and not back.frame_position.any()
+
+
+def test_the_covariance_comes_back_from_both_tables(tmp_path):
+    model = made_model(
+        chain_of("Tz(0.4) Rz(q1) Tx(0.7) [elbow] Ry(q2) Tx(0.6) [hand]"), TARGET_ON_HAND, rows=3, identified=True
+    )
+    model = model.with_effects([candidates_on(model.sites)["joint_offset@1"]])
+    estimate = made_estimate(model, sessions=(0,), seed=1)
+    count = len(parameters(model, estimate))
+    root = np.random.default_rng(2).standard_normal((count, count))
+    held = np.arange(count) == 1
+    covariance = root @ root.T * np.outer(~held, ~held)
+    fitted = Fit(model, estimate, NOISE, held, covariance, np.ones(1), None, np.zeros((1, 3)), None, None)
+    tables = (
+        there_and_back(tmp_path / "p.parquet", PARAMETERS, parameter_columns(fitted)),
+        there_and_back(tmp_path / "c.parquet", CORRELATIONS, correlation_columns(fitted)),
+    )
+    np.testing.assert_allclose(covariance_from(*tables), covariance, rtol=1e-12, atol=1e-15)

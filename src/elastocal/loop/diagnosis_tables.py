@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
+    from elastocal.fitting.model import Estimate, Model
 
 
 def step_blocks(diagnosis: Diagnosis) -> Iterator[dict[str, np.ndarray | list[str]]]:
@@ -84,17 +85,35 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, n
     -------
     Diagnosis
     """
-    sessions = np.unique(case.observations.states.session)
-    known = {effect.key: effect for effect in case.model.effects} | case.candidates
-    steps = []
-    for number, step in enumerate(facts["steps"]):
-        mine = {name: values[columns["step"] == number] for name, values in columns.items()}
-        effects = tuple(_with_priors(known[key], mine) for key in step["effects"])
-        model = replace(case.model, effects=effects)
-        estimate = estimate_from(mine, model, sessions)
+    steps: list[Step] = []
+    for step in facts["steps"]:
+        model, estimate = step_model(case, facts, columns, len(steps))
         fitted = fit(model, case.observations, noise_from({"noise": step["noise"]}), estimate)
         steps.append(Step(step["name"], step["kind"], fitted))
     return Diagnosis(case, tuple(steps), None, facts["document"])
+
+
+def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:
+    """Model and estimate of one step, without fitting it again.
+
+    Parameters
+    ----------
+    case, facts, columns
+        As in `diagnosis_from`.
+    number : int
+        Of the step, from 0.
+
+    Returns
+    -------
+    model : Model
+        With the priors under which it was fitted.
+    estimate : Estimate
+    """
+    mine = {name: values[columns["step"] == number] for name, values in columns.items()}
+    known = {effect.key: effect for effect in case.model.effects} | case.candidates
+    effects = tuple(_with_priors(known[key], mine) for key in facts["steps"][number]["effects"])
+    model = replace(case.model, effects=effects)
+    return model, estimate_from(mine, model, np.unique(case.observations.states.session))
 
 
 def model_columns(diagnosis: Diagnosis) -> dict[str, np.ndarray | list[str]]:

@@ -45,6 +45,28 @@ def correlation_columns(fitted: Fit) -> dict[str, np.ndarray | list[str]]:
     }
 
 
+def covariance_from(parameters: Mapping[str, np.ndarray], correlations: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The covariance of a fit from its tables, the inverse of `parameter_columns` and `correlation_columns`.
+
+    Parameters
+    ----------
+    parameters, correlations : dict of str to ndarray
+        Columns of one fit.
+
+    Returns
+    -------
+    ndarray (P, P)
+        Zero where held.
+    """
+    names = [f"{owner} {parameter}" for owner, parameter in zip(parameters["owner"], parameters["parameter"], strict=True)]
+    place = {name: number for number, name in enumerate(names)}
+    deviation = np.where(parameters["held"], 0.0, parameters["std_error"])
+    correlation = np.eye(len(names))
+    for one, other, value in zip(correlations["one"], correlations["other"], correlations["correlation"], strict=True):
+        correlation[place[one], place[other]] = correlation[place[other], place[one]] = value
+    return correlation * np.outer(deviation, deviation)
+
+
 def estimate_from(columns: Mapping[str, np.ndarray], model: Model, sessions: Collection[int]) -> Estimate:
     """The estimate of a model from the columns of its parameters.
 

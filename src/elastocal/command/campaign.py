@@ -1,0 +1,35 @@
+"""A diagnosed campaign as the subcommands that use its result find it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.command.checkout import checkout
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from elastocal.loop.calibrated_files import Diagnosed
+
+
+def diagnosed(folder: Path) -> Diagnosed:
+    """A campaign with what its diagnosis found, from the results of the pipeline.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the campaign.
+
+    Returns
+    -------
+    Diagnosed
+
+    Raises
+    ------
+    InputError
+        As `load_diagnosed`.
+    """
+    from elastocal.loop.calibrated_files import load_diagnosed
+
+    top = checkout()
+    return load_diagnosed(folder, top / "config" / "robots", top / "results" / "loop")

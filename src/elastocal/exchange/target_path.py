@@ -1,0 +1,102 @@
+"""A file of wanted poses of the end effector: position and rotation vector in base axes, and what the robot works under.
+
+Columns ``x, y, z`` (m) and ``rx, ry, rz`` (rotation vector, rad) of the last measuring point; ``fx .. mz`` (N, N m) where it is
+loaded; ``q1 .. qn`` (rad, as the controller reports them) near which the robot shall stand; ``approach1 .. approachn``,
+``time_s`` and ``temperature_c`` as in a campaign.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from elastocal.campaigns.importers.csv_columns import read_columns, table
+from elastocal.campaigns.measurements import closest_first
+from elastocal.errors import InputError
+from elastocal.mechanics.components import WRENCH
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+_POSE = ("x", "y", "z", "rx", "ry", "rz")
+_WRENCH = tuple(name for name, _, _ in WRENCH)
+# A position farther from the base than any arm reaches is in other units.
+_FARTHEST_M = 10.0
+
+
+@dataclass(frozen=True)
+class TargetPath:
+    """N wanted poses; None where the file has no such columns.
+
+    Attributes
+    ----------
+    position : ndarray (N, 3)
+        m, base axes.
+    rotation : ndarray (N, 3, 3)
+    start : ndarray (N, n) or None
+        rad.
+    wrench : ndarray (N, 6) or None
+        N, N m.
+    approach : ndarray (N, n) or None
+    time_s, temperature_c : ndarray (N,) or None
+    """
+
+    position: np.ndarray
+    rotation: np.ndarray
+    start: np.ndarray | None
+    wrench: np.ndarray | None
+    approach: np.ndarray | None
+    time_s: np.ndarray | None
+    temperature_c: np.ndarray | None
+
+    def __len__(self) -> int:
+        return len(self.position)
+
+
+def read_target_path(path: str | Path, joints: int) -> TargetPath:
+    """Read and check a file of wanted poses.
+
+    Parameters
+    ----------
+    path : str or Path
+    joints : int
+        Of the robot.
+
+    Returns
+    -------
+    TargetPath
+
+    Raises
+    ------
+    InputError
+        A column that is missing, unknown or there in part, or a cell that is no finite number; a position that no arm reaches.
+    """
+    angles = tuple(f"q{j}" for j in range(1, joints + 1))
+    approach = tuple(f"approach{j}" for j in range(1, joints + 1))
+    known = (*_POSE, *_WRENCH, *angles, *approach, "time_s", "temperature_c")
+    cells = read_columns(path, ",", _POSE, f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes")
+    for name in cells:
+        if name not in known:
+            raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, known))
+
+    def group(names: tuple[str, ...]) -> np.ndarray | None:
+        there = [name for name in names if name in cells]
+        if not there:
+            return None
+        if missing := [name for name in names if name not in cells]:
+            raise InputError(path, "header", f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
+        return table(path, cells, names)
+
+    pose = table(path, cells, _POSE)
+    far = np.abs(pose[:, :3]).max(axis=1) > _FARTHEST_M
+    if far.any():
+        row = int(np.argmax(far))
+        allowed = f"metres, {_FARTHEST_M:g} at most"
+        raise InputError(path, f"row {row + 1}", f"a position of {np.abs(pose[row, :3]).max():g}", allowed)
+    single = [group((name,)) for name in ("time_s", "temperature_c")]
+    time, temperature = (None if column is None else column[:, 0] for column in single)
+    rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
+    return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature)

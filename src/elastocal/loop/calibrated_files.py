@@ -1,0 +1,112 @@
+"""The calibrated robot of a campaign that was diagnosed, from the tables of its diagnosis, without a fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import calibrated_of
+from elastocal.campaigns.columns import columns_of
+from elastocal.errors import InputError
+from elastocal.fitting.case import case_from, noise_from
+from elastocal.io.json_files import read_json
+from elastocal.io.storage import read_table
+from elastocal.loop.diagnosis_tables import final_parameters, step_model
+from elastocal.loop.fit_columns import covariance_from
+from elastocal.loop.loading import load_campaign
+from elastocal.loop.schemas import CORRELATIONS, STEPS, measurements
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.fitting.case import Case
+
+# Of results/loop/<campaign>/.
+DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS = "campaign.json", "training.parquet", "held_out.parquet", "diagnosis.json"
+STEPS_TABLE, CORRELATIONS_TABLE = "steps.parquet", "correlations.parquet"
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """A campaign and what its diagnosis found.
+
+    Attributes
+    ----------
+    name : str
+        Of the campaign.
+    case : Case
+        Of the training poses.
+    calibrated : CalibratedRobot
+        By the final model.
+    verdict : dict
+        As verdict.json, without what held-out poses say.
+    """
+
+    name: str
+    case: Case
+    calibrated: CalibratedRobot
+    verdict: dict[str, Any]
+
+
+def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str | Path) -> Diagnosed:
+    """A campaign that was diagnosed and has not changed since.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `reading.read_campaign`.
+    results : str or Path
+        Holds a folder for each campaign with the tables of its diagnosis.
+
+    Returns
+    -------
+    Diagnosed
+
+    Raises
+    ------
+    InputError
+        Not diagnosed, or changed since.
+    """
+    descriptions, *parts = load_campaign(folder, robots_folder)
+    name = descriptions["campaign"]["campaign"]
+    tables = Path(results) / name
+    again = f"a campaign as it was diagnosed: elastocal diagnose {folder}"
+    if not all(
+        (tables / file).is_file() for file in (DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS, STEPS_TABLE, CORRELATIONS_TABLE)
+    ):
+        raise InputError(folder, "", "no diagnosis of it", again)
+    columns = [columns_of(part) for part in parts]
+    kept = [
+        read_table(tables / file, measurements(part.joint_angles.shape[1]))
+        for file, part in zip((TRAINING, HELD_OUT), parts, strict=True)
+    ]
+    same = _described(read_json(tables / DESCRIPTIONS)) == _described(descriptions)
+    if not (same and all(map(_same, kept, columns))):
+        raise InputError(folder, "", "changes since its diagnosis", again)
+    case = case_from(descriptions, columns[0])
+    facts, steps = read_json(tables / DIAGNOSIS), read_table(tables / STEPS_TABLE, STEPS)
+    last = len(facts["steps"]) - 1
+    model, estimate = step_model(case, facts, steps, last)
+    covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
+    noise = noise_from({"noise": facts["steps"][last]["noise"]})
+    calibrated = calibrated_of(case.campaign.robot, model, estimate, covariance, noise)
+    return Diagnosed(name, case, calibrated, facts["document"])
+
+
+def _described(descriptions: Mapping[str, Any] | None) -> dict[str, Any] | None:
+    """What a campaign says of itself, wherever its folder is."""
+    if descriptions is None:
+        return None
+    return {**descriptions, "source": "", "held_out": _described(descriptions.get("held_out"))}
+
+
+def _same(one: Mapping[str, np.ndarray], other: Mapping[str, Any]) -> bool:
+    def equal(a: np.ndarray, b: np.ndarray) -> bool:
+        return a.shape == b.shape and bool(((a == b) | ((a != a) & (b != b))).all())
+
+    return set(one) == set(other) and all(equal(np.asarray(one[name]), np.asarray(other[name])) for name in one)

@@ -1,0 +1,80 @@
+"""Wanted poses in, joint targets out; nothing is written where a pose cannot be reached."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS, analysed
+from diagnosed_folders import diagnosed_folder
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from elastocal.application.calibrated import forward, nominal_forward
+from elastocal.command import campaign
+from elastocal.command.main import app
+from elastocal.errors import InputError
+from elastocal.loop.calibrated_files import load_diagnosed
+
+BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    """A checkout with a diagnosed campaign in it."""
+    top = tmp_path_factory.mktemp("cell")
+    (top / "config").mkdir()
+    (top / "config" / "robots").symlink_to(ROBOTS)
+    folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
+    (top / "results" / "loop").mkdir()
+    (results / "made").rename(top / "results" / "loop" / "made")
+    return top, folder
+
+
+def path_file(folder: Path, angles: np.ndarray) -> Path:
+    position, rotation = nominal_forward(analysed("kuka"), angles)
+    columns = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
+    path = folder / "path.csv"
+    pd.DataFrame(columns, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(path, index=False)
+    return path
+
+
+def run(monkeypatch, cell, path, *more):
+    monkeypatch.setattr(campaign, "checkout", lambda: cell[0])
+    output = path.with_name("targets.csv")
+    return CliRunner().invoke(app, ["correct", str(cell[1]), str(path), "--output", str(output), *more]), output
+
+
+@pytest.fixture
+def angles():
+    return analysed("kuka").joint_limits.mean(axis=1) + BENT + 0.2 * np.linspace(0, 1, 8)[:, None]
+
+
+def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(monkeypatch, tmp_path, cell, angles):
+    result, output = run(monkeypatch, cell, path_file(tmp_path, angles))
+    assert result.exit_code == 0, result.stderr
+    assert "8 of 8 targets corrected" in result.stderr
+    targets = pd.read_csv(output)
+    robot = load_diagnosed(cell[1], ROBOTS, cell[0] / "results" / "loop").calibrated
+    reached, _ = forward(robot, targets[[f"q{j}" for j in range(1, 7)]].to_numpy())
+    wanted, _ = nominal_forward(robot.robot, angles)
+    np.testing.assert_allclose(reached, wanted, atol=1e-7)
+    missed = np.linalg.norm(wanted - forward(robot, targets[[f"q{j}_uncorrected" for j in range(1, 7)]].to_numpy())[0], axis=1)
+    np.testing.assert_allclose(targets["predicted_error_before_m"], missed, atol=1e-7)
+    assert (targets["status"] == "ok").all()
+    assert (targets["predicted_std_m"] > 0).all()
+
+
+def test_a_pose_out_of_reach_is_named_and_nothing_is_written(monkeypatch, tmp_path, cell, angles):
+    path = path_file(tmp_path, angles)
+    table = pd.read_csv(path)
+    table.loc[2, "x"] = 8.0
+    table.to_csv(path, index=False)
+    result, output = run(monkeypatch, cell, path)
+    assert isinstance(result.exception, InputError)
+    assert "row 3 is unreachable" in str(result.exception)
+    assert not output.exists()
+    result, output = run(monkeypatch, cell, path, "--partial")
+    assert result.exit_code == 0
+    assert pd.read_csv(output)["status"].tolist().count("ok") == 7
+    assert "7 of 8 targets corrected" in result.stderr

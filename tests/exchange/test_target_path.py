@@ -1,0 +1,55 @@
+"""Files of wanted poses: what is in them, and every fault with its row and column."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from support import refused
+
+from elastocal.exchange.target_path import read_target_path
+
+HEADER = "x,y,z,rx,ry,rz"
+ROWS = ["1.0,0.2,0.5,0.1,0.2,0.3", "1.1,0.2,0.5,0.0,0.0,0.0"]
+
+
+def written(folder, header=HEADER, rows=ROWS):
+    path = folder / "path.csv"
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def test_poses_are_read_and_what_is_not_there_is_none(tmp_path):
+    found = read_target_path(written(tmp_path), 6)
+    np.testing.assert_array_equal(found.position, [[1.0, 0.2, 0.5], [1.1, 0.2, 0.5]])
+    np.testing.assert_allclose(Rotation.from_matrix(found.rotation[0]).as_rotvec(), [0.1, 0.2, 0.3])
+    assert found.start is None and found.wrench is None and found.time_s is None
+    assert len(found) == 2
+
+
+def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
+    header = HEADER + ",fx,fy,fz,mx,my,mz,q1,q2,temperature_c"
+    found = read_target_path(written(tmp_path, header, [row + ",1,2,3,4,5,6,0.1,0.2,21" for row in ROWS]), 2)
+    np.testing.assert_array_equal(found.wrench[1], [1, 2, 3, 4, 5, 6])
+    np.testing.assert_array_equal(found.start[0], [0.1, 0.2])
+    np.testing.assert_array_equal(found.temperature_c, [21, 21])
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "key", "words"),
+    [
+        ("x,y,z,rx,ry", "1,0,0,0,0", "header", ["no column 'rz'"]),
+        (HEADER + ",q3", "1,0,0,0,0,0,1", "header", ["unknown column 'q3'"]),
+        (HEADER + ",fx", "1,0,0,0,0,0,1", "header", ["fx without fy, fz"]),
+        (HEADER, "1,0,left,0,0,0", "row 1, column z", ["'left'"]),
+        (HEADER, "1,0,nan,0,0,0", "row 1, column z", ["'nan'"]),
+        (HEADER, "1100,0,0,0,0,0", "row 1", ["1100", "metres"]),
+        (HEADER, "1,0,0,0,0", "row 1", ["5 cells", "6"]),
+    ],
+)
+def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):
+    with refused((tmp_path / "path.csv").as_posix(), key, *words):
+        read_target_path(written(tmp_path, header, [row]), 2)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with refused((tmp_path / "none.csv").as_posix(), "", "No such file"):
+        read_target_path(tmp_path / "none.csv", 6)
