@@ -42,6 +42,13 @@ def test_reported_joints_come_in_radians():
     np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
 
 
+def test_names_of_the_joints_come_and_go_with_the_file():
+    robot = robot_from_document(document(joint_names=["shoulder", "elbow"]))
+    assert robot.joint_names == ("shoulder", "elbow")
+    assert document_of(robot)["joint_names"] == ["shoulder", "elbow"]
+    assert "joint_names" not in document_of(robot_from_document(document()))
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
@@ -49,6 +56,7 @@ def test_reported_joints_come_in_radians():
         ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
         ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
         ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
+        ({"joint_names": ["shoulder"]}, "joint_names", ["1 entries", "each of the 2 joints"]),
         ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 rows of 2 numbers"]),
         ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["and 2 offsets"]),
         ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),

@@ -7,10 +7,12 @@ import sys
 import typer
 
 from elastocal.command.diagnose import diagnose
+from elastocal.command.importing import importing
 from elastocal.errors import InputError
 
 app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.command()(diagnose)
+app.add_typer(importing)
 
 
 @app.callback()

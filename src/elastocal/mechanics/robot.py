@@ -114,6 +114,8 @@ class Robot:
     compensator : Compensator or None
     payload_kg : float or None
         Rated.
+    joint_names : tuple of str or None
+        What others call the joints, as in the URDF file that a robot comes from; None where they have no names.
     """
 
     name: str
@@ -128,6 +130,7 @@ class Robot:
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
+    joint_names: tuple[str, ...] | None = None
 
     @property
     def joints(self) -> int:

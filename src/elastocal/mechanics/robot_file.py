@@ -84,6 +84,7 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
         gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
         compensator=_compensator(document.get("compensator"), n, source),
         payload_kg=document.get("payload_kg"),
+        joint_names=_joint_names(document.get("joint_names"), n, source),
     )
 
 
@@ -100,8 +101,10 @@ def document_of(robot: Robot) -> dict[str, Any]:
     dict
         Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
     """
+    named = {} if robot.joint_names is None else {"joint_names": list(robot.joint_names)}
     document: dict[str, Any] = {
         "name": robot.name,
+        **named,
         "chain": notation(robot.chain),
         "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
         "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
@@ -186,6 +189,14 @@ def _gear_ratio(ratios: Sequence[float | None] | None, joints: int, source: str)
     if len(ratios) != joints:
         raise InputError(source, "gear_ratio", f"{len(ratios)} entries", f"one or null for each of the {joints} joints")
     return tuple(ratios)
+
+
+def _joint_names(names: Sequence[str] | None, joints: int, source: str) -> tuple[str, ...] | None:
+    if names is None:
+        return None
+    if len(names) != joints:
+        raise InputError(source, "joint_names", f"{len(names)} entries", f"one for each of the {joints} joints")
+    return tuple(names)
 
 
 def _compensator(described: Mapping[str, Any] | None, joints: int, source: str) -> Compensator | None:
