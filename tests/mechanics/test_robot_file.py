@@ -8,7 +8,8 @@ from support import refused
 
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot import Compensator, Mass
-from elastocal.mechanics.robot_file import document_of, robot_from_document
+from elastocal.mechanics.robot_file import document_of, joint_count, robot_from_document
+from elastocal.mechanics.usual_values import usual_compliance
 
 TWO_JOINTS = {
     "name": "two joints",
@@ -40,6 +41,29 @@ def test_reported_joints_come_in_radians():
     robot = robot_from_document(document(reported_joints={"matrix": [[1, 0], [1, -1]], "offset_deg": [90, -45]}))
     np.testing.assert_array_equal(robot.reported_matrix, [[1, 0], [1, -1]])
     np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
+
+
+def test_without_limits_a_joint_turns_once_either_way():
+    robot = robot_from_document(document(joint_limits_deg=None))
+    np.testing.assert_allclose(robot.joint_limits, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
+
+
+def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
+    robot = robot_from_document(document(compliance_urad_per_Nm=None, payload_kg=20))
+    np.testing.assert_allclose(robot.compliance, usual_compliance(robot.chain, 20.0), rtol=1e-15)
+    assert not robot.compliance_known and robot_from_document(document()).compliance_known
+    assert "compliance_urad_per_Nm" not in document_of(robot)
+    assert not robot_from_document(document_of(robot)).compliance_known
+
+
+def test_a_track_without_limits_is_refused():
+    described = {key: value for key, value in TRACKED.items() if key != "joint_limits_deg"}
+    with refused("robots/x.yaml", "joint_limits_deg", "T.(q1)", "metres"):
+        robot_from_document(described, "robots/x.yaml")
+
+
+def test_joints_are_counted_without_more_than_the_chain():
+    assert joint_count({"chain": TRACKED["chain"]}) == 3
 
 
 def test_names_of_the_joints_come_and_go_with_the_file():
