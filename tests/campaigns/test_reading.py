@@ -240,3 +240,24 @@ def test_unknown_target_or_sense_is_refused_by_row_and_column(cell, row, column,
     cell.spoil(row, column, entry)
     with refused(cell.measurements, f"row {row}, column {column}", *words):
         cell.read()
+
+
+def test_loads_on_compliances_that_nobody_states_nor_identifies_are_refused(cell):
+    del cell.arm["compliance_urad_per_Nm"]
+    with refused(cell.source, "compliance", "nominal", "arm.yaml", "identify"):
+        cell.read()
+    cell.document["compliance"] = "identify"
+    robot = cell.read().robot
+    assert not robot.compliance_known and (robot.compliance > 0).all()
+
+
+def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_nothing(cell):
+    del cell.arm["compliance_urad_per_Nm"]
+    cell.arm["masses"] = [{"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}]
+    keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
+    cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
+    robot = cell.read().robot
+    np.testing.assert_array_equal(robot.compliance, np.zeros(3))
+    assert robot.masses == () and not robot.compliance_known
+    cell.arm["compliance_urad_per_Nm"] = [1, 2, 3]
+    assert cell.read().robot.masses and cell.read().robot.compliance_known

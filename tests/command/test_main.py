@@ -17,7 +17,14 @@ def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch, capsys):
     assert capsys.readouterr().err == "robot.yaml: chain: found 'X'; allowed: Tz(l1)\n"
 
 
+def callbacks(app):
+    """Functions that an application and the applications inside of it run."""
+    found = [command.callback for command in app.registered_commands]
+    for group in app.registered_groups:
+        found += [group.typer_instance.registered_callback.callback, *callbacks(group.typer_instance)]
+    return found
+
+
 def test_every_module_of_a_subcommand_is_registered():
     modules = {p.stem for p in Path(main.__file__).parent.glob("*.py")} - {"__init__", "main", "checkout", "campaign"}
-    registered = {command.callback.__module__.rpartition(".")[2] for command in main.app.registered_commands}
-    assert modules == registered
+    assert modules == {callback.__module__.rpartition(".")[2] for callback in callbacks(main.app)}

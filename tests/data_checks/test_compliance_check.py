@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from elastocal.data_checks.compliance_check import MOST_OFF_NOMINAL, compliance_warnings
+from elastocal.data_checks.compliance_check import (
+    MOST_OFF_NOMINAL,
+    MOST_OFF_USUAL,
+    compliance_warnings,
+)
 
 NOMINAL = 1e-6 * np.array([0.5, 1.0, 2.0])
 ERROR = 0.02 * NOMINAL
@@ -32,3 +36,11 @@ def test_what_may_be_chance_says_so():
 
 def test_what_was_not_identified_is_not_judged():
     assert compliance_warnings(-NOMINAL, 0.0 * NOMINAL, NOMINAL) == []
+
+
+def test_beside_usual_values_only_what_is_off_by_orders_of_magnitude_is_named():
+    assert compliance_warnings(0.9 * MOST_OFF_USUAL * NOMINAL, ERROR, NOMINAL, known=False) == []
+    (warning,) = compliance_warnings(NOMINAL * [1.0, 1000.0, 1.0], ERROR, NOMINAL, known=False)
+    assert "1e+03 times usual for such a robot" in warning
+    (warning,) = compliance_warnings(NOMINAL * [1.0, -1.0, 1.0], ERROR, NOMINAL, known=False)
+    assert "negative, usual for such a robot 1" in warning

@@ -31,6 +31,11 @@ def test_loads_in_another_unit_are_named_with_its_factor(campaign, factor):
     assert fault.evidence[1] < 0.5 * fault.evidence[0]
 
 
+def test_without_known_compliances_no_unit_is_named(campaign):
+    unknown = replace(campaign, robot=replace(campaign.robot, compliance_known=False))
+    assert find(unknown, scaled(campaign.measurements, 1e-3, 1e-3)) == []
+
+
 def test_the_sentence_names_kilogram_force(campaign):
     (fault,) = find(campaign, scaled(campaign.measurements, 1 / GRAVITY, 1 / GRAVITY))
     assert fault.detail == "the loads look like kilogram-force: measurements fit 9.81 times the written loads"

@@ -50,6 +50,17 @@ def test_the_campaign_is_the_one_described(campaign, config_folder, kuka):
             np.testing.assert_array_equal(getattr(found.measurements, name), values, err_msg=name)
 
 
+def test_a_model_of_rigid_joints_knows_that_no_compliances_are_known(campaign, config_folder):
+    described_ = described(campaign, config_folder)
+    del described_["robot"]["compliance_urad_per_Nm"]
+    described_["robot"]["masses"] = [{"link": 2, "mass_kg": 10, "centre_m": [0.3, 0, 0], "relative_std": 0.2}]
+    case = case_from(described_, columns_of(campaign.measurements))
+    assert not case.model.compliance_known and not case.model.nominal_compliance.any() and not case.model.sites.masses
+    described_["campaign"]["compliance"] = "identify"
+    case = case_from(described_, columns_of(campaign.measurements))
+    assert not case.model.compliance_known and (case.model.nominal_compliance > 0).all() and case.model.sites.masses
+
+
 @pytest.mark.parametrize(("compliance", "springs"), [("identify", ["joint_compliance"]), ("nominal", [])])
 def test_the_model_has_the_declared_effects_and_the_candidates_are_all_others(campaign, config_folder, compliance, springs):
     case = case_of(campaign, config_folder, compliance=compliance, declared=["joint_offset", "hysteresis"])

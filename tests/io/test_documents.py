@@ -136,3 +136,11 @@ def test_error_is_one_line_whatever_goes_into_it():
     assert (error.source, error.key, error.found, error.allowed) == ("file.yaml", "key", "two\nlines", "some\n\n  thing")
     assert str(InputError("file.yaml", "", "nothing", "a file")) == "file.yaml: found nothing; allowed: a file"
     assert isinstance(error, ValueError)
+
+
+@pytest.mark.parametrize("start", ["<robot name='x'>", '\n<?xml version="1.0"?>\n<robot>'])
+def test_a_urdf_for_a_document_is_told_how_it_is_imported(tmp_path, start):
+    path = tmp_path / "robot.yaml"
+    path.write_text(start, encoding="utf-8")
+    with refused(path, "", "XML", "elastocal import urdf"):
+        read_document(path)

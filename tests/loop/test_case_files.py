@@ -61,6 +61,6 @@ def test_a_test_of_another_campaign_has_the_description_of_that_campaign(files, 
 
 def test_measurements_of_a_robot_with_other_joints_are_refused_by_their_file(files, loaded):
     robot = loaded[0]["robot"]
-    write_json(files[0], loaded[0] | {"robot": robot | {"compliance_urad_per_Nm": [1.0] * 7}})
+    write_json(files[0], loaded[0] | {"robot": robot | {"chain": robot["chain"] + " Rz(q7) [more]"}})
     with refused(files[1], ""):
         load_case(*files)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 from support import robot_of
 
-from elastocal.mechanics.robot import with_target_offset
+from elastocal.mechanics.robot import Mass, with_rigid_joints, with_target_offset
 
 
 def test_reported_angles_are_converted_both_ways():
@@ -24,3 +24,10 @@ def test_target_offset_reaches_every_point_and_leaves_the_chain_alone(kuka):
     assert moved.chain.transforms == kuka.chain.transforms
     assert {p.offset_m for p in kuka.chain.points} == {(0.0, 0.0, 0.0)}
     assert with_target_offset(kuka.chain, [0.1, 0.2, 0.3]) == moved.chain
+
+
+def test_rigid_joints_yield_to_nothing():
+    robot = replace(robot_of("Rz(q1) Tx(1) Ry(q2) [A]"), masses=(Mass(2, 1.0, (0.1, 0.0, 0.0), 0.1),))
+    rigid = with_rigid_joints(robot)
+    assert not rigid.compliance.any() and rigid.masses == () and not rigid.compliance_known
+    assert rigid.chain == robot.chain

@@ -8,7 +8,8 @@ from support import refused
 
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot import Compensator, Mass
-from elastocal.mechanics.robot_file import document_of, robot_from_document
+from elastocal.mechanics.robot_file import document_of, joint_count, robot_from_document
+from elastocal.mechanics.usual_values import usual_compliance
 
 TWO_JOINTS = {
     "name": "two joints",
@@ -42,6 +43,36 @@ def test_reported_joints_come_in_radians():
     np.testing.assert_allclose(robot.reported_offset, [np.pi / 2, -np.pi / 4], rtol=1e-15)
 
 
+def test_without_limits_a_joint_turns_once_either_way():
+    robot = robot_from_document(document(joint_limits_deg=None))
+    np.testing.assert_allclose(robot.joint_limits, [[-2 * np.pi, 2 * np.pi]] * 2, rtol=1e-15)
+
+
+def test_without_compliances_the_usual_ones_are_there_as_not_known_and_never_written():
+    robot = robot_from_document(document(compliance_urad_per_Nm=None, payload_kg=20))
+    np.testing.assert_allclose(robot.compliance, usual_compliance(robot.chain, 20.0), rtol=1e-15)
+    assert not robot.compliance_known and robot_from_document(document()).compliance_known
+    assert "compliance_urad_per_Nm" not in document_of(robot)
+    assert not robot_from_document(document_of(robot)).compliance_known
+
+
+def test_a_track_without_limits_is_refused():
+    described = {key: value for key, value in TRACKED.items() if key != "joint_limits_deg"}
+    with refused("robots/x.yaml", "joint_limits_deg", "T.(q1)", "metres"):
+        robot_from_document(described, "robots/x.yaml")
+
+
+def test_joints_are_counted_without_more_than_the_chain():
+    assert joint_count({"chain": TRACKED["chain"]}) == 3
+
+
+def test_names_of_the_joints_come_and_go_with_the_file():
+    robot = robot_from_document(document(joint_names=["shoulder", "elbow"]))
+    assert robot.joint_names == ("shoulder", "elbow")
+    assert document_of(robot)["joint_names"] == ["shoulder", "elbow"]
+    assert "joint_names" not in document_of(robot_from_document(document()))
+
+
 @pytest.mark.parametrize(
     ("changes", "key", "words"),
     [
@@ -49,6 +80,7 @@ def test_reported_joints_come_in_radians():
         ({"compliance_urad_per_Nm": [1, 2, 3]}, "compliance_urad_per_Nm", ["3 entries", "each of the 2 joints"]),
         ({"joint_limits_deg": [[-180, 180], [45, -45]]}, "joint_limits_deg[1]", ["[45, -45]", "[lower, upper]"]),
         ({"joint_limits_deg": [[5, 5], [-45, 45]]}, "joint_limits_deg[0]", ["[5, 5]", "[lower, upper]"]),
+        ({"joint_names": ["shoulder"]}, "joint_names", ["1 entries", "each of the 2 joints"]),
         ({"reported_joints": {"matrix": [[1, 0]]}}, "reported_joints", ["2 rows of 2 numbers"]),
         ({"reported_joints": {"offset_deg": [1, 2, 3]}}, "reported_joints", ["and 2 offsets"]),
         ({"reported_joints": {"matrix": [[1, 0], [1]]}}, "reported_joints", ["2 rows of 2 numbers"]),

@@ -178,3 +178,24 @@ def test_a_file_is_read_as_its_document(tmp_path):
     (tmp_path / "arm.yaml").write_text(str(document("Rz(q1)", 1)), encoding="utf-8")
     with refused((tmp_path / "arm.yaml").as_posix(), "chain"):
         arm_from_file(tmp_path / "arm.yaml")
+
+
+def test_a_file_without_compliances_and_limits_is_of_an_arm_of_usual_ones():
+    described = document()
+    del described["compliance_urad_per_Nm"], described["joint_limits_deg"]
+    arm = arm_from_document(described | {"payload_kg": 50})
+    reach = np.array([np.hypot(0.2, 0.5) + 0.3, 0.3])
+    np.testing.assert_allclose(arm.compliance, 2e-3 / (50 * 9.80665 * reach), rtol=1e-12)
+    np.testing.assert_allclose(arm.limits, [[-2 * np.pi, 2 * np.pi]] * 2)
+    shortest = arm_from_document(described | {"payload_kg": 50, "chain": "Rz(q1) Tx(1) Rz(q2) Tx(0.1) [A]"})
+    np.testing.assert_allclose(shortest.compliance[1], 2e-3 / (50 * 9.80665 * 0.2), rtol=1e-12)
+
+
+def test_names_of_joints_say_nothing_to_the_plant():
+    np.testing.assert_array_equal(arm_of(joint_names=["a", "b"]).axes, arm_of().axes)
+
+
+@pytest.mark.parametrize("chain", ["Tx(q1) Rz(q2) Tx(1) [A]", "Rz(q1) Ry(q2) Tz(1) Ry(-q2) [A]", "Rz(q2) Rz(q1) Tx(1) [A]"])
+def test_drives_that_the_plant_cannot_move_are_refused(chain):
+    with refused("my.yaml", "chain", "R.("):
+        arm_from_document(document(chain), "my.yaml")

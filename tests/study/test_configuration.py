@@ -111,6 +111,12 @@ FAULTY_FILES = {
         "compliance_urad_per_Nm",
         ["2 entries", "1 joints"],
     ),
+    "no compliances": (
+        "robots/arm.yaml",
+        "name: arm\nchain: Rz(q1) Tx(1) [A] Ry(q2) Tx(1) [B]\njoint_limits_deg: [[-180, 180], [-90, 90]]\n",
+        "compliance_urad_per_Nm",
+        ["nothing", "simulate"],
+    ),
     "faulty chain": (
         "robots/arm.yaml",
         "name: arm\nchain: Rz(q1) Tx(l7) [A]\njoint_limits_deg: [[-1, 1]]\ncompliance_urad_per_Nm: [1]\n",

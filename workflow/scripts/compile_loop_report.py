@@ -6,6 +6,7 @@ from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters
 from elastocal.loop.schemas import STEPS, residuals
+from elastocal.mechanics.robot_file import joint_count
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_pages import write_loop_report
 
@@ -14,7 +15,7 @@ from job import Job, run
 
 def compile_loop_report(job: Job) -> None:
     verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
-    joints = len(descriptions["robot"]["compliance_urad_per_Nm"])
+    joints = joint_count(descriptions["robot"])
     rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]
     facts = loop_facts(
         verdict,

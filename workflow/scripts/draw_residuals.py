@@ -5,12 +5,13 @@ from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals as schema
+from elastocal.mechanics.robot_file import joint_count
 
 from job import Job, run
 
 
 def draw_residuals(job: Job) -> None:
-    joints = len(read_json(job.input.descriptions)["robot"]["compliance_urad_per_Nm"])
+    joints = joint_count(read_json(job.input.descriptions)["robot"])
     save(residuals(read_table(job.input.residuals, schema(joints))), job.output.pdf, job.output.png)
 
 

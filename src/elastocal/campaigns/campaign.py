@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
-from elastocal.mechanics.robot import Robot
+from elastocal.mechanics.robot import Robot, with_rigid_joints
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -105,6 +105,7 @@ class Campaign:
     ----------
     name : str
     robot : Robot
+        With rigid joints where `compliance` is nominal and the robot file states none.
     measured : {"position", "pose"}
     frame : {"tracker", "base"}
         tracker: the placement of the base in it is unknown, and another one in each session.
@@ -134,6 +135,8 @@ class Campaign:
 def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
     """A campaign from its parts, which have been checked before.
 
+    Nominal compliances that the robot file does not state leave rigid joints.
+
     Parameters
     ----------
     document : dict
@@ -147,13 +150,15 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
     -------
     Campaign
     """
+    compliance = document.get("compliance", "nominal")
+    rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
-        robot=robot,
+        robot=with_rigid_joints(robot) if rigid else robot,
         measured=document["measured"],
         frame=document["frame"],
         targets=targets_from(document["targets"], robot.chain, source),
-        compliance=document.get("compliance", "nominal"),
+        compliance=compliance,
         declared=tuple(document.get("declared", ())),
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),

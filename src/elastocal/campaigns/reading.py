@@ -21,7 +21,7 @@ from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Collection, Mapping, Sequence
     from typing import Any
 
     from elastocal.campaigns.campaign import Campaign, Target
@@ -62,6 +62,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     table = read_measurements(folder, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets)
     check_measurements(measurements, table, robot, targets, source)
+    _check_compliance(document, robot, robot_path, measurements, source)
     held_out_mask(holdout, measurements, source)
     return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
 
@@ -201,6 +202,16 @@ def folds_of(folder: str | Path, robots_folder: str | Path, number: int, of: int
     """
     pairs = measured_poses(read_campaign(folder, robots_folder).measurements)[0]
     return {"poses": pairs[number - 1 :: of].tolist()}
+
+
+def _check_compliance(
+    document: Mapping[str, Any], robot: Robot, robot_path: Path, measurements: Measurements, source: str
+) -> None:
+    """Refuse loads on a robot whose compliances are neither known nor identified; without loads its joints count as rigid."""
+    nominal = document.get("compliance", "nominal") == "nominal"
+    if nominal and not robot.compliance_known and measurements.wrench.any():
+        found = f"nominal, but no compliance_urad_per_Nm in {robot_path.as_posix()}, and loads"
+        raise InputError(source, "compliance", found, "identify, or nominal with compliance_urad_per_Nm in the robot file")
 
 
 def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:

@@ -17,6 +17,12 @@ if TYPE_CHECKING:
 # Compliances of a robot and those published for its make differ by up to two or so; five is a unit, a sign or another effect
 # that was taken for a joint's.
 MOST_OFF_NOMINAL = 5.0
+# What is usual for a robot's size is itself known to a factor of five.
+MOST_OFF_USUAL = 25.0
+_RIGID = (
+    "the robot file states no joint compliances: the joints are taken as rigid, and do not yield to the weights that it may"
+    " state; load the robot and set compliance to identify, or state them"
+)
 # So many standard errors beyond what robots have are no chance.
 _SURE = 2.0
 
@@ -32,18 +38,26 @@ def fitted_compliance_warnings(fitted: Fit) -> list[str]:
     -------
     list of str
         None where compliances are not identified, nor where measurements are wrong by centimetres: they mean nothing there.
+        That the joints are taken as rigid, where the compliances are not known either.
     """
     model = fitted.model
+    if not model.identifies_compliance and not model.compliance_known:
+        return [_RIGID]
     off = np.sqrt((fitted.residual[:, :3] ** 2).sum(axis=1).mean())
     if not model.identifies_compliance or off > IMPLAUSIBLE_M:
         return []
     mine = [owner == "joint_compliance" for owner, _ in fitted.parameters]
     deviations = np.sqrt(np.diag(fitted.covariance))[mine]
-    return compliance_warnings(joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance)
+    return compliance_warnings(
+        joint_compliances(model, fitted.estimate), deviations, model.nominal_compliance, model.compliance_known
+    )
 
 
 def compliance_warnings(
-    compliance: np.ndarray | Sequence[float], std_error: np.ndarray | Sequence[float], nominal: np.ndarray | Sequence[float]
+    compliance: np.ndarray | Sequence[float],
+    std_error: np.ndarray | Sequence[float],
+    nominal: np.ndarray | Sequence[float],
+    known: bool = True,
 ) -> list[str]:
     """Name the identified joint compliances that are negative, or far off nominal either way.
 
@@ -53,6 +67,8 @@ def compliance_warnings(
         Identified, rad/(N m); standard error 0 where a compliance was not identified.
     nominal : array_like (n,)
         Of the robot file.
+    known : bool
+        Whether it states them; else they are usual ones.
 
     Returns
     -------
@@ -60,10 +76,11 @@ def compliance_warnings(
         One sentence with value and standard error of each, or none.
     """
     compliance, std_error, nominal = (1e6 * np.asarray(values, float) for values in (compliance, std_error, nominal))
-    low, high = nominal / MOST_OFF_NOMINAL, MOST_OFF_NOMINAL * nominal
+    most, word = (MOST_OFF_NOMINAL, "nominal") if known else (MOST_OFF_USUAL, "usual for such a robot")
+    low, high = nominal / most, most * nominal
     beyond = np.maximum(low - compliance, compliance - high)
     named = [
-        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint])}"
+        f"joint {joint + 1} {compliance[joint]:.3g} ± {std_error[joint]:.2g} ({_off(compliance[joint], nominal[joint], word)}"
         f"{'' if beyond[joint] > _SURE * std_error[joint] else ', perhaps by chance'})"
         for joint in np.flatnonzero((std_error > 0) & (beyond > 0))
     ]
@@ -75,5 +92,5 @@ def compliance_warnings(
     ]
 
 
-def _off(value: float, nominal: float) -> str:
-    return f"negative, nominal {nominal:.3g}" if value < 0 else f"{value / nominal:.2g} times nominal"
+def _off(value: float, nominal: float, word: str) -> str:
+    return f"negative, {word} {nominal:.3g}" if value < 0 else f"{value / nominal:.2g} times {word}"

@@ -32,8 +32,8 @@ _WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
 _FAR_WORSE, _UNEXPLAINED = 2.0, 0.5
 _FEWEST_POSES = 4
 _ROUNDING_M = 1e-9
-# Compliances are sought only within these multiples of the nominal ones.
-_RATIOS_OF_ROBOTS = 0.3, 3.0
+# Compliances are sought only within these multiples of the nominal ones, or of those usual for a robot of the size.
+_RATIOS_OF_ROBOTS, _RATIOS_OF_USUAL = (0.3, 3.0), (0.05, 20.0)
 _APART, _REJECTIONS = 6.0, 4
 # Below this share of their square, loads of one pose do not differ.
 _DIFFERING = 1e-6
@@ -210,6 +210,8 @@ class StateDeflections:
         How many were read.
     rows : tuple of tuple of int
         Loaded rows of the file behind each state.
+    compliance_known : bool
+        Whether the robot file states compliances.
     """
 
     wrench: np.ndarray
@@ -218,6 +220,7 @@ class StateDeflections:
     end_jacobian: np.ndarray
     targets: np.ndarray
     rows: tuple[tuple[int, ...], ...]
+    compliance_known: bool = True
 
     def misfits(self, compliance: np.ndarray, seen: np.ndarray | None = None) -> np.ndarray:
         """RMS over the targets of what the load of each state (columns) leaves of the deflections of each state (rows).
@@ -262,7 +265,7 @@ class StateDeflections:
         torques = generalized_forces(self.end_jacobian[states], self.wrench[loads]) * nominal
         left = (self.jacobian[states] * torques[:, None, None, :]).reshape(-1, len(nominal))
         ratios = np.linalg.lstsq(left, self.seen[states].reshape(-1), rcond=1e-6)[0]
-        return nominal * np.clip(ratios, *_RATIOS_OF_ROBOTS)
+        return nominal * np.clip(ratios, *(_RATIOS_OF_ROBOTS if self.compliance_known else _RATIOS_OF_USUAL))
 
 
 def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDeflections | None:
@@ -311,6 +314,7 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
         end[first][loaded],
         both.sum(axis=1)[loaded],
         rows,
+        campaign.robot.compliance_known,
     )
 
 

@@ -28,7 +28,10 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     Returns
     -------
     list of Fault
+        None where the compliances are not known: no size of a deflection is to be expected then.
     """
+    if not campaign.robot.compliance_known:
+        return []
     deflected = deflections(campaign, measurements)
     found = unit_of_loads(deflected) if deflected else None
     if found is None:

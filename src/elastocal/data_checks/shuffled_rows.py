@@ -264,7 +264,7 @@ def _of_loads(campaign: Campaign, measurements: Measurements) -> list[Fault]:
     if states is None or not _FEWEST_IN_PLACE <= len(states.wrench) <= _MOST_STATES:
         return []
     every, nominal = np.arange(len(states.wrench)), campaign.robot.compliance
-    compliance = nominal
+    compliance = nominal if states.compliance_known else states.compliance(every, every, nominal)
     for _ in range(_ROUNDS_OF_COMPLIANCE):
         missed = np.diag(states.misfits(compliance))
         out = missed > _MISSED * states.sizes()

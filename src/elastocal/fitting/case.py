@@ -62,7 +62,7 @@ def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]
     source = descriptions["source"]
     robot = robot_from_document(descriptions["robot"], source)
     campaign = described_campaign(descriptions["campaign"], robot, measurements_from(columns), source)
-    sites = sites_of(robot)
+    sites = sites_of(campaign.robot)
     model = declared_model(campaign, declared_candidates(campaign.declared, sites, source))
     candidates = {key: c for key, c in candidates_on(sites).items() if c.effect not in campaign.declared}
     return Case(campaign, averaged(without_outlying_repeats(campaign.measurements)), model, candidates)

@@ -39,6 +39,8 @@ class Model:
         From which effects count the time: the first measurement to be fitted.
     row_span : (int, int) or None
         First and last row of the measurements to be fitted, between which the campaign made its progress.
+    compliance_known : bool
+        Whether the nominal compliances are those of the robot file; else they are usual ones, or 0 of joints taken as rigid.
     """
 
     sites: Sites
@@ -49,6 +51,7 @@ class Model:
     effects: tuple[Candidate, ...] = ()
     time_zero_s: float = 0.0
     row_span: tuple[int, int] | None = None
+    compliance_known: bool = True
 
     @property
     def identifies_compliance(self) -> bool:
@@ -119,4 +122,5 @@ def declared_model(campaign: Campaign, effects: Iterable[Candidate] = ()) -> Mod
         (*springs, *weight, *effects),
         0.0 if campaign.measurements.time_s is None else float(campaign.measurements.time_s.min()),
         (int(campaign.measurements.row.min()), int(campaign.measurements.row.max())) if len(campaign.measurements) else None,
+        campaign.robot.compliance_known,
     )

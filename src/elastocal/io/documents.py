@@ -43,6 +43,8 @@ _Validator = jsonschema.validators.extend(
     ),
 )
 
+_NOT_XML = "YAML; a URDF becomes a robot file by `elastocal import urdf FILE --base LINK --tip LINK --output robot.yaml`"
+
 
 def read_document(path: str | Path) -> Any:
     """Contents of a YAML file.
@@ -58,11 +60,14 @@ def read_document(path: str | Path) -> Any:
     Raises
     ------
     InputError
-        A file that is missing or is no YAML.
+        A file that is missing or is no YAML, such as a URDF.
     """
     try:
         with open(path, encoding="utf-8") as file:
-            return yaml.load(file, Loader=_Loader)
+            text = file.read()
+        if text.lstrip("\ufeff \r\n\t").startswith("<"):
+            raise InputError(path, "", "XML", _NOT_XML)
+        return yaml.load(text, Loader=_Loader)
     except OSError as error:
         raise InputError(path, "", error.strerror or str(error), "a readable file") from None
     except UnicodeDecodeError as error:

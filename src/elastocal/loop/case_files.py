@@ -8,6 +8,7 @@ from elastocal.fitting.case import Case, case_from
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import measurements
+from elastocal.mechanics.robot_file import joint_count
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,5 +29,5 @@ def load_case(descriptions_path: str | Path, measurements_path: str | Path, part
     """
     descriptions = read_json(descriptions_path)
     described = (part and descriptions[part]) or descriptions
-    joints = len(described["robot"]["compliance_urad_per_Nm"])
+    joints = joint_count(described["robot"], described["source"])
     return case_from(described, read_table(measurements_path, measurements(joints)))

@@ -98,9 +98,9 @@ class Robot:
     name : str
     chain : Chain
     compliance : ndarray (n,)
-        Joint compliances, rad/(N m); of prismatic joints m/N.
+        Joint compliances, rad/(N m); of prismatic joints m/N. Usual ones where they are not known.
     joint_limits : ndarray (n, 2)
-        rad; of prismatic joints m.
+        rad; of prismatic joints m. A turn either way where they are not known.
     links : tuple of Link
         Elastic links of the extended model; empty for the reduced model.
     reported_matrix, reported_offset : ndarray (n, n), (n,)
@@ -114,6 +114,10 @@ class Robot:
     compensator : Compensator or None
     payload_kg : float or None
         Rated.
+    joint_names : tuple of str or None
+        What others call the joints, as in the URDF file that a robot comes from; None where they have no names.
+    compliance_known : bool
+        Whether the compliances are the robot's; else they are a scale for what is to be identified, see `usual_values`.
     """
 
     name: str
@@ -128,6 +132,8 @@ class Robot:
     gear_ratio: tuple[float | None, ...] | None = None
     compensator: Compensator | None = None
     payload_kg: float | None = None
+    joint_names: tuple[str, ...] | None = None
+    compliance_known: bool = True
 
     @property
     def joints(self) -> int:
@@ -161,6 +167,21 @@ class Robot:
         ndarray (N, n)
         """
         return np.linalg.solve(self.reported_matrix, (angles - self.reported_offset).T).T
+
+
+def with_rigid_joints(robot: Robot) -> Robot:
+    """A robot whose joints do not yield, whatever it weighs: what is left of one without known compliances.
+
+    Parameters
+    ----------
+    robot : Robot
+
+    Returns
+    -------
+    Robot
+        Without masses, which turn nothing.
+    """
+    return replace(robot, compliance=np.zeros(robot.joints), masses=(), compliance_known=False)
 
 
 @overload

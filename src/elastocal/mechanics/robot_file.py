@@ -1,6 +1,8 @@
 """A robot from its file and back, with the checks that the file's schema cannot make.
 
-The chain is in the notation of `chain`. A robot file may say what the links weigh::
+The chain is in the notation of `chain`. Without ``joint_limits_deg`` a joint turns once either way; without
+``compliance_urad_per_Nm`` the compliances have to be identified, or the joints count as rigid where nothing loads them. A
+robot file may say what the links weigh::
 
     masses:
       - {link: 2, mass_kg: 190, centre_m: [0.52, 0.0, 0.03], relative_std: 0.1}
@@ -28,6 +30,7 @@ import numpy as np
 from elastocal.errors import InputError
 from elastocal.mechanics.chain import notation, parse_chain, stretches
 from elastocal.mechanics.robot import STANDING, Compensator, Link, Mass, Robot, Tube
+from elastocal.mechanics.usual_values import UNLIMITED_DEG, usual_compliance
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -62,9 +65,6 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     chain = parse_chain(document["chain"], document.get("lengths_m", {}), source)
     _check_reach(chain, "lengths_m" if document.get("lengths_m") else "chain", source)
     n = chain.coordinates
-    if len(document["compliance_urad_per_Nm"]) != n:
-        found = f"{len(document['compliance_urad_per_Nm'])} entries"
-        raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {n} joints")
     reported = document.get("reported_joints", {})
     matrix = reported.get("matrix", np.eye(n).tolist())
     offset = reported.get("offset_deg", [0.0] * n)
@@ -74,8 +74,8 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
     return Robot(
         name=document["name"],
         chain=chain,
-        compliance=1e-6 * np.array(document["compliance_urad_per_Nm"], float),
-        joint_limits=joint_limits(document["joint_limits_deg"], chain, source),
+        compliance=_compliance(document, chain, source),
+        joint_limits=joint_limits(document.get("joint_limits_deg"), chain, source),
         links=_links(chain, document.get("links"), source),
         reported_matrix=np.array(matrix, float),
         reported_offset=np.array(offset, float) * _per_degree(chain),
@@ -84,6 +84,8 @@ def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> R
         gear_ratio=_gear_ratio(document.get("gear_ratio"), n, source),
         compensator=_compensator(document.get("compensator"), n, source),
         payload_kg=document.get("payload_kg"),
+        joint_names=_joint_names(document.get("joint_names"), n, source),
+        compliance_known="compliance_urad_per_Nm" in document,
     )
 
 
@@ -100,12 +102,15 @@ def document_of(robot: Robot) -> dict[str, Any]:
     dict
         Keys as in ``schemas/robot.yaml``; optional ones only where they say something. Lengths stand in the chain as numbers.
     """
+    named = {} if robot.joint_names is None else {"joint_names": list(robot.joint_names)}
     document: dict[str, Any] = {
         "name": robot.name,
+        **named,
         "chain": notation(robot.chain),
         "joint_limits_deg": (robot.joint_limits / _per_degree(robot.chain)[:, None]).tolist(),
-        "compliance_urad_per_Nm": (1e6 * robot.compliance).tolist(),
     }
+    if robot.compliance_known:
+        document["compliance_urad_per_Nm"] = (1e6 * robot.compliance).tolist()
     if (robot.reported_matrix != np.eye(robot.joints)).any() or robot.reported_offset.any():
         offset = (robot.reported_offset / _per_degree(robot.chain)).tolist()
         document["reported_joints"] = {"matrix": robot.reported_matrix.tolist(), "offset_deg": offset}
@@ -122,13 +127,29 @@ def document_of(robot: Robot) -> dict[str, Any]:
     return document
 
 
-def joint_limits(limits_deg: Sequence[Sequence[float]], chain: Chain, source: str) -> np.ndarray:
+def joint_count(document: Mapping[str, Any], source: str = "robot") -> int:
+    """Number of joints of the contents of a robot file.
+
+    Parameters
+    ----------
+    document : mapping
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    int
+    """
+    return parse_chain(document["chain"], document.get("lengths_m", {}), source).coordinates
+
+
+def joint_limits(limits_deg: Sequence[Sequence[float]] | None, chain: Chain, source: str) -> np.ndarray:
     """Joint limits in rad, of prismatic joints in m.
 
     Parameters
     ----------
-    limits_deg : sequence of (float, float)
-        Lower and upper limit of each joint; of prismatic ones in metres.
+    limits_deg : sequence of (float, float) or None
+        Lower and upper limit of each joint; of prismatic ones in metres. None where nothing is known: a turn either way.
     chain : Chain
         Whose joints they are.
     source : str
@@ -141,15 +162,29 @@ def joint_limits(limits_deg: Sequence[Sequence[float]], chain: Chain, source: st
     Raises
     ------
     InputError
-        Where there are too few or too many, or a lower limit is not below the upper one.
+        Where there are too few or too many, a lower limit is not below the upper one, or those of a prismatic joint lack.
     """
     joints = chain.coordinates
+    if limits_deg is None:
+        if any(chain.prismatic):
+            joint = chain.prismatic.index(True) + 1
+            raise InputError(source, "joint_limits_deg", f"nothing, but T.(q{joint})", "[lower, upper], for a track in metres")
+        limits_deg = [UNLIMITED_DEG] * joints
     if len(limits_deg) != joints:
         raise InputError(source, "joint_limits_deg", f"{len(limits_deg)} entries", f"one for each of the {joints} joints")
     for joint, (low, high) in enumerate(limits_deg):
         if low >= high:
             raise InputError(source, f"joint_limits_deg[{joint}]", str([low, high]), "[lower, upper]")
     return np.array(limits_deg, float) * _per_degree(chain)[:, None]
+
+
+def _compliance(document: Mapping[str, Any], chain: Chain, source: str) -> np.ndarray:
+    if "compliance_urad_per_Nm" not in document:
+        return usual_compliance(chain, document.get("payload_kg"))
+    if len(document["compliance_urad_per_Nm"]) != chain.coordinates:
+        found = f"{len(document['compliance_urad_per_Nm'])} entries"
+        raise InputError(source, "compliance_urad_per_Nm", found, f"one for each of the {chain.coordinates} joints")
+    return 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
 
 
 def _per_degree(chain: Chain) -> np.ndarray:
@@ -186,6 +221,14 @@ def _gear_ratio(ratios: Sequence[float | None] | None, joints: int, source: str)
     if len(ratios) != joints:
         raise InputError(source, "gear_ratio", f"{len(ratios)} entries", f"one or null for each of the {joints} joints")
     return tuple(ratios)
+
+
+def _joint_names(names: Sequence[str] | None, joints: int, source: str) -> tuple[str, ...] | None:
+    if names is None:
+        return None
+    if len(names) != joints:
+        raise InputError(source, "joint_names", f"{len(names)} entries", f"one for each of the {joints} joints")
+    return tuple(names)
 
 
 def _compensator(described: Mapping[str, Any] | None, joints: int, source: str) -> Compensator | None:

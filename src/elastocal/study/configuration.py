@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+# What a robot file may leave out and a simulation of the robot needs.
+_SIMULATED = ("joint_limits_deg", "compliance_urad_per_Nm")
+
 
 @dataclass(frozen=True)
 class Study:
@@ -58,6 +61,11 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
     """
     check_document(config, "config", source)
     robots = {name: named_document(folder, "robots", "robot", name, source) for name in config["robots"]}
+    for name, document in robots.items():
+        for key in (key for key in _SIMULATED if key not in document):
+            raise InputError(
+                document_path(folder, "robots", name), key, "nothing", "values to simulate with, in a robot of the study"
+            )
     strategies = {name: named_document(folder, "strategies", "strategy", name, source) for name in config["strategies"]}
     chains = {
         name: robot_from_document(document, document_path(folder, "robots", name)).chain for name, document in robots.items()

@@ -1,0 +1,12 @@
+"""`elastocal import`: what people have, to the files that elastocal reads."""
+
+from __future__ import annotations
+
+import typer
+
+importing = typer.Typer(name="import", no_args_is_help=True)
+
+
+@importing.callback()
+def import_() -> None:
+    """Read what you have: a robot as URDF or Denavit-Hartenberg table, measurements in another CSV format."""
