@@ -7,10 +7,16 @@ FOLDER is the campaign; PATH.csv has the wanted poses and OUT.csv the joint targ
 from the robot file of the campaign, --seed and --effect, and is the same in both.
 """
 
+import argparse
+from pathlib import Path
+
+import numpy as np
 import pandas as pd
 
-from elastocal.blind.rehearsal import filled_sheet
+from elastocal.blind.rehearsal import filled_sheet, hidden_robot, reached
 from elastocal.campaigns.measurements import CSV
+from elastocal.campaigns.reading import read_descriptions
+from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write
 
 
@@ -20,3 +26,34 @@ def measure(given, robot, document):
     with atomic_write(path) as partial:
         filled.to_csv(partial, index=False)
     print(f"{len(filled)} measurements in {path}")
+
+
+def move(given, robot, document):
+    wanted = read_target_path(given.path, robot.arm.joints)
+    targets = pd.read_csv(given.targets)
+    wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
+    for name, ending in (("uncorrected", "_uncorrected"), ("corrected", "")):
+        angles = targets[[f"q{joint}{ending}" for joint in range(1, robot.arm.joints + 1)]].to_numpy()
+        off = 1e3 * np.linalg.norm(reached(robot, angles, wrench, given.seed)[0] - wanted.position, axis=1)
+        print(f"{name:12} position error: RMS {np.sqrt((off**2).mean()):.3f} mm, largest {off.max():.3f} mm")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = parser.add_subparsers(required=True)
+    for run in (measure, move):
+        command = what.add_parser(run.__name__)
+        command.add_argument("folder", type=Path)
+        if run is move:
+            command.add_argument("path", type=Path)
+            command.add_argument("targets", type=Path)
+        command.add_argument("--seed", type=int, default=1)
+        command.add_argument("--effect", action="append", default=[], help="a hidden effect; one is drawn without")
+        command.add_argument("--reveal", action="store_true", help="say what was hidden")
+        command.set_defaults(run=run)
+    given = parser.parse_args()
+    document, robot_file = read_descriptions(given.folder, Path("config/robots"))
+    robot, defects = hidden_robot(robot_file, given.seed, given.effect)
+    given.run(given, robot, document)
+    if given.reveal:
+        print("hidden:", *(f"{defect.effect} {defect.joints or ''}" for defect in defects[-max(len(given.effect), 1) :]))
