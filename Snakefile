@@ -16,6 +16,7 @@ include: "workflow/rules/loop_report.smk"
 include: "workflow/rules/blind.smk"
 include: "workflow/rules/blind_follow_up.smk"
 include: "workflow/rules/blind_report.smk"
+include: "workflow/rules/closed_loop.smk"
 
 
 onsuccess:

@@ -1,0 +1,270 @@
+"""The loop closed on the plant: a robot with a hidden defect is measured, diagnosed, commanded by the result, measured again.
+
+Each wanted pose is commanded five times: as the robot file has the arm, by a calibration of the geometry alone, by the declared
+model (geometry and springs), by the model that the diagnosis found, and by the plant itself, whose equilibrium is inverted by
+Newton's method as `compensation` inverts a model. What the last leaves is the floor: noise of the tracker and repeatability.
+Nobody's model has seen any of these poses.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import OperatingConditions, calibrated_from, nominal_forward
+from elastocal.application.compensation import OK, corrected
+from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, refined
+from elastocal.blind.folders import write_blind_campaign
+from elastocal.blind.rehearsal import ERRORS_OF_GEOMETRY, hidden_robot, reached
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.settings import Settings
+from elastocal.effects.catalogue import declared_candidates
+from elastocal.effects.catalogue import effects as catalogue
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.model import declared_model
+from elastocal.fitting.observations import select_states
+from elastocal.io.storage import Column, TableSchema
+from elastocal.loop.whole import cases_in
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.plant.campaigns import Design, schedule_of, usual_force_N
+from elastocal.plant.defects import KINDS
+from elastocal.plant.drives import Repeatability
+from elastocal.plant.random_numbers import stream
+from elastocal.plant.weights import declared_masses
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from typing import Any
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.diagnosis.diagnose import Diagnosis
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.mechanics.robot import Robot
+    from elastocal.plant.physical_robot import PhysicalRobot
+
+UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
+MODELS = (UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE)
+UNLOADED, LOADED, MILLING = "unloaded", "loaded", "milling"
+PARTS = (UNLOADED, LOADED, MILLING)
+# Wanted poses of each part.
+_POSES, _PATH = 40, 60
+# Share of the joint limits from which they are drawn: what a cell uses.
+_REACH = 0.8
+# On an arm of 140 kg and more; of smaller arms in proportion, as `usual_force_N`.
+_MILLING_N, _USUAL_N = 500.0, 1000.0
+# Of the path over the reach of the arm: 0.5 m on one of 2.5 m.
+_PATH_SHARE = 0.2
+# Postures that are tried for a path that stays within the limits.
+_TRIES = 200
+# Newton's steps on the plant: each leaves a hundredth or less.
+_STEPS = 5
+# Effects by the approach, which no command of a path states.
+_BY_APPROACH = ("hysteresis",)
+_DESIGN = Design(declared=ERRORS_OF_GEOMETRY)
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Poses that the robot shall reach.
+
+    Attributes
+    ----------
+    part : ndarray of str (N,)
+    position, rotation : ndarray (N, 3), (N, 3, 3)
+        m, base axes.
+    wrench : ndarray (N, 6)
+    start : ndarray (N, n)
+        Joint angles of the rigid robot, as the controller shows them, rad.
+    """
+
+    part: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray
+    wrench: np.ndarray
+    start: np.ndarray
+
+
+def schema(joints: int) -> TableSchema:
+    """Every wanted pose, what it was commanded as, and how far the robot missed it."""
+    return TableSchema(
+        "closed_loop",
+        (
+            Column("effect", "text", "", "what the robot has and nobody declared"),
+            Column("seed", "int32", "", "of the case"),
+            Column("verdict", "text", "", "of the diagnosis"),
+            Column("named", "bool", "", "whether the verdict names the effect, alone or with others, and the model has it"),
+            Column("part", "text", "", "unloaded, loaded, or milling: a path under the process force"),
+            Column("model", "text", "", "by which the targets were corrected"),
+            Column("pose", "int32", "", "number of the wanted pose"),
+            *(Column(f"q{j}", "float64", "rad", f"commanded angle of joint {j}") for j in range(1, joints + 1)),
+            Column("reached_error_m", "float64", "m", "distance of where the robot came to rest from the wanted position"),
+            Column("measured_error_m", "float64", "m", "the same as the tracker measures it"),
+            Column("predicted_std_m", "float64", "m", "by the model's covariance and the repeatability; 0 without a model"),
+            Column("corrected", "bool", "", "whether the target could be corrected within limits and off singular postures"),
+        ),
+    )
+
+
+def hidden_effects(robot: PhysicalRobot) -> list[str]:
+    """Defects with which the loop is closed: all that move the robot, need no covariate and can be on this arm."""
+    known = catalogue()
+    return sorted(
+        name
+        for name, kind in KINDS.items()
+        if name in known
+        and known[name].MOVES_ROBOT
+        and not kind.needs
+        and name not in (*ERRORS_OF_GEOMETRY, *_BY_APPROACH)
+        and kind.locations(robot.arm)
+    )
+
+
+def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int) -> dict[str, np.ndarray]:
+    """One robot with one hidden defect, from campaign to corrected targets that were measured.
+
+    Parameters
+    ----------
+    robot_file, robots_folder : str or Path
+    effect : str
+        Hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights.
+    seed : int
+
+    Returns
+    -------
+    dict of str to ndarray
+        One row for each wanted pose and model, columns as `schema` has them.
+    """
+    plant, _ = hidden_robot(robot_file, seed, [effect])
+    training = _measured(plant, robot_file, robots_folder, seed)
+    found = diagnose(training, Settings(), seed)
+    robot = training.campaign.robot
+    wanted = _wanted(robot, plant, seed)
+    operating = OperatingConditions(wanted.wrench)
+    rows = []
+    models = {
+        GEOMETRY: calibrated_from(_geometry(training, found), replace(robot, masses=())),
+        DECLARED: calibrated_from(found.declared, robot),
+        FOUND: calibrated_from(found.final, robot),
+    }
+    for name in MODELS:
+        if name == UNCORRECTED:
+            commands, predicted, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
+        elif name == TRUE:
+            commands, good = _by_plant(plant, robot, wanted, seed)
+            predicted = np.zeros(len(wanted.part))
+        else:
+            commands, predicted, good = _by_model(models[name], wanted, operating)
+        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": predicted, "corrected": good})
+    named = effect in {entry["name"] for entry in found.document["effects"] if entry["adopted"]}
+    head = {"effect": effect, "seed": seed, "verdict": found.document["verdict"], "named": named}
+    count = len(wanted.part)
+    return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
+
+
+def _measured(plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, seed: int) -> Case:
+    """The training part of a campaign of the plant, by way of its folder."""
+    schedule = schedule_of(plant.arm, _DESIGN, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, _DESIGN, schedule, declared_masses(plant.arm))
+        return cases_in(folder, robots_folder)[0]
+
+
+def _geometry(case: Case, found: Diagnosis) -> Fit:
+    """A calibration of the geometry alone: a rigid arm, fitted to where no load acts but its weight."""
+    campaign = case.campaign
+    rigid = replace(
+        campaign, robot=replace(campaign.robot, masses=(), compliance=np.zeros(campaign.robot.joints)), compliance="nominal"
+    )
+    bare = declared_model(rigid)
+    model = bare.with_effects(declared_candidates(campaign.declared, bare.sites, "closed loop"))
+    unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
+    return fit(model, select_states(case.observations, unloaded), found.declared.noise)
+
+
+def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+    draws = stream(seed, "wanted poses")
+    low, high = robot.joint_limits.T
+    force = usual_force_N(plant.arm)
+    angles = low + (high - low) * (0.5 + _REACH * (draws.random((2 * _POSES, robot.joints)) - 0.5))
+    shown = robot.reported_angles(angles)
+    position, rotation = nominal_forward(robot, shown)
+    wrench = np.zeros((2 * _POSES, 6))
+    direction = draws.standard_normal((_POSES, 3))
+    wrench[_POSES:, :3] = force * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    path_position, path_rotation, path_shown = _milling_path(robot, plant, draws)
+    along = np.gradient(path_position, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    # Half against the feed and the rest upwards off the part.
+    process = (force * _MILLING_N / _USUAL_N) * (-np.sqrt(0.5) * along + np.sqrt(0.5) * np.array([0.0, 0.0, 1.0]))
+    return Wanted(
+        np.repeat(PARTS, (_POSES, _POSES, _PATH)),
+        np.concatenate([position, path_position]),
+        np.concatenate([rotation, path_rotation]),
+        np.concatenate([wrench, np.pad(process, ((0, 0), (0, 3)))]),
+        np.concatenate([shown, path_shown]),
+    )
+
+
+def _milling_path(robot: Robot, plant: PhysicalRobot, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A bow in a level plane at one orientation, in a posture that keeps within the limits: positions, rotations, angles."""
+    low, high = robot.joint_limits.T
+    share = np.linspace(-0.5, 0.5, _PATH)[:, None]
+    length = _PATH_SHARE * plant.arm.reach_m
+    for _ in range(_TRIES):
+        middle = (low + (high - low) * (0.5 + 0.5 * (draws.random(robot.joints) - 0.5)))[None]
+        heading = draws.uniform(0.0, 2.0 * np.pi)
+        ahead, aside = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
+        at, turned = nominal_forward(robot, robot.reported_angles(middle))
+        position = at + length * (share * ahead + share**2 * aside)
+        rotation = np.broadcast_to(turned, (_PATH, 3, 3))
+        angles, left = refined(robot, position, rotation, np.repeat(middle, _PATH, axis=0))
+        smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
+        if left.max() < SOLVED_M and not beyond_limits(robot, angles).any() and smooth:
+            return position, rotation, robot.reported_angles(angles)
+    raise RuntimeError(f"{robot.name}: no posture in {_TRIES} in which the path lies within the limits")
+
+
+def _by_model(
+    calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
+    return found.joint_angles, np.hypot(found.std_m, found.repeatability_m), found.status == OK
+
+
+def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Commands by Newton's method on the plant without its chance."""
+    certain = replace(plant, drives=tuple(law for law in plant.drives if not isinstance(law, Repeatability)))
+    commands = wanted.start.copy()
+    inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
+    for _ in range(_STEPS):
+        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+        step = (inverse @ off[..., None])[..., 0]
+        commands = robot.reported_angles(robot.model_angles(commands) + step)
+    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+    return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
+
+
+def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
+    """What the robot does with its commands, with chance of its own."""
+    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
+    read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
+    return {
+        "part": wanted.part,
+        "pose": np.arange(len(wanted.part)),
+        **{f"q{joint}": column for joint, column in enumerate(commands.T, 1)},
+        "reached_error_m": np.linalg.norm(position - wanted.position, axis=1),
+        "measured_error_m": np.linalg.norm(read[:, 0] - wanted.position, axis=1),
+    }
+
+
+def cases(robot_file: str | Path, seed: int, each: int) -> Iterator[tuple[str, int]]:
+    """Hidden effects and seeds of all cases on one robot, `each` of every effect."""
+    for effect in hidden_effects(hidden_robot(robot_file, seed)[0]):
+        for number in range(each):
+            yield effect, int(stream(seed, f"closed loop {Path(robot_file).stem} {effect} {number}").integers(2**31))

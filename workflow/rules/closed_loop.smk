@@ -1,0 +1,51 @@
+"""The loop closed on the plant: measured, diagnosed, commanded by the result and measured again.
+
+`snakemake -j2 closed_loop`. Writes results/closed_loop/{robot}.parquet, every commanded pose, and reports/closed_loop/.
+"""
+
+CLOSED_LOOP = config["closed_loop"]
+
+
+rule close_loop:
+    input:
+        robot="config/robots/{robot}.yaml",
+        sources=sources("close_loop.py"),
+    output:
+        moved="results/closed_loop/{robot}.parquet",
+    log:
+        "results/logs/close_loop/{robot}.log",
+    benchmark:
+        "results/timings/close_loop/{robot}.tsv"
+    params:
+        robots="config/robots",
+        each=CLOSED_LOOP["each"],
+        seed=config["seed"],
+    script:
+        "../scripts/close_loop.py"
+
+
+rule summarize_closed_loop:
+    input:
+        moved=expand(rules.close_loop.output.moved, robot=CLOSED_LOOP["robots"]),
+        robots=expand("config/robots/{robot}.yaml", robot=CLOSED_LOOP["robots"]),
+        sources=sources("summarize_closed_loop.py"),
+    output:
+        errors="reports/closed_loop/cases.csv",
+        summary="reports/closed_loop/closed_loop.csv",
+        goals="reports/closed_loop/goals.csv",
+        figure="reports/closed_loop/closed_loop.pdf",
+        picture="reports/closed_loop/closed_loop.png",
+    log:
+        "results/logs/summarize_closed_loop.log",
+    benchmark:
+        "results/timings/summarize_closed_loop.tsv"
+    params:
+        robots=CLOSED_LOOP["robots"],
+        seed=config["seed"],
+    script:
+        "../scripts/summarize_closed_loop.py"
+
+
+rule closed_loop:
+    input:
+        rules.summarize_closed_loop.output,

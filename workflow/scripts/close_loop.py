@@ -1,0 +1,19 @@
+"""All cases of the closed loop on one robot, as one table."""
+
+from pathlib import Path
+
+from elastocal.blind.closed_loop import cases, closed_loop, schema
+from elastocal.campaigns.reading import read_robot
+from elastocal.io.provenance import provenance
+from elastocal.io.storage import write_table
+
+from job import Job, run
+
+
+def close_loop(job: Job) -> None:
+    robot, robots = job.input.robot, job.params.robots
+    blocks = (closed_loop(robot, robots, *case) for case in cases(robot, job.params.seed, job.params.each))
+    write_table(job.output.moved, schema(read_robot(Path(robot)).joints), blocks, provenance(job.params, **job.wildcards))
+
+
+run(close_loop, snakemake)

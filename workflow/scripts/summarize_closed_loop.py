@@ -1,0 +1,29 @@
+"""Errors of the closed loop: by case, together with intervals, and as a figure."""
+
+from pathlib import Path
+
+from elastocal.blind.closed_loop import schema
+from elastocal.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal.campaigns.reading import read_robot
+from elastocal.figures.closed_loop import closed_loop
+from elastocal.figures.style import save
+from elastocal.io.data_frames import read_frame, write_csv
+
+from job import Job, run
+
+
+def summarize_closed_loop(job: Job) -> None:
+    joints = [read_robot(Path(robot)).joints for robot in job.input.robots]
+    tables = {
+        robot: read_frame(path, schema(count))
+        for robot, path, count in zip(job.params.robots, job.input.moved, joints, strict=True)
+    }
+    errors = case_errors(tables)
+    table = summary(errors, job.params.seed)
+    write_csv(job.output.errors, errors)
+    write_csv(job.output.summary, table)
+    write_csv(job.output.goals, goals(errors))
+    save(closed_loop(table), job.output.figure, job.output.picture)
+
+
+run(summarize_closed_loop, snakemake)
