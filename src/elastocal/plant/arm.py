@@ -206,7 +206,8 @@ def arm_from_document(document: Mapping[str, Any], source: str = "robot") -> Arm
         A word of the chain that is none, a drive that shifts or that stands in two places, or a chain that does not end in a
         measuring point.
     """
-    lengths, stretches, axes = document.get("lengths_m", {}), [], []
+    lengths, stretches = document.get("lengths_m", {}), []
+    axes: list[np.ndarray] = []
     position, rotation, points = np.zeros(3), np.eye(3), []
     for word in document["chain"].split():
         match = _WORD.fullmatch(word)
