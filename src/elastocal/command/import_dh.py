@@ -1,0 +1,55 @@
+"""`elastocal import dh`: a robot file from a Denavit-Hartenberg table."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elastocal.exchange.dh import RELATIVE_STD, robot_from_dh
+from elastocal.exchange.robot_text import refuse_existing, summary, write_robot
+
+
+class Angles(StrEnum):
+    """Units of angles."""
+
+    DEG = "deg"
+    RAD = "rad"
+
+
+class Lengths(StrEnum):
+    """Units of lengths."""
+
+    M = "m"
+    MM = "mm"
+
+
+def dh(
+    file: Annotated[Path, typer.Argument(help="The table, .csv or .yaml.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The robot file to write.")],
+    modified: Annotated[bool, typer.Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
+    angles: Annotated[Angles, typer.Option(help="Unit of columns of angles that do not end in one.")] = Angles.DEG,
+    lengths: Annotated[Lengths, typer.Option(help="Unit of columns of lengths that do not end in one.")] = Lengths.M,
+    name: Annotated[str | None, typer.Option(help="Maker and model; the file's name without.")] = None,
+    mass_std: Annotated[
+        float, typer.Option(min=0.001, help="How well the masses are known: standard deviation over the value.")
+    ] = RELATIVE_STD,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file that is there.")] = False,
+) -> None:
+    """Make a robot file of a Denavit-Hartenberg table, one row for each joint.
+
+    Columns: theta_offset_deg, d_m, a_m, alpha_deg; and if you like joint, type (R, P or F), lower_deg, upper_deg,
+    compliance_urad_per_Nm, mass_kg, cx_m, cy_m, cz_m, point. The first two rows of a UR5e, standard notation:
+
+    joint, theta_offset_deg, d_m, a_m, alpha_deg, type
+
+    1, 0, 0.1625, 0, 90, R
+
+    2, 0, 0, -0.425, 0, R
+    """
+    refuse_existing(output, force)
+    result = robot_from_dh(file, modified, angles.value, lengths.value, name, mass_std)
+    write_robot(result, output)
+    typer.echo("\n".join([*summary(result), f"written: {output.as_posix()}"]))

@@ -1,0 +1,246 @@
+"""A Denavit-Hartenberg table, as CSV or YAML, checked cell by cell.
+
+One row for each joint, or for what is fixed before, between or behind joints::
+
+    joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
+    1,     0,                0.1625, 0,       90,        R
+    2,     0,                0,      -0.425,  0,         R
+    3,     0,                0,      -0.3922, 0,         R
+    4,     0,                0.1333, 0,       90,        R
+    5,     0,                0.0997, 0,       -90,       R
+    6,     0,                0.0996, 0,       0,         R
+
+is a UR5e in the standard notation. ``type`` is R (revolute, also where the column is left out), P (prismatic) or F (fixed). A
+column of angles or lengths may end in ``_deg``, ``_rad``, ``_m`` or ``_mm``; without, an option says which. In radians ``pi/2``
+may stand for a number. Optional columns: ``lower`` and ``upper`` (joint limits; of prismatic joints lengths),
+``compliance_urad_per_Nm``, ``mass_kg`` with ``cx``, ``cy``, ``cz`` (centre of mass in the frame of the row), and ``point``
+(name of a measuring point at the frame of the row). In YAML the table is a list of rows with the same keys.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from elastocal.campaigns.measurements import closest_first
+from elastocal.errors import InputError
+from elastocal.io.documents import read_document
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+ANGLE_UNITS = {"deg": math.radians(1.0), "rad": 1.0}
+LENGTH_UNITS = {"m": 1.0, "mm": 1e-3}
+REVOLUTE, PRISMATIC, FIXED = "R", "P", "F"
+_ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "cz"), ("lower", "upper")
+_PLAIN = ("compliance_urad_per_Nm", "mass_kg")
+_WORDS = ("joint", "type", "point")
+_NEEDED = ("d", "a", "alpha")
+_PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.IGNORECASE)
+_COMMENT = "#"
+
+
+@dataclass(frozen=True)
+class DhRow:
+    """One row, in SI units.
+
+    Attributes
+    ----------
+    where : str
+        Line or row of the file, for messages.
+    joint : str
+        As the table calls it; empty where it does not.
+    kind : {"R", "P", "F"}
+    theta, d, a, alpha : float
+        rad and m; theta of a revolute joint is the offset that is added to its angle, d of a prismatic one to its shift.
+    limits : (float, float) or None
+        rad, of a prismatic joint m.
+    compliance : float or None
+        µrad/(N m), of a prismatic joint µm/N.
+    mass_kg : float or None
+    centre_m : (float, float, float)
+        In the frame of the row.
+    point : str
+        Measuring point at the frame of the row; empty for none.
+    """
+
+    where: str
+    joint: str
+    kind: str
+    theta: float
+    d: float
+    a: float
+    alpha: float
+    limits: tuple[float, float] | None
+    compliance: float | None
+    mass_kg: float | None
+    centre_m: tuple[float, float, float]
+    point: str
+
+
+def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m") -> list[DhRow]:
+    """Rows of a Denavit-Hartenberg table.
+
+    Parameters
+    ----------
+    path : str or Path
+        Ends in ``.csv``, ``.yaml`` or ``.yml``.
+    angles : {"deg", "rad"}
+        Of columns that do not say.
+    lengths : {"m", "mm"}
+        Of columns that do not say.
+
+    Returns
+    -------
+    list of DhRow
+
+    Raises
+    ------
+    InputError
+        File, line and column of what cannot be read.
+    """
+    source = Path(path).as_posix()
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".csv", ".yaml", ".yml"):
+        raise InputError(source, "", f"a file that ends in {suffix or 'nothing'!r}", ".csv, .yaml or .yml")
+    columns, table = _csv_rows(path, source) if suffix == ".csv" else _yaml_rows(path, source)
+    meanings = _meanings(columns, angles, lengths, source)
+    rows = [_row(where, cells, meanings, source) for where, cells in table]
+    if not any(row.kind != FIXED for row in rows):
+        raise InputError(source, "", "no joint", "a row of type R or P for each joint")
+    return rows
+
+
+@dataclass(frozen=True)
+class _Meaning:
+    """What a column holds: its name without the unit, and what one of it is in SI units; of angles in degrees or radians."""
+
+    name: str
+    angle: str
+    length: str
+
+
+def _csv_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+    try:
+        with open(path, encoding="utf-8-sig", newline="") as file:
+            lines = [(number, line) for number, line in enumerate(file, 1) if line.strip() and not line.startswith(_COMMENT)]
+    except OSError as error:
+        raise InputError(source, "", error.strerror or str(error), "a readable file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(source, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    if not lines:
+        raise InputError(source, "", "an empty file", "a header and one row for each joint")
+    separator = ";" if ";" in lines[0][1] else ","
+    cells = [[cell.strip() for cell in row] for row in csv.reader((line for _, line in lines), delimiter=separator)]
+    header, table = cells[0], []
+    for (number, _), row in zip(lines[1:], cells[1:], strict=False):
+        if len(row) != len(header):
+            raise InputError(source, f"line {number}", f"{len(row)} cells", f"{len(header)}, one for each column")
+        table.append((f"line {number}", dict(zip(header, row, strict=True))))
+    return header, table
+
+
+def _yaml_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+    rows = read_document(path)
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, dict) for row in rows):
+        raise InputError(source, "", type(rows).__name__, "a list of rows, such as `- {d_m: 0.1, a_m: 0, alpha_deg: 90}`")
+    columns = list(dict.fromkeys(str(name) for row in rows for name in row))
+    table = [(f"row {number}", {str(name): cell for name, cell in row.items()}) for number, row in enumerate(rows, 1)]
+    return columns, table
+
+
+def _meanings(columns: Sequence[str], angles: str, lengths: str, source: str) -> dict[str, _Meaning]:
+    """What each column is, by its name."""
+    found: dict[str, _Meaning] = {}
+    for column in columns:
+        name, _, unit = column.rpartition("_")
+        if unit in ANGLE_UNITS and name in (*_ANGLES, *_LIMITS):
+            meaning = _Meaning(name, unit, lengths)
+        elif unit in LENGTH_UNITS and name in (*_LENGTHS, *_LIMITS):
+            meaning = _Meaning(name, angles, unit)
+        elif column in (*_ANGLES, *_LENGTHS, *_LIMITS, *_PLAIN, *_WORDS):
+            meaning = _Meaning(column, angles, lengths)
+        else:
+            known = ["joint", "theta_offset_deg", "d_m", "a_m", "alpha_deg", "type", "lower_deg", "upper_deg", *_PLAIN]
+            raise InputError(source, "header", repr(column), closest_first(column, [*known, "cx_m", "cy_m", "cz_m", "point"]))
+        if any(meaning.name == other.name for other in found.values()):
+            raise InputError(source, "header", f"{meaning.name} twice", "each column once")
+        found[column] = meaning
+    for name in _NEEDED:
+        if not any(meaning.name == name for meaning in found.values()):
+            raise InputError(source, "header", f"no column {name}", "theta_offset, d, a and alpha, such as d_m or d_mm")
+    return found
+
+
+def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning], source: str) -> DhRow:
+    column_of = {meaning.name: column for column, meaning in meanings.items()}
+
+    def text(name: str) -> str:
+        cell = cells.get(column_of.get(name, ""))
+        return "" if cell is None else str(cell).strip()
+
+    kind = (text("type") or REVOLUTE).upper()[:1]
+    if kind not in (REVOLUTE, PRISMATIC, FIXED):
+        raise InputError(source, f"{where}, type", repr(text("type")), "R (revolute), P (prismatic) or F (fixed)")
+
+    def number(name: str) -> float | None:
+        """In SI units; None where nothing stands."""
+        if not text(name):
+            return None
+        column, meaning = column_of[name], meanings[column_of[name]]
+        turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
+        value = _number(text(name), turns and meaning.angle == "rad")
+        if value is None:
+            raise InputError(source, f"{where}, {column}", repr(text(name)), "a number")
+        if name in _PLAIN:
+            if not value > 0:
+                raise InputError(source, f"{where}, {column}", text(name), "more than 0")
+            return value
+        if turns:
+            return value * ANGLE_UNITS[meaning.angle]
+        return value * LENGTH_UNITS[meaning.length]
+
+    for name in _NEEDED:
+        if not text(name):
+            raise InputError(source, f"{where}, {column_of[name]}", "nothing", "a number")
+    low, high = number("lower"), number("upper")
+    if (low is None) != (high is None) or (low is not None and high is not None and low >= high):
+        raise InputError(source, f"{where}, lower and upper", f"{text('lower') or 'nothing'} to {text('upper') or 'nothing'}",
+                         "both limits, the lower one first, or none")  # fmt: skip
+    mass, centre = number("mass_kg"), [number(name) for name in ("cx", "cy", "cz")]
+    if mass is None and any(part is not None for part in centre):
+        raise InputError(source, f"{where}, mass_kg", "nothing, but a centre", "the mass in kg")
+    if mass is not None and None in centre:
+        raise InputError(source, f"{where}, cx, cy, cz", "no centre of the mass", "three numbers, in the frame of the row")
+    x, y, z = (part or 0.0 for part in centre)
+    return DhRow(
+        where,
+        text("joint"),
+        kind,
+        number("theta_offset") or 0.0,
+        number("d") or 0.0,
+        number("a") or 0.0,
+        number("alpha") or 0.0,
+        None if low is None or high is None else (low, high),
+        number("compliance_urad_per_Nm"),
+        mass,
+        (x, y, z),
+        text("point"),
+    )
+
+
+def _number(text: str, of_pi: bool) -> float | None:
+    """A number, or in radians a multiple of pi; None for anything else."""
+    match = _PI.fullmatch(text.replace(" ", "")) if of_pi else None
+    if match:
+        sign, factor, divisor = match.groups()
+        return (-1.0 if sign == "-" else 1.0) * float(factor or 1) * math.pi / float(divisor or 1)
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in text else None

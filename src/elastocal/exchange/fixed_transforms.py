@@ -1,0 +1,128 @@
+"""Fixed transforms as words of the chain notation, see `mechanics.chain`.
+
+A rigid displacement becomes ``Tx Ty Tz Rz Ry Rx``, the rotation by yaw, pitch and roll; what is zero is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+# Picometres, and as many degrees: a chain of any length keeps to far less than a nanometre, and cos(90 deg) is no length.
+_DECIMALS = 12
+
+
+def displacement_words(transform: np.ndarray) -> list[str]:
+    """A homogeneous transform in words.
+
+    Parameters
+    ----------
+    transform : ndarray (4, 4)
+
+    Returns
+    -------
+    list of str
+    """
+    yaw, pitch, roll = yaw_pitch_roll(transform[:3, :3])
+    shifts = [shift_word(axis, amount) for axis, amount in zip("xyz", transform[:3, 3], strict=True)]
+    return _there([*shifts, turn_word("z", yaw), turn_word("y", pitch), turn_word("x", roll)])
+
+
+def turned_axis(axis: np.ndarray) -> tuple[list[str], str, str, list[str]]:
+    """A joint's axis as one of the chain's, between a fixed rotation and its inverse where it is oblique.
+
+    Parameters
+    ----------
+    axis : ndarray (3,)
+        Not zero.
+
+    Returns
+    -------
+    before : list of str
+        Words of the rotation that turns z into the axis, empty for x, y and z.
+    letter, sign : str
+        Of the axis then, and "-" or "".
+    after : list of str
+        Words of the rotation back.
+    """
+    before, letter, sign = _aligned(axis)
+    return _words_of(before), letter, sign, _words_of([(name, -angle) for name, angle in reversed(before)])
+
+
+def axis_rotation(axis: np.ndarray) -> np.ndarray:
+    """The fixed rotation before a joint about an axis, as in `turned_axis`, ndarray (3, 3)."""
+    turn = np.eye(3)
+    for name, angle in _aligned(axis)[0]:
+        turn = turn @ rotation_about(name, math.radians(_rounded(math.degrees(angle))))
+    return turn
+
+
+def _aligned(axis: np.ndarray) -> tuple[list[tuple[str, float]], str, str]:
+    unit = np.asarray(axis, float) / np.linalg.norm(axis)
+    along = int(np.argmax(np.abs(unit)))
+    if np.abs(np.delete(unit, along)).max() < 10.0**-_DECIMALS:
+        return [], "xyz"[along], "-" if unit[along] < 0 else ""
+    return [("z", math.atan2(unit[1], unit[0])), ("y", math.atan2(math.hypot(unit[0], unit[1]), unit[2]))], "z", ""
+
+
+def _words_of(turns: Iterable[tuple[str, float]]) -> list[str]:
+    return _there([turn_word(name, angle) for name, angle in turns])
+
+
+def shift_word(letter: str, amount_m: float) -> str | None:
+    """``Tx(0.5)``; None for nothing."""
+    return _word(f"T{letter}", amount_m, "")
+
+
+def turn_word(letter: str, angle_rad: float) -> str | None:
+    """``Rx(90deg)``; None for nothing."""
+    return _word(f"R{letter}", math.degrees(angle_rad), "deg")
+
+
+def yaw_pitch_roll(rotation: np.ndarray) -> tuple[float, float, float]:
+    """Angles of R = Rz(yaw) Ry(pitch) Rx(roll), rad.
+
+    Near a pitch of 90 deg yaw and roll are not separate; the roll is read of what the yaw leaves, so that the product is right.
+
+    Parameters
+    ----------
+    rotation : ndarray (3, 3)
+
+    Returns
+    -------
+    yaw, pitch, roll : float
+    """
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0]) if level > 10.0**-_DECIMALS else 0.0
+    rest = rotation_about("z", -yaw) @ rotation
+    return yaw, math.atan2(-rotation[2, 0], level), math.atan2(-rest[1, 2], rest[1, 1])
+
+
+def rotation_about(letter: str, angle_rad: float) -> np.ndarray:
+    """Rotation matrix about x, y or z, ndarray (3, 3)."""
+    c, s = math.cos(angle_rad), math.sin(angle_rad)
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[letter]
+    turn = np.eye(3)
+    turn[first, first] = turn[second, second] = c
+    turn[first, second], turn[second, first] = -s, s
+    return turn
+
+
+def _rounded(amount: float) -> float:
+    return round(amount, _DECIMALS)
+
+
+def _word(name: str, amount: float, unit: str) -> str | None:
+    amount = _rounded(amount)
+    if amount == 0:
+        return None
+    return f"{name}({'-' if amount < 0 else ''}{np.format_float_positional(abs(amount), trim='-')}{unit})"
+
+
+def _there(words: Iterable[str | None]) -> list[str]:
+    return [word for word in words if word is not None]

@@ -1,0 +1,199 @@
+"""A robot file as text that a person reads: where it came from, keys in their usual order, a line for each joint's mass."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import textwrap
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from elastocal.errors import InputError
+from elastocal.io.atomic_writes import write_text
+from elastocal.io.documents import check_document
+from elastocal.mechanics.robot_file import robot_from_document
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.mechanics.robot import Robot
+
+_WIDTH = 128
+_INDENT = "  "
+_ORDER = (
+    "name",
+    "joint_names",
+    "chain",
+    "lengths_m",
+    "joint_limits_deg",
+    "compliance_urad_per_Nm",
+    "reported_joints",
+    "payload_kg",
+    "gear_ratio",
+    "compensator",
+    "gravity_m_s2",
+    "masses",
+)
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A robot that was read of a file of another kind.
+
+    Attributes
+    ----------
+    document : dict
+        Contents of its robot file.
+    robot : Robot
+        The same, as it is used.
+    origin : str
+        Where it came from: file, digest and options, in a sentence.
+    notes : tuple of str
+        What is to be known of it, and what it lacks.
+    """
+
+    document: dict[str, Any]
+    robot: Robot
+    origin: str
+    notes: tuple[str, ...]
+
+
+def imported(document: dict[str, Any], path: str | Path, options: str, notes: Sequence[str]) -> Imported:
+    """Check the contents of a robot file that were made from another file.
+
+    Parameters
+    ----------
+    document : dict
+    path : str or Path
+        The other file.
+    options : str
+        How it was read.
+    notes : sequence of str
+
+    Returns
+    -------
+    Imported
+
+    Raises
+    ------
+    InputError
+        Where the robot is none that a robot file may describe.
+    """
+    source = Path(path).as_posix()
+    check_document(document, "robot", source)
+    robot = robot_from_document(document, source)
+    digest = hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    missing = (
+        [] if robot.compliance_known else ["no compliances: set `compliance: identify` in campaign.yaml, or write them here"]
+    )
+    missing += [] if robot.payload_kg is not None else ["no rated load (payload_kg)"]
+    origin = f"From {Path(path).name} (sha256 {digest[:16]}), {options}."
+    return Imported(document, robot, origin, (*notes, *missing))
+
+
+def robot_text(result: Imported) -> str:
+    """The text of a robot file.
+
+    Parameters
+    ----------
+    result : Imported
+
+    Returns
+    -------
+    str
+    """
+    head = [line for text in (result.origin, *map(_sentence, result.notes)) for line in _comment(text)]
+    body = [line for key in _ORDER if key in result.document for line in _lines(key, result.document[key])]
+    return "\n".join([*head, *body]) + "\n"
+
+
+def write_robot(result: Imported, path: str | Path) -> None:
+    """Write a robot file; it appears whole or not at all.
+
+    Parameters
+    ----------
+    result : Imported
+    path : str or Path
+
+    Raises
+    ------
+    InputError
+        A place that cannot be written to.
+    """
+    try:
+        write_text(path, robot_text(result))
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a place for a file") from None
+
+
+def summary(result: Imported) -> list[str]:
+    """What was read, and what is to be known of it, in a few lines.
+
+    Parameters
+    ----------
+    result : Imported
+
+    Returns
+    -------
+    list of str
+    """
+    robot = result.robot
+    shifts = sum(robot.chain.prismatic)
+    kinds = f"{robot.joints} joints" + (f", {shifts} of them prismatic" if shifts else "")
+    reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
+    weight = math.fsum(mass.mass_kg for mass in robot.masses)
+    return [
+        f"{robot.name}: {kinds}, {reach:.4g} m stretched out{f', {weight:.4g} kg' if robot.masses else ''}",
+        f"measuring points: {', '.join(point.name for point in robot.chain.points)}",
+        *(f"note: {note}" for note in result.notes),
+    ]
+
+
+def _sentence(note: str) -> str:
+    return f"{note[:1].upper()}{note[1:]}."
+
+
+def _comment(text: str) -> list[str]:
+    """Comment lines; whatever a file's name holds stays inside of them."""
+    plain = "".join(character if character.isprintable() else "?" for character in text)
+    return textwrap.wrap(plain, _WIDTH, initial_indent="# ", subsequent_indent="# ", break_on_hyphens=False)
+
+
+def _lines(key: str, value: Any) -> list[str]:
+    if key == "chain":
+        return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT, **_WHOLE_WORDS)]
+    if key == "masses":
+        return ["masses:", *(f"{_INDENT}- {_flow(entry)}" for entry in value)]
+    if key == "joint_limits_deg":
+        return textwrap.wrap(f"{key}: {_flow(value)}", _WIDTH, subsequent_indent=_INDENT, **_WHOLE_WORDS)
+    return [f"{key}: {_flow(value)}"]
+
+
+_WHOLE_WORDS: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": False}
+
+
+def _flow(value: Any) -> str:
+    text = yaml.safe_dump(value, default_flow_style=True, width=math.inf, sort_keys=False, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
+def refuse_existing(path: str | Path, force: bool) -> None:
+    """Refuse a path where something is already.
+
+    Parameters
+    ----------
+    path : str or Path
+    force : bool
+        Whether a file there may be replaced.
+
+    Raises
+    ------
+    InputError
+    """
+    if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
+        raise InputError(path, "", "no place for a file", "a file in a folder that is there")
+    if Path(path).exists() and not force:
+        raise InputError(path, "", "a file that is there already", "another --output, or --force to replace it")

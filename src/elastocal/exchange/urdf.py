@@ -1,0 +1,103 @@
+"""A URDF to the contents of a robot file."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.errors import InputError
+from elastocal.exchange.robot_text import imported
+from elastocal.exchange.urdf_chain import chain_between
+from elastocal.exchange.urdf_reading import read_urdf
+from elastocal.exchange.urdf_weights import RELATIVE_STD, gravity_in_base, weights_of
+from elastocal.mechanics.usual_values import UNLIMITED_DEG
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from yourdfpy import URDF, Joint
+
+    from elastocal.exchange.robot_text import Imported
+
+# Limits to a billionth of a degree, or to a nanometre.
+_DECIMALS = 9
+# An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
+_NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
+
+
+def robot_from_urdf(
+    path: str | Path, base: str, tip: str, points: Sequence[str] = (), relative_std: float = RELATIVE_STD
+) -> Imported:
+    """The robot between two links of a URDF.
+
+    Parameters
+    ----------
+    path : str or Path
+    base, tip : str
+        Links: the robot's base frame, and its last measuring point.
+    points : sequence of str
+        Links between them that become measuring points too.
+    relative_std : float
+        How well the masses are known.
+
+    Returns
+    -------
+    Imported
+        Joint limits of continuous joints are a turn either way; compliances are none, for a URDF has none.
+
+    Raises
+    ------
+    InputError
+        As in `read_urdf` and `chain_between`; a prismatic joint without limits.
+    """
+    urdf, source = read_urdf(path), str(path)
+    chain = chain_between(urdf, base, tip, points, source)
+    weights = weights_of(urdf, chain, relative_std)
+    gravity = gravity_in_base(urdf, base)
+    notes = list(weights.notes)
+    limits = [_limits(joint, notes, source) for joint in chain.joints]
+    document: dict[str, Any] = {
+        "name": urdf.robot.name,
+        "joint_names": [joint.name for joint in chain.joints],
+        "chain": chain.notation,
+        "joint_limits_deg": limits,
+    }
+    if gravity is not None:
+        document["gravity_m_s2"] = gravity
+        notes.append(f"gravity as at {base!r} where the root of the tree stands upright and the joints before it are at zero")
+    if weights.masses:
+        document["masses"] = weights.masses
+        notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
+    if few := _few_digits(urdf, [joint.child for joint in urdf.robot.joints if joint.child in chain.links]):
+        notes.append(f"nearly right angles stay as they are written, with few digits: those of {few}")
+    return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
+
+
+def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
+    """Degrees, of prismatic joints metres."""
+    limit = joint.limit
+    low, high = (0.0, 0.0) if limit is None else (limit.lower or 0.0, limit.upper or 0.0)
+    prismatic = joint.type == "prismatic"
+    if joint.type == "continuous" and low >= high:
+        return list(UNLIMITED_DEG)
+    if low >= high and prismatic:
+        allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
+        raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed)
+    if low >= high:
+        notes.append(f"joint {joint.name!r} has no limits in the URDF: a turn either way")
+        return list(UNLIMITED_DEG)
+    return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]
+
+
+def _few_digits(urdf: URDF, children: Sequence[str]) -> str:
+    """Joints of the chain with a rotation that is a right angle but for the digits it was written with."""
+    named = []
+    for joint in urdf.robot.joints:
+        if joint.child in children and joint.origin is not None:
+            off = np.abs(joint.origin[:3, :3] - np.round(joint.origin[:3, :3]))
+            if _EXACTLY_RAD < off.max() < _NEARLY_RAD:
+                named.append(joint.name)
+    return ", ".join(named)

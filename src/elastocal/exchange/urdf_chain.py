@@ -1,0 +1,217 @@
+"""The serial chain between two links of a URDF, in the notation of `mechanics.chain`.
+
+A joint of a URDF is a fixed transform (``origin``), and then a rotation about or a translation along an axis. The transform
+becomes ``Tx Ty Tz Rz Ry Rx``; an axis that is not x, y or z is turned into z and back, ``Rz Ry Rz(q1) Ry Rz``. A joint that
+mimics another one of the chain, by +1 or -1, stands in the chain as a passive joint ``Ry(-q2)``.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.campaigns.measurements import closest_first
+from elastocal.errors import InputError
+from elastocal.exchange.fixed_transforms import (
+    axis_rotation,
+    displacement_words,
+    rotation_about,
+    shift_word,
+    turn_word,
+    turned_axis,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from yourdfpy import URDF, Joint
+
+_MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
+
+
+@dataclass(frozen=True)
+class Carried:
+    """Where a link of the chain is.
+
+    Attributes
+    ----------
+    body : int
+        Number of the joint that carries it, 0 for the column.
+    transform : ndarray (4, 4)
+        Of its frame, in the frame directly behind that joint, all joints at zero.
+    behind_passive : bool
+        Whether a passive joint turns it against that joint's frame.
+    """
+
+    body: int
+    transform: np.ndarray
+    behind_passive: bool
+
+
+@dataclass(frozen=True)
+class UrdfChain:
+    """The chain between two links.
+
+    Attributes
+    ----------
+    words : tuple of str
+        In the notation, with measuring points.
+    joints : tuple of yourdfpy.Joint
+        Those of q1, q2, ...
+    links : dict of str to Carried
+        Links on the chain.
+    """
+
+    words: tuple[str, ...]
+    joints: tuple[Joint, ...]
+    links: dict[str, Carried]
+
+    @property
+    def notation(self) -> str:
+        """The chain in a line."""
+        return " ".join(self.words)
+
+
+def parent_joints(urdf: URDF) -> dict[str, Joint]:
+    """The joint above each link, by the link's name; the root has none."""
+    return {joint.child: joint for joint in urdf.robot.joints}
+
+
+def chain_between(urdf: URDF, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
+    """The chain from one link to another that it carries.
+
+    Parameters
+    ----------
+    urdf : yourdfpy.URDF
+    base, tip : str
+        Names of links.
+    points : sequence of str
+        Further links of the chain that become measuring points; the tip is the last one always.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    UrdfChain
+
+    Raises
+    ------
+    InputError
+        A link that is not there or not on the chain, a tip that the base does not carry, a joint that the notation cannot say.
+    """
+    path = _path(urdf, base, tip, source)
+    masters = _masters(urdf, path, source)
+    on_chain = [base, *(joint.child for joint in path)]
+    for name in points:
+        if name not in on_chain:
+            allowed = f"a link between {base!r} and {tip!r}: {closest_first(name, on_chain)}"
+            raise InputError(source, "point", repr(name), allowed)
+    marked = {name: point_name(name) for name in (*points, tip)}
+    if len(set(marked.values())) < len(marked):
+        raise InputError(
+            source, "point", ", ".join(map(repr, marked)), "links whose names differ by more than blanks and brackets"
+        )
+    words = [f"[{marked[base]}]"] if base in marked else []
+    numbers: dict[str, int] = {}
+    place = Carried(0, np.eye(4), False)
+    links = {base: place}
+    for joint in path:
+        origin = np.eye(4) if joint.origin is None else joint.origin
+        words += displacement_words(origin)
+        place = Carried(place.body, place.transform @ origin, place.behind_passive)
+        if joint.name in masters:
+            moved, place = _moved(joint, *masters[joint.name], numbers, place, source)
+            words += moved
+        if joint.child in marked:
+            words.append(f"[{marked[joint.child]}]")
+        links[joint.child] = place
+    named = {joint.name: joint for joint in path}
+    return UrdfChain(tuple(words), tuple(named[name] for name in numbers), links)
+
+
+def point_name(link: str) -> str:
+    """A link's name as that of a measuring point: blanks and brackets, which the notation needs, become underscores."""
+    return re.sub(r"[\[\]\s]", "_", link)
+
+
+def _moved(
+    joint: Joint, master: str, sign: float, offset: float, numbers: dict[str, int], place: Carried, source: str
+) -> tuple[list[str], Carried]:
+    """Words of a joint that moves, and where it carries what is behind it."""
+    axis = np.asarray(joint.axis, float)
+    if not np.linalg.norm(axis) > 0:
+        raise InputError(source, f"joint {joint.name!r}: axis xyz", "0 0 0", "a direction")
+    kind = _MOVING[joint.type]
+    before, letter, minus, after = turned_axis(axis)
+    negative = (minus == "-") != (sign < 0)
+    fixed = (turn_word if kind == "R" else shift_word)(letter, -offset if minus else offset)
+    passive = master in numbers
+    number = numbers.setdefault(master, len(numbers) + 1)
+    words = [*before, *([fixed] if fixed else []), f"{kind}{letter}({'-' if negative else ''}q{number})", *after]
+    turn, step = np.eye(4), np.eye(4)
+    turn[:3, :3] = axis_rotation(axis)
+    if not passive:
+        return words, Carried(number, turn.T, False)
+    amount = -offset if minus else offset
+    if kind == "R":
+        step[:3, :3] = rotation_about(letter, amount)
+    else:
+        step["xyz".index(letter), 3] = amount
+    return words, Carried(place.body, place.transform @ turn @ step @ turn.T, place.behind_passive or kind == "R")
+
+
+def _path(urdf: URDF, base: str, tip: str, source: str) -> list[Joint]:
+    names = [link.name for link in urdf.robot.links]
+    for key, name in (("base", base), ("tip", tip)):
+        if name not in names:
+            raise InputError(source, key, repr(name), f"a link: {closest_first(name, names)}")
+    above = parent_joints(urdf)
+    path, at = [], tip
+    while at != base:
+        if at not in above:
+            raise InputError(source, f"base {base!r}, tip {tip!r}", _relation(above, base, tip), "a tip that the base carries")
+        path.append(above[at])
+        at = above[at].parent
+    path.reverse()
+    if not any(joint.type in _MOVING for joint in path):
+        raise InputError(source, f"base {base!r}, tip {tip!r}", "no joint that moves between them", "links with joints between")
+    for joint in path:
+        if joint.type not in (*_MOVING, "fixed"):
+            raise InputError(source, f"joint {joint.name!r}", f"type {joint.type}", " | ".join((*_MOVING, "fixed")))
+    return path
+
+
+def _relation(above: Mapping[str, Joint], base: str, tip: str) -> str:
+    at = base
+    while at in above:
+        at = above[at].parent
+        if at == tip:
+            return "a base that the tip carries (give them the other way round)"
+    return "two branches of the tree"
+
+
+def _masters(urdf: URDF, path: Sequence[Joint], source: str) -> dict[str, tuple[str, float, float]]:
+    """By name of each joint that moves: the joint of the chain whose coordinate it has, +1 or -1 of it, and an offset."""
+    every = {joint.name: joint for joint in urdf.robot.joints}
+    kinds = {joint.name: _MOVING[joint.type] for joint in path if joint.type in _MOVING}
+    masters = {}
+    for name in kinds:
+        master, factor, offset, seen = name, 1.0, 0.0, {name}
+        while (mimic := every[master].mimic) is not None:
+            called = f"joint {master!r}: mimic"
+            if mimic.joint not in kinds:
+                raise InputError(source, called, repr(mimic.joint), f"a joint that moves in the chain: {', '.join(kinds)}")
+            if mimic.joint in seen:
+                raise InputError(source, called, f"a loop back to {mimic.joint!r}", "a joint that mimics no other in the end")
+            factor, offset = factor * mimic.multiplier, offset + factor * mimic.offset
+            master = mimic.joint
+            seen.add(master)
+        if abs(factor) != 1.0 or kinds[master] != kinds[name]:
+            found = f"{factor:g} times {master!r}" if kinds[master] == kinds[name] else f"{master!r}, which moves otherwise"
+            raise InputError(source, f"joint {name!r}: mimic", found, "a joint of the same type with multiplier 1 or -1")
+        masters[name] = (master, math.copysign(1.0, factor), offset)
+    return masters

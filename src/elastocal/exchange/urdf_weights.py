@@ -1,0 +1,136 @@
+"""What the links of a URDF weigh, as the masses of a robot file: see `mechanics.robot_file`.
+
+All that a joint carries rigidly is one mass, side branches and what stands behind the tip included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.exchange.urdf_chain import parent_joints
+from elastocal.mechanics.robot import STANDARD_GRAVITY
+
+if TYPE_CHECKING:
+    from yourdfpy import URDF
+
+    from elastocal.exchange.urdf_chain import Carried, UrdfChain
+
+# A URDF does not say where its masses come from: of a drawing without cables, grease and covers, or guessed. Where dynamic
+# parameters of robots were identified, masses and centres of such models were off by a tenth to a third.
+RELATIVE_STD = 0.2
+# Kilograms and metres to the nanometre.
+_DECIMALS = 9
+# So many links of a robot never weigh the same.
+_FEWEST_ALIKE = 3
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Masses of a robot file, and what is to be said of them.
+
+    Attributes
+    ----------
+    masses : list of dict
+        Entries of ``masses``.
+    notes : tuple of str
+    """
+
+    masses: list[dict[str, Any]]
+    notes: tuple[str, ...]
+
+
+def weights_of(urdf: URDF, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
+    """Masses and centres of what each joint carries.
+
+    Parameters
+    ----------
+    urdf : yourdfpy.URDF
+    chain : UrdfChain
+    relative_std : float
+        How well they are known.
+
+    Returns
+    -------
+    Weights
+    """
+    moments: dict[int, np.ndarray] = {}
+    held, passive = set(), set()
+    for link in urdf.robot.links:
+        mass = None if link.inertial is None else link.inertial.mass
+        carried = _carried(urdf, link.name, chain) if mass else None
+        # What moves beside the column weighs on no joint of the chain.
+        if not mass or carried is None or (carried[0].body == 0 and carried[1]):
+            continue
+        place, by = carried
+        held.update(by)
+        if place.behind_passive:
+            passive.add(link.name)
+        own = np.eye(4) if link.inertial.origin is None else link.inertial.origin
+        centre = (place.transform @ own)[:3, 3]
+        moments[place.body] = moments.get(place.body, np.zeros(4)) + mass * np.append(centre, 1.0)
+    alike = {float(moment[3]) for moment in moments.values()}
+    if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
+        return Weights([], (f"every link weighs {alike.pop():g} kg: placeholders, which are left out",))
+    notes = []
+    if held:
+        notes.append(f"joints beside the chain are held at zero for what they carry: {_named(held)}")
+    if passive:
+        notes.append(f"behind a passive joint, but weighing as if it did not turn: {_named(passive)}")
+    if not moments:
+        notes.append("no masses: the weight of the links is not known")
+    entries = [_entry(body, moment, relative_std) for body, moment in sorted(moments.items())]
+    return Weights(entries, tuple(notes))
+
+
+def gravity_in_base(urdf: URDF, base: str) -> list[float] | None:
+    """Gravity in the axes of a link, m/s², where the root of the tree stands upright and the joints before it are at zero.
+
+    Parameters
+    ----------
+    urdf : yourdfpy.URDF
+    base : str
+
+    Returns
+    -------
+    list of float or None
+        None where it points down the link's z axis.
+    """
+    above, transform, at = parent_joints(urdf), np.eye(4), base
+    while at in above:
+        transform = _at_zero(above[at]) @ transform
+        at = above[at].parent
+    gravity = np.round(-STANDARD_GRAVITY * transform[2, :3], _DECIMALS) + 0.0
+    return None if gravity[2] == -STANDARD_GRAVITY else gravity.tolist()
+
+
+def _carried(urdf: URDF, link: str, chain: UrdfChain) -> tuple[Carried, list[str]] | None:
+    """Where a link is on the chain, and the joints beside the chain that move it; None where the chain does not carry it."""
+    above, transform, by, at = parent_joints(urdf), np.eye(4), [], link
+    while at not in chain.links:
+        if at not in above:
+            return None
+        joint = above[at]
+        transform = _at_zero(joint) @ transform
+        if joint.type != "fixed":
+            by.append(joint.name)
+        at = joint.parent
+    place = chain.links[at]
+    return type(place)(place.body, place.transform @ transform, place.behind_passive), by
+
+
+def _at_zero(joint: Any) -> np.ndarray:
+    return np.eye(4) if joint.origin is None else joint.origin
+
+
+def _entry(body: int, moment: np.ndarray, relative_std: float) -> dict[str, Any]:
+    centre = np.round(moment[:3] / moment[3], _DECIMALS) + 0.0
+    mass = round(float(moment[3]), _DECIMALS)
+    return {"link": body, "mass_kg": mass, "centre_m": centre.tolist(), "relative_std": relative_std}
+
+
+def _named(names: set[str]) -> str:
+    most = sorted(names)[:4]
+    return ", ".join(most) + (f" and {len(names) - len(most)} more" if len(names) > len(most) else "")
