@@ -16,11 +16,15 @@ from elastocal.application.calibrated import (
     calibrated_of,
     forward,
     moves_robot,
+    observations_of,
     prediction_covariance,
+    states_of,
 )
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.catalogue import candidates_on
+from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.model import Model
 from elastocal.fitting.parameters import stepped
 from elastocal.mechanics.robot import Mass
@@ -144,3 +148,20 @@ def test_what_an_effect_needs_and_is_not_given_is_neutral_and_said(fanuc, key, n
     (line,) = assumptions(found, OperatingConditions())
     assert line.startswith(f"{key} needs the {name}")
     assert assumptions(found, given) == [] == assumptions(without, OperatingConditions())
+
+
+def test_correlations_of_parameters_in_other_units_keep_their_digits(fanuc):
+    """Two parameters that undo each other to a millionth, one of them a million million times larger in its unit."""
+    keys = ("joint_offset@2", "link_weight@2")
+    robot = made_calibrated(fanuc, *keys, identified=False)
+    angles = random_angles(np.random.default_rng(3), fanuc.chain, 6)
+    deviation = np.array([1e-3, *[1e6] * (len(robot.covariance) - 1)])
+    direction = deviation / np.linalg.norm(deviation)
+    shape = np.eye(len(deviation)) - (1 - 1e-9) * np.outer(direction, direction)
+    covariance = 1e-12 * shape * np.outer(1 / deviation, 1 / deviation) * 1e-3
+    robot = replace(robot, covariance=covariance)
+    model, estimate = robot.model, robot.estimate
+    seen = observations_of(states_of(robot, angles, OperatingConditions()))
+    gradient = linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities
+    expected = gradient @ covariance @ gradient.transpose(0, 2, 1)
+    np.testing.assert_allclose(prediction_covariance(robot, angles), expected, rtol=1e-6, atol=1e-9 * np.abs(expected).max())

@@ -298,6 +298,11 @@ def _parts(count: int) -> list[slice]:
 
 
 def _square_root(covariance: np.ndarray) -> np.ndarray:
-    """A factor L with L L' the covariance, singular where parameters are held."""
-    values, vectors = np.linalg.eigh(covariance)
-    return vectors * np.sqrt(values.clip(min=0.0))
+    """A factor L with L L' the covariance, singular where parameters are held.
+
+    Of the correlations: parameters in kilograms would drown those in radians per newton metre.
+    """
+    deviation = np.sqrt(np.diag(covariance))
+    scale = np.where(deviation > 0, deviation, 1.0)
+    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
+    return deviation[:, None] * vectors * np.sqrt(values.clip(min=0.0))

@@ -19,7 +19,7 @@ _WORDS = {
     "found": "with the effects found",
     "true": "true model (floor)",
 }
-_PARTS = {"unloaded": "unloaded", "loaded": "under the campaign's loads", "milling": "milling path under process force"}
+_PARTS = {"unloaded": "unloaded", "loaded": "under loads", "milling": "milling path"}
 
 
 @styled

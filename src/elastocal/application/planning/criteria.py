@@ -1,0 +1,103 @@
+"""Criteria of optimal design, and what each candidate adds to a design.
+
+With M the information matrix in units of the plausible sizes, which a prior of one plausible size each makes I without any
+measurement (Bayesian designs [1]_, for which no parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
+
+- D: log det M grows by log det (I + Z M^-1 Z'), by the matrix determinant lemma;
+- A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number of
+  parameters for A, and for I the mean of G' G over where the end effector shall be accurate, G its sensitivities.
+
+References
+----------
+.. [1] Chaloner, K. and Verdinelli, I., Bayesian experimental design: a review, Statistical Science 10, 1995.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+CRITERIA = ("D", "A", "I")
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """What makes a design good.
+
+    Attributes
+    ----------
+    weight : ndarray (P, P) or None
+        C of A and I; None for D.
+    """
+
+    weight: np.ndarray | None
+
+    def value(self, matrix: np.ndarray) -> float:
+        """log det M, or -tr C M^-1: the larger the better."""
+        if self.weight is None:
+            return float(np.linalg.slogdet(matrix)[1])
+        return -float(np.trace(np.linalg.solve(matrix, self.weight)))
+
+    def gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        """By how much the value grows with each candidate.
+
+        Parameters
+        ----------
+        rows : ndarray (N, k, P)
+        matrix : ndarray (P, P)
+
+        Returns
+        -------
+        ndarray (N,)
+        """
+        white = _whitened(rows, matrix)
+        inner = white @ white.transpose(0, 2, 1)
+        inner[:, np.arange(rows.shape[1]), np.arange(rows.shape[1])] += 1.0
+        if self.weight is None:
+            return np.linalg.slogdet(inner)[1]
+        across = white @ self._whitened_weight(matrix).astype(white.dtype) @ white.transpose(0, 2, 1)
+        return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
+
+    def slopes(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+        """Derivatives of the value by the weight of each candidate: tr M^-1 Z' Z, or tr M^-1 C M^-1 Z' Z; ndarray (N,)."""
+        white = _whitened(rows, matrix)
+        if self.weight is None:
+            return (white**2).sum(axis=(1, 2))
+        across = white @ self._whitened_weight(matrix).astype(white.dtype)
+        return (across * white).sum(axis=(1, 2))
+
+    def _whitened_weight(self, matrix: np.ndarray) -> np.ndarray:
+        lower = np.linalg.cholesky(matrix)
+        half = solve_triangular(lower, self.weight, lower=True)
+        return solve_triangular(lower, half.T, lower=True)
+
+
+def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:
+    """One of `CRITERIA`.
+
+    Parameters
+    ----------
+    kind : {"D", "A", "I"}
+    accuracy_rows : ndarray (N, 3, P)
+        As by `survey.accuracy_rows`.
+
+    Returns
+    -------
+    Criterion
+    """
+    if kind == "D":
+        return Criterion(None)
+    return Criterion(np.eye(accuracy_rows.shape[2]) / accuracy_rows.shape[2] if kind == "A" else mean_squares(accuracy_rows))
+
+
+def mean_squares(rows: np.ndarray) -> np.ndarray:
+    """Mean of G' G over N places, ndarray (P, P)."""
+    flat = rows.reshape(-1, rows.shape[2])
+    return flat.T @ flat / len(rows)
+
+
+def _whitened(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    inverse = np.linalg.inv(np.linalg.cholesky(matrix)).astype(rows.dtype)
+    return (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)

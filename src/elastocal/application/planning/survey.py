@@ -1,0 +1,182 @@
+"""What shall be measured and how well, and what one configuration tells about the parameters of the robot's model.
+
+The model is the one that a campaign declares: offsets of the joints, lengths and angles of the links, joint compliances where
+loads are measured, the errors of declared masses, and where tracker and reflectors are, if unknown. Sensitivities are those of
+the fit itself, at the robot file's values.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.effects import declared_weight
+from elastocal.effects.catalogue import declared_candidates
+from elastocal.effects.joint_compliance import candidate as joint_compliance
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.model import Estimate, Model
+from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.parameters import parameters
+from elastocal.mechanics.sites import sites_of
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Target
+    from elastocal.mechanics.robot import Robot
+
+GEOMETRY = ("joint_offset", "link_geometry")
+# States that are linearized at once: their Jacobians stay in the processor's cache.
+_AT_ONCE = 1000
+
+
+@dataclass(frozen=True)
+class Survey:
+    """What is measured in each configuration.
+
+    Attributes
+    ----------
+    robot : Robot
+    targets : tuple of Target
+        All are read under each load.
+    unknown_base : bool
+        Whether the tracker's frame is fitted.
+    measured : {"position", "pose"}
+    shares : tuple of float
+        Shares of the force of a configuration under which it is read; (0,) without loads.
+    position_m, orientation_rad : float
+        Standard deviation of each component of a measurement.
+    """
+
+    robot: Robot
+    targets: tuple[Target, ...]
+    unknown_base: bool
+    measured: str
+    shares: tuple[float, ...]
+    position_m: float
+    orientation_rad: float
+
+    @property
+    def rows(self) -> int:
+        """Numbers in a measurement of one target."""
+        return 6 if self.measured == "pose" else 3
+
+    @property
+    def loaded(self) -> bool:
+        """Whether any reading is under a load."""
+        return any(self.shares)
+
+
+@dataclass(frozen=True)
+class Information:
+    """What candidates tell, in units of the plausible size of each parameter.
+
+    Attributes
+    ----------
+    rows : ndarray (N, k, P)
+        Whitened sensitivities of the k numbers measured in each of N configurations; information is ``rows.T @ rows``.
+    names : list of (str, str)
+        What each parameter belongs to, and its name.
+    """
+
+    rows: np.ndarray
+    names: list[tuple[str, str]]
+
+
+def model_of(survey: Survey) -> tuple[Model, Estimate]:
+    """The model that a campaign of this survey declares, at the values of the robot file.
+
+    Parameters
+    ----------
+    survey : Survey
+
+    Returns
+    -------
+    model : Model
+    estimate : Estimate
+    """
+    robot, sites = survey.robot, sites_of(survey.robot)
+    springs = (joint_compliance(sites),) if survey.loaded else ()
+    weight = (declared_weight.candidate(sites),) if sites.masses else ()
+    effects = (*springs, *weight, *declared_candidates(GEOMETRY, sites))
+    model = Model(sites, survey.targets, survey.unknown_base, survey.rows, robot.compliance, effects)
+    count = len(survey.targets)
+    estimate = Estimate(
+        (0,),
+        np.eye(3)[None],
+        np.zeros((1, 3)),
+        np.array([target.offset_m or (0.0, 0.0, 0.0) for target in survey.targets]),
+        np.broadcast_to(np.eye(3), (count, 3, 3)).copy(),
+        tuple(robot.compliance if e.effect == "joint_compliance" else np.zeros(len(e.parameters)) for e in effects),
+        tuple(np.zeros(0) for _ in effects),
+    )
+    return model, estimate
+
+
+def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Information:
+    """What each configuration tells.
+
+    Parameters
+    ----------
+    survey : Survey
+    reported_angles : ndarray (N, n)
+        rad.
+    force : ndarray (N, 3)
+        N, base axes, at the last measuring point; read at each of the shares.
+
+    Returns
+    -------
+    Information
+    """
+    model, estimate = model_of(survey)
+    named = parameters(model, estimate)
+    plausible = np.array([parameter.plausible for _, parameter in named])
+    rows = survey.rows
+    deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[:rows]
+    scale = plausible / deviation[:, None]
+    numbers = len(survey.shares) * len(survey.targets) * rows
+    found = np.empty((len(reported_angles), numbers, len(named)), np.float32)
+    for start in range(0, len(reported_angles), max(_AT_ONCE // len(survey.shares), 1)):
+        part = slice(start, start + max(_AT_ONCE // len(survey.shares), 1))
+        seen = _observations(survey, reported_angles[part], force[part])
+        line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
+        found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
+    return Information(found, [(owner, parameter.name) for owner, parameter in named])
+
+
+def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Sensitivities of where the first target is seen, in the units of `Information`: what a validation would measure.
+
+    Where base or reflector are unknown they count, for then nothing but the target in the tracker's frame can be known.
+
+    Parameters
+    ----------
+    survey : Survey
+    reported_angles : ndarray (N, n)
+        Where it shall be known, rad.
+    force : ndarray (N, 3)
+        Under which it works there, N, base axes.
+
+    Returns
+    -------
+    ndarray (N, 3, P)
+        m, per plausible size of each parameter.
+    """
+    alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
+    rows = information(alone, reported_angles, force).rows
+    return rows[:, :3] * survey.position_m
+
+
+def _observations(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
+    """Every target under every share of the load of each configuration, in this order."""
+    loads, targets = len(survey.shares), len(survey.targets)
+    angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)
+    wrench = np.zeros((len(angles), 6))
+    wrench[:, :3] = (force[:, None] * np.array(survey.shares)[:, None]).reshape(-1, 3)
+    count = len(angles)
+    nothing = np.zeros(count, int)
+    states = States(nothing, np.arange(count) // loads, np.arange(count) % loads, angles, wrench, nothing + 1)
+    state = np.repeat(np.arange(count), targets)
+    nowhere = np.zeros((len(state), 3)), np.broadcast_to(np.eye(3), (len(state), 3, 3))
+    return Observations(states, state, np.tile(np.arange(targets), count), nowhere[0], nowhere[1] if survey.rows == 6 else None)
