@@ -142,7 +142,7 @@ def summary(result: Imported) -> list[str]:
     """
     robot = result.robot
     shifts = sum(robot.chain.prismatic)
-    kinds = f"{robot.joints} joints" + (f", {shifts} of them prismatic" if shifts else "")
+    kinds = f"{robot.joints} joint{'s' if robot.joints > 1 else ''}" + (f", {shifts} of them prismatic" if shifts else "")
     reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
     weight = math.fsum(mass.mass_kg for mass in robot.masses)
     return [

@@ -1,0 +1,134 @@
+"""Denavit-Hartenberg tables to robots, beside products of pinocchio's transforms."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from support import refused
+from synthetic import made_states
+
+from elastocal.effects.conditions import conditions_of
+from elastocal.exchange.dh import robot_from_dh
+from elastocal.exchange.robot_text import robot_text
+from elastocal.io.documents import read_document
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.robot_file import robot_from_document
+from elastocal.mechanics.sites import sites_of
+
+UR5E = """joint, theta_offset_deg, d_m,    a_m,     alpha_deg, type
+1,     0,                0.1625, 0,       90,        R
+2,     0,                0,      -0.425,  0,         R
+3,     0,                0,      -0.3922, 0,         R
+4,     0,                0.1333, 0,       90,        R
+5,     0,                0.0997, 0,       -90,       R
+6,     0,                0.0996, 0,       0,         R
+"""
+
+
+def written(folder, rows, header="theta_offset,d,a,alpha,type,lower,upper"):
+    path = folder / "arm.csv"
+    path.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+def screw(letter, turn, shift):
+    axis = np.eye(3)["xyz".index(letter)]
+    return pin.SE3(pin.exp3(turn * axis), shift * axis)
+
+
+def frames_of(rows, coordinates, modified):
+    """Frame of each row."""
+    found, at, values = [], pin.SE3.Identity(), iter(coordinates)
+    for theta, d, a, alpha, kind, *_ in rows:
+        moved = 0.0 if kind == "F" else next(values)
+        about_z = screw("z", theta + (moved if kind == "R" else 0.0), d + (moved if kind == "P" else 0.0))
+        about_x = screw("x", alpha, a)
+        at = at * (about_x * about_z if modified else about_z * about_x)
+        found.append(at)
+    return found
+
+
+angle, length = st.floats(-3.2, 3.2), st.floats(-0.5, 0.5)
+tables = st.lists(st.tuples(angle, length, length, angle, st.sampled_from("RPF")), min_size=1, max_size=7).filter(
+    lambda rows: any(row[4] != "F" for row in rows)
+)
+
+
+@settings(max_examples=60, deadline=None)
+@given(rows=tables, modified=st.booleans())
+def test_any_table_is_where_its_notation_puts_it_and_weighs_there(tmp_path_factory, rows, modified):
+    header = "theta_offset,d,a,alpha,type,lower,upper,mass_kg,cx,cy,cz"
+    weighed = [(*row, -1, 1, 1.5 + number, 0.1, -0.02 * number, 0.05) for number, row in enumerate(rows)]
+    path = written(tmp_path_factory.mktemp("dh"), weighed, header)
+    robot = robot_from_document(yaml.safe_load(robot_text(robot_from_dh(path, modified, angles="rad"))))
+    states = made_states(robot.joints, 4, seed=1)
+    position, rotation = poses(robot.chain, states.joint_angles, robot.chain.end_effector)
+    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, : robot.joints]
+
+    def height(q):
+        """Sum of mass times height, whose slope against gravity is the torque."""
+        frames = frames_of(rows, q, modified)
+        return sum(row[7] * frame.act(np.array(row[8:]))[2] for row, frame in zip(weighed, frames, strict=True))
+
+    for number, q in enumerate(states.joint_angles):
+        end = frames_of(rows, q, modified)[-1]
+        np.testing.assert_allclose(position[number], end.translation, rtol=0, atol=1e-9)
+        assert np.linalg.norm(pin.log3(end.rotation.T @ rotation[number])) < 1e-9
+        steps = 1e-5 * np.eye(robot.joints)
+        slope = np.array([(height(q + step) - height(q - step)) / 2e-5 for step in steps])
+        np.testing.assert_allclose(own[number], -9.80665 * slope, rtol=0, atol=1e-5)
+
+
+def test_the_ur_of_this_project_is_its_table(tmp_path, config_folder):
+    """The UR10 of config/robots, which was typed from its maker's table."""
+    lengths = read_document(config_folder / "robots" / "ur10.yaml")["lengths_m"]
+    names = (("d1", None, 90), (None, "a2", 0), (None, "a3", 0), ("d4", None, 90), ("d5", None, -90), ("d6", None, 0))
+    rows = [(0, lengths.get(d, 0), lengths.get(a, 0), alpha, "R", "", "") for d, a, alpha in names]
+    robot = robot_from_dh(written(tmp_path, rows)).robot
+    known = robot_from_document(read_document(config_folder / "robots" / "ur10.yaml"))
+    q = np.random.default_rng(0).uniform(-3, 3, (5, 6))
+    for one, other in zip(
+        poses(robot.chain, q, robot.chain.end_effector), poses(known.chain, q, known.chain.end_effector), strict=True
+    ):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12)
+
+
+def test_the_example_of_the_docstring_is_a_ur5e(tmp_path):
+    path = tmp_path / "ur5e.csv"
+    path.write_text(UR5E)
+    result = robot_from_dh(path)
+    assert result.document["chain"] == (
+        "Rz(q1) Tz(0.1625) Rx(90deg) Rz(q2) Tx(-0.425) Rz(q3) Tx(-0.3922) Rz(q4) Tz(0.1333) Rx(90deg) Rz(q5) Tz(0.0997)"
+        " Rx(-90deg) Rz(q6) Tz(0.0996) [flange]"
+    )
+    assert result.document["name"] == "ur5e" and "joint_names" not in result.document
+    assert "joint_limits_deg" not in result.document and not result.robot.compliance_known
+    assert "standard" in result.origin and any("a turn either way" in note for note in result.notes)
+
+
+def test_limits_compliances_names_and_points_come_along(tmp_path):
+    header = "joint,d,a,alpha,type,lower,upper,compliance_urad_per_Nm,point"
+    path = written(tmp_path, [("rail", 0, 0, 90, "P", 0, 2, 0.02, ""), ("arm", 1, 1, 0, "R", "", "", 5, "elbow at")], header)
+    result = robot_from_dh(path, name="two")
+    assert result.document["joint_names"] == ["rail", "arm"] and result.document["name"] == "two"
+    assert result.document["joint_limits_deg"] == [[0.0, 2.0], [-360.0, 360.0]]
+    assert result.document["compliance_urad_per_Nm"] == [0.02, 5.0] and result.robot.compliance_known
+    assert result.document["chain"].endswith("[elbow_at]")
+
+
+@pytest.mark.parametrize(
+    ("header", "rows", "key", "words"),
+    [
+        ("d,a,alpha,compliance_urad_per_Nm", [(0, 1, 0, 2), (0, 1, 0, "")], "line 3, compliance_urad_per_Nm", ["every joint"]),
+        ("d,a,alpha,type", [(0, 1, 0, "P")], "line 2, lower and upper", ["prismatic"]),
+        ("joint,d,a,alpha", [("a", 0, 1, 0), ("a", 0, 1, 0)], "line 2, joint", ["each once"]),
+        ("d,a,alpha,point", [(0, 1, 0, "p"), (0, 1, 0, "p")], "chain", ["[p] twice"]),
+        ("d,a,alpha", [(0, 425, 0)], "chain", ["metres"]),
+    ],
+)
+def test_what_makes_no_robot_is_refused(tmp_path, header, rows, key, words):
+    path = written(tmp_path, rows, header)
+    with refused(path, key, *words):
+        robot_from_dh(path)

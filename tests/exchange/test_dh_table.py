@@ -1,0 +1,88 @@
+"""A Denavit-Hartenberg table is read in its units, and every fault is one line with its line and column."""
+
+import math
+
+import pytest
+from support import refused
+
+from elastocal.exchange.dh_table import read_dh_table
+
+HEADER = "joint,theta_offset_deg,d_m,a_m,alpha_deg,type\n"
+
+
+def table(folder, text, name="arm.csv"):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_row_is_in_si_units(tmp_path):
+    text = "# maker's manual\njoint; theta_offset_deg; d_mm; a_m; alpha; lower; upper; mass_kg; cx; cy; cz_m; point; type\n"
+    path = table(tmp_path, text + "\nbase;90;250;-0.1;-pi/2;-1;pi;3;10;0;0.2;elbow;R\n; ;0;0;2*pi; ; ;;;;;;f\n")
+    row, fixed = read_dh_table(path, "rad", "mm")
+    assert (row.joint, row.kind, row.point, row.where) == ("base", "R", "elbow", "line 4")
+    assert (row.theta, row.d, row.a, row.alpha) == pytest.approx((math.pi / 2, 0.25, -0.1, -math.pi / 2))
+    assert row.limits == pytest.approx((-1.0, math.pi)) and row.mass_kg == 3.0
+    assert row.centre_m == pytest.approx((0.01, 0.0, 0.2))
+    assert (fixed.kind, fixed.limits, fixed.mass_kg, fixed.alpha) == ("F", None, None, pytest.approx(2 * math.pi))
+
+
+def test_limits_of_a_shift_are_lengths(tmp_path):
+    path = table(tmp_path, "d,a,alpha,type,lower,upper\n0,0,90,P,100,400\n0,0,90,R,-90,180\n")
+    shift, turn = read_dh_table(path, lengths="mm")
+    assert shift.limits == pytest.approx((0.1, 0.4)) and turn.limits == pytest.approx((-math.pi / 2, math.pi))
+
+
+def test_yaml_says_the_same(tmp_path):
+    csv = table(tmp_path, HEADER + "1,0,0.1625,0,90,R\n2,-90,0,-0.425,0,R\n")
+    yaml = table(
+        tmp_path,
+        "- {joint: 1, theta_offset_deg: 0, d_m: 0.1625, a_m: 0, alpha_deg: 90}\n"
+        "- {joint: 2, theta_offset_deg: -90, d_m: 0, a_m: -0.425, alpha_deg: 0, type: R}\n",
+        "arm.yaml",
+    )
+    for one, other in zip(read_dh_table(csv), read_dh_table(yaml), strict=True):
+        assert vars(one) | {"where": ""} == vars(other) | {"where": ""}
+    assert [row.where for row in read_dh_table(yaml)] == ["row 1", "row 2"]
+
+
+FAULTS = {
+    "no number": (HEADER + "1,0,0.1,0,90,R\n2,0,x,0,90,R\n", "line 3, d_m", ["'x'"]),
+    "pi in degrees": (HEADER + "1,0,0.1,0,pi/2,R\n", "line 2, alpha_deg", ["'pi/2'"]),
+    "not finite": (HEADER + "1,0,inf,0,90,R\n", "line 2, d_m", ["'inf'"]),
+    "nothing": (HEADER + "1,0,,0,90,R\n", "line 2, d_m", ["nothing"]),
+    "a type": (HEADER + "1,0,0,0,90,spherical\n", "line 2, type", ["'spherical'", "revolute"]),
+    "too few cells": (HEADER + "1,0,0,0,90\n", "line 2", ["5 cells", "6"]),
+    "no column": ("d_m,a_m\n0,0\n", "header", ["no column alpha"]),
+    "unknown column": ("d_m,a_m,alfa_deg\n0,0,0\n", "header", ["'alfa_deg'", "'alpha_deg'?"]),
+    "a column in two units": ("d_m,d_mm,a,alpha\n0,0,0,0\n", "header", ["d twice"]),
+    "one limit": ("d,a,alpha,lower,upper\n0,0,0,1,\n", "line 2, lower and upper", ["both"]),
+    "limits the wrong way": ("d,a,alpha,lower,upper\n0,0,0,9,-9\n", "line 2, lower and upper", ["9 to -9"]),
+    "a mass without a centre": ("d,a,alpha,mass_kg\n0,0,0,9\n", "line 2, cx, cy, cz", ["three numbers"]),
+    "a centre without a mass": ("d,a,alpha,cx\n0,0,0,9\n", "line 2, mass_kg", ["the mass"]),
+    "a mass of nothing": ("d,a,alpha,mass_kg,cx,cy,cz\n0,0,0,0,0,0,0\n", "line 2, mass_kg", ["more than 0"]),
+    "no joint": ("d,a,alpha,type\n0,0,0,F\n", "", ["no joint"]),
+    "nothing at all": ("# only this\n", "", ["an empty file"]),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_names_its_line_and_column(tmp_path, fault):
+    text, key, words = FAULTS[fault]
+    path = table(tmp_path, text)
+    with refused(path, key, *words):
+        read_dh_table(path)
+
+
+@pytest.mark.parametrize(("name", "text"), [("arm.yaml", "rows: 3"), ("arm.txt", "x"), ("arm.yaml", "[]"), ("arm.yaml", "- 3")])
+def test_what_is_no_table_is_refused(tmp_path, name, text):
+    with refused(tmp_path / name, ""):
+        read_dh_table(table(tmp_path, text, name))
+
+
+def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
+    with refused(tmp_path / "none.csv", "", "No such file"):
+        read_dh_table(tmp_path / "none.csv")
+    (tmp_path / "latin.csv").write_bytes(b"d,a,alpha\n\xff")
+    with refused(tmp_path / "latin.csv", "byte 10", "UTF-8"):
+        read_dh_table(tmp_path / "latin.csv")

@@ -1,0 +1,68 @@
+"""The text of a robot file: read by a person and by the loader."""
+
+import pytest
+import yaml
+from support import refused
+
+from elastocal.exchange.robot_text import imported, refuse_existing, robot_text, summary, write_robot
+
+DOCUMENT = {
+    "masses": [{"link": 1, "mass_kg": 2.0, "centre_m": [1e-5, 0.0, 0.5], "relative_std": 0.2}],
+    "chain": "Tz(0.5) Rz(q1) " + " ".join(["Tx(0.1) Rx(90deg)"] * 20) + " Tz(q2) [flange]",
+    "joint_limits_deg": [[-180.0, 180.0], [0.0, 0.5]],
+    "joint_names": ["yes", "joint: 2"],
+    "name": "arm #1: 'heavy'",
+}
+
+
+@pytest.fixture
+def result(tmp_path):
+    (tmp_path / "x.urdf").write_text("something")
+    return imported(DOCUMENT, tmp_path / "x.urdf", "by hand", ["masses are guessed"])
+
+
+def test_the_text_gives_back_the_document(result):
+    assert yaml.safe_load(robot_text(result)) == DOCUMENT
+
+
+def test_the_head_says_where_it_came_from_and_what_it_lacks(result):
+    lines = robot_text(result).splitlines()
+    assert lines[0] == "# From x.urdf (sha256 3fc9b689459d738f), by hand."
+    assert "# Masses are guessed." in lines
+    assert any("No compliances" in line for line in lines) and any("payload_kg" in line for line in lines)
+    assert all(len(line) <= 128 for line in lines)
+    keys = [line.partition(":")[0] for line in lines if line[0].isalpha()]
+    assert keys == ["name", "joint_names", "chain", "joint_limits_deg", "masses"]
+
+
+def test_the_name_of_a_file_cannot_leave_the_comment(tmp_path):
+    path = tmp_path / "a\nname: other\n.urdf"
+    path.write_text("")
+    text = robot_text(imported(DOCUMENT, path, "by hand", ()))
+    assert yaml.safe_load(text) == DOCUMENT
+
+
+def test_what_was_read_is_told_in_a_few_lines(result):
+    told = summary(result)
+    assert told[0] == "arm #1: 'heavy': 2 joints, 1 of them prismatic, 2.5 m stretched out, 2 kg"
+    assert told[1] == "measuring points: flange" and told[2] == "note: masses are guessed"
+
+
+def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):
+    path = tmp_path / "x.csv"
+    path.write_text("")
+    with refused(path, "chain", "metres"):
+        imported(DOCUMENT | {"chain": "Tz(500) Rz(q1) Tz(q2) [flange]"}, path, "by hand", ())
+
+
+def test_nothing_is_replaced_unless_it_shall_be(tmp_path, result):
+    path = tmp_path / "robot.yaml"
+    refuse_existing(path, False)
+    write_robot(result, path)
+    assert yaml.safe_load(path.read_text()) == DOCUMENT
+    with refused(path, "", "already", "--force"):
+        refuse_existing(path, False)
+    refuse_existing(path, True)
+    for place in (tmp_path, tmp_path / "none" / "robot.yaml"):
+        with refused(place, "", "no place"):
+            refuse_existing(place, True)

@@ -1,0 +1,92 @@
+"""URDF files by hand, and where pinocchio takes their links to be."""
+
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import pinocchio as pin
+
+from elastocal.mechanics.kinematics import poses
+
+GRAVITY = np.array([0.0, 0.0, -9.80665])
+
+
+def numbers(values):
+    return " ".join(repr(float(value)) for value in values)
+
+
+def origin(xyz, rpy):
+    return f'<origin xyz="{numbers(xyz)}" rpy="{numbers(rpy)}"/>'
+
+
+def link(name, mass=None, centre=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0)):
+    if mass is None:
+        return f"<link name={quoteattr(name)}/>"
+    inertia = '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/>'
+    return f'<link name={quoteattr(name)}><inertial>{origin(centre, rpy)}<mass value="{mass!r}"/>{inertia}</inertial></link>'
+
+
+def joint(
+    name, parent, child, kind="revolute", xyz=(0.0, 0.0, 0.0), rpy=(0.0, 0.0, 0.0), axis=(0, 0, 1), limits=(-2, 2), mimic=None
+):
+    parts = [f"<parent link={quoteattr(parent)}/><child link={quoteattr(child)}/>", origin(xyz, rpy)]
+    if kind != "fixed":
+        parts.append(f'<axis xyz="{numbers(axis)}"/>')
+    if limits is not None and kind in ("revolute", "prismatic"):
+        parts.append(f'<limit lower="{limits[0]}" upper="{limits[1]}" effort="1" velocity="1"/>')
+    if mimic is not None:
+        parts.append('<mimic joint="{}" multiplier="{!r}" offset="{!r}"/>'.format(*mimic))
+    return f"<joint name={quoteattr(name)} type={quoteattr(kind)}>{''.join(parts)}</joint>"
+
+
+def robot(*parts, name="made"):
+    return f'<?xml version="1.0"?>\n<robot name="{name}">\n' + "\n".join(parts) + "\n</robot>\n"
+
+
+def written(folder, *parts, **more):
+    path = folder / "made.urdf"
+    path.write_text(robot(*parts, **more), encoding="utf-8")
+    return path
+
+
+class Pinocchio:
+    """A URDF by pinocchio; joints are set by name, all others are at zero."""
+
+    def __init__(self, path):
+        self.model = pin.buildModelFromXML(path.read_text(encoding="utf-8"))
+        self.model.gravity.linear = GRAVITY
+        self.data = self.model.createData()
+
+    def configuration(self, values):
+        q = pin.neutral(self.model)
+        for name, value in values.items():
+            number = self.model.getJointId(name)
+            place = self.model.joints[number].idx_q
+            if self.model.joints[number].nq == 2:
+                q[place : place + 2] = np.cos(value), np.sin(value)
+            else:
+                q[place] = value
+        return q
+
+    def pose(self, base, tip, values):
+        """Of one link in the axes of another: position (3,) and rotation (3, 3)."""
+        pin.framesForwardKinematics(self.model, self.data, self.configuration(values))
+        at = [self.data.oMf[self.model.getFrameId(name, pin.FrameType.BODY)] for name in (base, tip)]
+        found = at[0].inverse() * at[1]
+        return found.translation, found.rotation
+
+    def weight(self, values, names):
+        """What the weight of the links does to joints, N m or N."""
+        torque = pin.computeGeneralizedGravity(self.model, self.data, self.configuration(values))
+        return np.array([-torque[self.model.joints[self.model.getJointId(name)].idx_v] for name in names])
+
+
+def assert_same_poses(robot, path, base, tip, set_joints=None, count=8):
+    """To a nanometre and a nanoradian. `set_joints` maps the angles of a state to values by joint name."""
+    by_pinocchio, rng = Pinocchio(path), np.random.default_rng(5)
+    angles = rng.uniform(-np.pi, np.pi, (count, robot.joints))
+    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
+    for state, own, turned in zip(angles, position, rotation, strict=True):
+        values = dict(zip(robot.joint_names, state, strict=True))
+        there, axes = by_pinocchio.pose(base, tip, values | (set_joints(values) if set_joints else {}))
+        np.testing.assert_allclose(own, there, rtol=0, atol=1e-9)
+        assert np.linalg.norm(pin.log3(axes.T @ turned)) < 1e-9
