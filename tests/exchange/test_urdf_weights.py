@@ -37,6 +37,14 @@ def test_what_is_bolted_on_weighs_with_the_link_that_carries_it(tmp_path):
     assert found.notes == ()
 
 
+def test_what_is_bolted_to_what_is_bolted_on_is_placed_through_both(tmp_path):
+    grip = (link("grip"), joint("bolt", "hand", "grip", "fixed", (0, 0, 0.3), (0, 0, np.pi / 2)))
+    camera = (link("camera", 2.0, (0, 0, 0.1)), joint("mount", "grip", "camera", "fixed", (0.2, 0, 0), (np.pi / 2, 0, 0)))
+    found = weights(tmp_path, *ARM, *grip, *camera)
+    # Of the camera: 1 m out, 0.3 m up, 0.2 m along the grip's x axis, which is y; 0.1 m along its z axis, which is x.
+    assert found.masses[1]["centre_m"] == pytest.approx([(0.1 + 1.1) / 2, 0.1, 0.15])
+
+
 def test_what_moves_beside_the_chain_weighs_as_at_zero_and_is_told(tmp_path):
     found = weights(tmp_path, *ARM, *FINGER, relative_std=0.5)
     assert found.masses[1]["mass_kg"] == 3.0 and found.masses[1]["centre_m"] == pytest.approx([0.4, 0, 0.1])

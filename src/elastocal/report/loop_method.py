@@ -40,6 +40,7 @@ def method(verdict: Mapping[str, Any], descriptions: Mapping[str, Any]) -> dict[
         "where": f" of another campaign ({other['campaign']['campaign']})" if other else "",
         "declared": listed(map(physical_name, declared)) if declared else "",
         "identified": descriptions["campaign"]["compliance"] == "identify",
+        "rigid": descriptions["campaign"]["compliance"] == "nominal" and "compliance_urad_per_Nm" not in descriptions["robot"],
     }
 
 
