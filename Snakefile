@@ -17,6 +17,7 @@ include: "workflow/rules/blind.smk"
 include: "workflow/rules/blind_follow_up.smk"
 include: "workflow/rules/blind_report.smk"
 include: "workflow/rules/closed_loop.smk"
+include: "workflow/rules/planning.smk"
 
 
 onsuccess:

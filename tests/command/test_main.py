@@ -5,6 +5,8 @@ import pytest
 from elastocal.command import main
 from elastocal.errors import InputError
 
+NO_SUBCOMMANDS = {"__init__", "main", "checkout", "campaign", "quantities"}
+
 
 def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch, capsys):
     def refuse():
@@ -26,5 +28,5 @@ def callbacks(app):
 
 
 def test_every_module_of_a_subcommand_is_registered():
-    modules = {p.stem for p in Path(main.__file__).parent.glob("*.py")} - {"__init__", "main", "checkout", "campaign"}
+    modules = {path.stem for path in Path(main.__file__).parent.glob("*.py")} - NO_SUBCOMMANDS
     assert modules == {callback.__module__.rpartition(".")[2] for callback in callbacks(main.app)}

@@ -9,11 +9,13 @@ import typer
 from elastocal.command.correct import correct
 from elastocal.command.diagnose import diagnose
 from elastocal.command.importing import importing
+from elastocal.command.plan import plan
 from elastocal.errors import InputError
 
 app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 app.command()(diagnose)
 app.command()(correct)
+app.command()(plan)
 app.add_typer(importing)
 
 

@@ -1,8 +1,8 @@
 """How far a design is from the best that any weights on the candidates could be: the general equivalence theorem.
 
-For a concave criterion f of M(w) = I + n sum w_i Z_i' Z_i no weights have more than f(M) + n max_i s_i - n sum w_i s_i, with s_i
-the slope of f along candidate i: Kiefer and Wolfowitz's theorem [1]_ as a bound that holds for any w. The weights come from the
-multiplicative algorithm [2]_.
+For a concave criterion f of M(w) = I + n sum w_i Z_i' Z_i no weights have more than f(M) + n max_i s_i - n sum w_i s_i, with
+s_i the slope of f along candidate i: Kiefer and Wolfowitz's theorem [1]_ as a bound that holds for any w. The weights come from
+the multiplicative algorithm [2]_.
 
 References
 ----------
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from elastocal.application.planning.criteria import Criterion
 
 # Of the multiplicative algorithm; each raises the criterion.
-_STEPS = 60
+_STEPS = 120
 # Candidates on which weights are put, and how often those that break the bound join them.
 _SUPPORT, _ROUNDS = 300, 2
 

@@ -4,8 +4,8 @@ With M the information matrix in units of the plausible sizes, which a prior of 
 measurement (Bayesian designs [1]_, for which no parameter need be identifiable), a candidate with rows Z makes it M + Z' Z, and
 
 - D: log det M grows by log det (I + Z M^-1 Z'), by the matrix determinant lemma;
-- A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number of
-  parameters for A, and for I the mean of G' G over where the end effector shall be accurate, G its sensitivities.
+- A and I: tr C M^-1 falls by tr (I + Z M^-1 Z')^-1 Z M^-1 C M^-1 Z', by Woodbury's identity; C is the identity over the number
+  of parameters for A, and for I the mean of G' G over where the robot shall be accurate, G the sensitivities there.
 
 References
 ----------
@@ -17,7 +17,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 CRITERIA = ("D", "A", "I")
 
@@ -69,9 +68,9 @@ class Criterion:
         return (across * white).sum(axis=(1, 2))
 
     def _whitened_weight(self, matrix: np.ndarray) -> np.ndarray:
-        lower = np.linalg.cholesky(matrix)
-        half = solve_triangular(lower, self.weight, lower=True)
-        return solve_triangular(lower, half.T, lower=True)
+        assert self.weight is not None
+        inverse = np.linalg.inv(np.linalg.cholesky(matrix))
+        return inverse @ self.weight @ inverse.T
 
 
 def criterion(kind: str, accuracy_rows: np.ndarray) -> Criterion:

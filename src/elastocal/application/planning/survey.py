@@ -63,6 +63,11 @@ class Survey:
         return 6 if self.measured == "pose" else 3
 
     @property
+    def numbers(self) -> int:
+        """Numbers that are measured in one configuration."""
+        return len(self.shares) * len(self.targets) * self.rows
+
+    @property
     def loaded(self) -> bool:
         """Whether any reading is under a load."""
         return any(self.shares)
@@ -114,6 +119,11 @@ def model_of(survey: Survey) -> tuple[Model, Estimate]:
     return model, estimate
 
 
+def count_parameters(survey: Survey) -> int:
+    """How many parameters the model of a survey has."""
+    return len(parameters(*model_of(survey)))
+
+
 def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Information:
     """What each configuration tells.
 
@@ -135,11 +145,11 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) 
     rows = survey.rows
     deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[:rows]
     scale = plausible / deviation[:, None]
-    numbers = len(survey.shares) * len(survey.targets) * rows
+    numbers = survey.numbers
     found = np.empty((len(reported_angles), numbers, len(named)), np.float32)
     for start in range(0, len(reported_angles), max(_AT_ONCE // len(survey.shares), 1)):
         part = slice(start, start + max(_AT_ONCE // len(survey.shares), 1))
-        seen = _observations(survey, reported_angles[part], force[part])
+        seen = observed(survey, reported_angles[part], force[part])
         line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
         found[part] = (line.sensitivities * scale).reshape(-1, numbers, len(named))
     return Information(found, [(owner, parameter.name) for owner, parameter in named])
@@ -168,7 +178,7 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
     return rows[:, :3] * survey.position_m
 
 
-def _observations(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
+def observed(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
     """Every target under every share of the load of each configuration, in this order."""
     loads, targets = len(survey.shares), len(survey.targets)
     angles = np.repeat(survey.robot.model_angles(reported_angles), loads, axis=0)

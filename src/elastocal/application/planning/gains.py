@@ -1,0 +1,134 @@
+"""How many random poses it takes to know a robot as well as by a plan, and whether fits to simulated readings agree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.application.planning.criteria import Criterion, mean_squares
+from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.plan import candidates
+from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.prediction import predict
+
+if TYPE_CHECKING:
+    from elastocal.application.planning.cell import Cell
+    from elastocal.application.planning.plan import Candidates, Loads
+    from elastocal.application.planning.survey import Survey
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
+
+# Random orders of candidates, of so many poses, beside which a plan is put.
+_ORDERS, _LONGEST = 60, 120
+# Robots that are fitted, of each kind of design.
+_ROBOTS = 12
+# Of the plausible size: how far a robot is off its file.
+_OFF = 0.3
+_PLACES = 300
+
+
+def gains(survey: Survey, cell: Cell, loads: Loads, poses: int, count: int, seed: int) -> dict[str, Any]:
+    """A plan against random poses.
+
+    Parameters
+    ----------
+    survey : Survey
+    cell : Cell
+    loads : Loads
+    poses : int
+        Of the plan.
+    count : int
+        Of candidates.
+    seed : int
+
+    Returns
+    -------
+    dict
+        ``planned_mm, random_mm`` with 5 and 95 % limits over random designs of as many poses; ``random_poses`` that it takes to
+        be as good as the plan, with the same limits; ``fitted_planned_mm, fitted_random_mm``: errors over the workspace of
+        models fitted to simulated measurements, RMS over robots, with ``fitted_ratio`` and its 95 % limits by a bootstrap over
+        robots.
+    """
+    draws = np.random.default_rng(seed)
+    some = candidates(survey, cell, loads, count, seed)
+    rows = information(survey, some.joint_angles, some.force).rows
+    places = some.at(draws.permutation(len(rows))[:_PLACES])
+    weight = mean_squares(accuracy_rows(survey, places.joint_angles, places.force))
+    rule = Criterion(None)
+    chosen = exchanged(rows, greedy(rows, poses, rule), rule)
+    planned = _left(matrix_of(rows, chosen), weight)
+    orders = [draws.choice(len(rows), _LONGEST, replace=False) for _ in range(_ORDERS)]
+    curves = np.array([_curve(rows, order, weight) for order in orders])
+    needed = np.array([np.argmax(curve <= planned) + 1 if (curve <= planned).any() else _LONGEST for curve in curves])
+    found: dict[str, Any] = {"poses": poses, "planned_mm": 1e3 * planned}
+    for name, values in (("random_mm", 1e3 * curves[:, poses - 1]), ("random_poses", needed)):
+        low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+        found |= {name: middle, f"{name}_low": low, f"{name}_high": high}
+    errors = np.array(
+        [
+            [_fitted_error(survey, some.at(design), places, seed + robot) for design in (chosen, orders[robot][:poses])]
+            for robot in range(_ROBOTS)
+        ]
+    )
+    rms = np.sqrt((errors**2).mean(axis=0))
+    again = np.sqrt((errors[draws.integers(_ROBOTS, size=(2000, _ROBOTS))] ** 2).mean(axis=1))
+    low, high = np.quantile(again[:, 1] / again[:, 0], [0.025, 0.975])
+    return found | {
+        "fitted_planned_mm": 1e3 * rms[0],
+        "fitted_random_mm": 1e3 * rms[1],
+        "fitted_ratio": rms[1] / rms[0],
+        "fitted_ratio_low": low,
+        "fitted_ratio_high": high,
+    }
+
+
+def _left(matrix: np.ndarray, weight: np.ndarray) -> float:
+    return float(np.sqrt(np.trace(np.linalg.solve(matrix, weight))))
+
+
+def _curve(rows: np.ndarray, order: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    each = rows[order].astype(float)
+    totals = np.eye(rows.shape[2]) + np.cumsum(each.transpose(0, 2, 1) @ each, axis=0)
+    return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2))
+
+
+def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: int) -> float:
+    """Error over the workspace of a model fitted to what one simulated robot shows in a design, RMS, m."""
+    model, nominal = model_of(survey)
+    draws = np.random.default_rng(seed)
+    true = _off(model, nominal, draws)
+    seen = observed(survey, design.joint_angles, design.force)
+    position, rotation = predict(model, true, seen, conditions(model, true, seen.states))
+    read = replace(seen, position=position + survey.position_m * draws.standard_normal(position.shape))
+    if seen.rotation is not None:
+        # Rotations are read without noise: the same for both designs.
+        read = replace(read, rotation=rotation)
+    noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(survey.robot.joints))
+    fitted = fit(model, read, noise)
+    alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
+    there = observed(alone, places.joint_angles, places.force)
+    off = _in_tracker_frame(model, fitted.estimate, there) - _in_tracker_frame(model, true, there)
+    return float(np.sqrt((off**2).sum(axis=1).mean()))
+
+
+def _in_tracker_frame(model: Model, estimate: Estimate, seen: Observations) -> np.ndarray:
+    """Predicted positions (M, 3) as the tracker would see them: where its frame is unknown, nothing else can be compared."""
+    position = predict(model, estimate, seen, conditions(model, estimate, seen.states))[0]
+    return position @ estimate.frame_rotation[0].T + estimate.frame_position[0]
+
+
+def _off(model: Model, nominal: Estimate, draws: np.random.Generator) -> Estimate:
+    """A robot that is off its file."""
+    sizes = {(owner, p.name): p.plausible for owner, p in parameters(model, nominal)}
+    values = []
+    for effect, value in zip(model.effects, nominal.coefficients, strict=True):
+        step = _OFF * draws.standard_normal(len(value))
+        plausible = np.array([sizes[effect.key, p.name] for p in effect.parameters])
+        values.append(value * np.exp(step) if effect.effect == "joint_compliance" else value + step * plausible)
+    return replace(nominal, coefficients=tuple(values))

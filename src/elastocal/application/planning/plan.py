@@ -1,0 +1,242 @@
+"""A plan: which configurations to measure, in which order, which to repeat and which to hold out; and what it is worth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import qmc
+
+from elastocal.application.planning.bound import best_value, efficiency
+from elastocal.application.planning.cell import allowed
+from elastocal.application.planning.criteria import Criterion, criterion, mean_squares
+from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from elastocal.application.planning.cell import Cell
+    from elastocal.application.planning.survey import Survey
+
+# Configurations over which the accuracy is averaged, of those that the cell allows.
+_PLACES = 300
+# Random designs beside which the plan is shown.
+_RANDOM = 40
+# More are drawn than are asked for, since the cell forbids some.
+_DRAWS = 4
+
+
+@dataclass(frozen=True)
+class Loads:
+    """With what the robot is loaded.
+
+    Attributes
+    ----------
+    force_N : float
+        0 for none.
+    pulled : bool
+        By a pull in any direction; otherwise by a weight that hangs down.
+    """
+
+    force_N: float
+    pulled: bool
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Shares of the force at which each configuration is read."""
+        if not self.force_N:
+            return (0.0,)
+        return (0.0, 1.0, -1.0) if self.pulled else (0.0, 1.0)
+
+    def forces(self, count: int, down: np.ndarray, draws: np.random.Generator) -> np.ndarray:
+        """A force for each configuration, ndarray (N, 3), N, base axes."""
+        if not self.pulled:
+            return np.tile(self.force_N * down, (count, 1))
+        direction = draws.standard_normal((count, 3))
+        return self.force_N * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Configurations among which a plan is made.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (N, n)
+        As the controller reports them, rad.
+    force : ndarray (N, 3)
+        N, base axes.
+    """
+
+    joint_angles: np.ndarray
+    force: np.ndarray
+
+    def at(self, chosen: np.ndarray | list[int]) -> Candidates:
+        """Some of them."""
+        return Candidates(self.joint_angles[chosen], self.force[chosen])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to measure.
+
+    Attributes
+    ----------
+    fitted, held_out : Candidates
+        Configurations that choose the parameters, in the order of a short tour; those that judge them, which are random.
+    efficiency : float
+        Share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
+    accuracy_m : ndarray (poses,)
+        Root mean square error of a target's position over the workspace that the parameters' uncertainty leaves, with the first
+        1, 2, .. of them, best first.
+    random_m : ndarray (designs, poses)
+        The same with random configurations.
+    """
+
+    fitted: Candidates
+    held_out: Candidates
+    efficiency: float
+    accuracy_m: np.ndarray
+    random_m: np.ndarray
+
+
+def candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
+    """Configurations within the limits that the cell allows.
+
+    Parameters
+    ----------
+    survey : Survey
+    cell : Cell
+    loads : Loads
+    count : int
+        Of candidates; fewer where the cell allows fewer.
+    seed : int
+        Of Halton's sequence, scrambled, and of the directions of the loads.
+
+    Returns
+    -------
+    Candidates
+
+    Raises
+    ------
+    InputError
+        Where the cell allows none.
+    """
+    robot = survey.robot
+    low, high = robot.joint_limits.T
+    shares = qmc.Halton(robot.joints, seed=seed).random(_DRAWS * count)
+    reported = robot.reported_angles(low + (high - low) * shares)
+    fine = allowed(cell, robot, survey.targets, reported)
+    good = np.flatnonzero(np.all(list(fine.values()), axis=0))[:count]
+    if not len(good):
+        least = min(fine, key=lambda name: fine[name].mean())
+        words = {"boxes": "the boxes leave the arm no room", "sight": "the tracker sees the targets in none"}[least]
+        found = f"none of {len(reported)} configurations allowed: {words}"
+        raise InputError("plan", least, found, "room for the arm and its targets")
+    down = np.array(robot.gravity_m_s2) / np.linalg.norm(robot.gravity_m_s2)
+    return Candidates(reported[good], loads.forces(len(good), down, np.random.default_rng(seed)))
+
+
+def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: str, seed: int) -> Plan:
+    """Choose configurations.
+
+    Parameters
+    ----------
+    survey : Survey
+    some : Candidates
+    poses, held_out : int
+        To fit, and to judge.
+    kind : {"D", "A", "I"}
+    seed : int
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        Fewer candidates than poses, or poses that measure fewer numbers than there are parameters.
+    """
+    count, draws = len(some.joint_angles), np.random.default_rng(seed)
+    if count < poses + held_out:
+        found = f"{poses + held_out} of {count} allowed configurations"
+        raise InputError("plan", "poses", found, f"at most {count}, or more candidates")
+    if poses < fewest_poses(survey):
+        numbers = poses * survey.numbers
+        found = f"{poses}, which measure {numbers} numbers for {count_parameters(survey)} parameters"
+        raise InputError("plan", "poses", found, f"at least {fewest_poses(survey)}")
+    rows = information(survey, some.joint_angles, some.force).rows
+    places = some.at(draws.permutation(count)[:_PLACES])
+    accuracy = accuracy_rows(survey, places.joint_angles, places.force)
+    rule, weight = criterion(kind, accuracy), mean_squares(accuracy)
+    # A design by determinants is found fast and good by all criteria: a start for the exchange.
+    chosen = exchanged(rows, greedy(rows, poses, Criterion(None)), rule)
+    worth = efficiency(rule, matrix_of(rows, chosen), best_value(rows, poses, rule, chosen))
+    rest = np.setdiff1d(np.arange(count), chosen)
+    judged = draws.choice(rest, held_out, replace=False)
+    order = _best_first(rows, chosen, weight)
+    random = np.array([_curve(rows, draws.choice(count, poses, replace=False), weight) for _ in range(_RANDOM)])
+    return Plan(
+        some.at(tour(some.joint_angles, chosen)),
+        some.at(tour(some.joint_angles, judged.tolist())),
+        worth,
+        _curve(rows, order, weight),
+        random,
+    )
+
+
+def fewest_poses(survey: Survey) -> int:
+    """Poses that measure as many numbers as there are parameters."""
+    return -(-count_parameters(survey) // survey.numbers)
+
+
+def poses_needed(curve_m: np.ndarray, accuracy_m: float) -> int | None:
+    """Fewest poses whose curve is at or below an accuracy; None where all of them are not enough."""
+    enough = np.flatnonzero(curve_m <= accuracy_m)
+    return int(enough[0]) + 1 if len(enough) else None
+
+
+def tour(joint_angles: np.ndarray, chosen: list[int]) -> list[int]:
+    """An order in which joints move little: nearest neighbour, then 2-opt [1]_ by the largest angle of a move.
+
+    References
+    ----------
+    .. [1] Croes, G. A., A method for solving traveling-salesman problems, Operations Research 6, 1958.
+    """
+    if len(chosen) < 3:
+        return list(chosen)
+    at = joint_angles[chosen]
+    far = np.abs(at[:, None] - at[None]).max(axis=-1)
+    order, left = [0], set(range(1, len(chosen)))
+    while left:
+        order.append(min(left, key=lambda place: far[order[-1], place]))
+        left.remove(order[-1])
+    improved = True
+    while improved:
+        improved = False
+        for i in range(1, len(order) - 1):
+            for j in range(i + 1, len(order)):
+                after = far[order[j], order[j + 1]] if j + 1 < len(order) else 0.0
+                new = far[order[i], order[j + 1]] if j + 1 < len(order) else 0.0
+                if far[order[i - 1], order[j]] + new < far[order[i - 1], order[i]] + after - 1e-12:
+                    order[i : j + 1] = order[i : j + 1][::-1]
+                    improved = True
+    return [chosen[place] for place in order]
+
+
+def _best_first(rows: np.ndarray, chosen: list[int], weight: np.ndarray) -> list[int]:
+    """The chosen in the order in which each lowers the error most."""
+    places = greedy(rows[chosen], len(chosen), Criterion(weight))
+    return [chosen[place] for place in places]
+
+
+def _curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Accuracy with the first 1, 2, .. of some configurations, ndarray (len(order),), m."""
+    matrix, found = np.eye(rows.shape[2]), []
+    for place in order:
+        more = rows[place].astype(float)
+        matrix = matrix + more.T @ more
+        found.append(np.sqrt(np.trace(np.linalg.solve(matrix, weight))))
+    return np.array(found)

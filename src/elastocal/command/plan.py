@@ -1,0 +1,138 @@
+"""`elastocal plan`: where to measure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+
+from elastocal.command.quantities import length_m, numbers
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from elastocal.application.planning.plan import Plan
+    from elastocal.application.planning.survey import Survey
+    from elastocal.campaigns.campaign import Target
+    from elastocal.mechanics.chain import Chain
+
+
+def plan(
+    robot: Annotated[Path, typer.Argument(help="Robot file.")],
+    output: Annotated[Path | None, typer.Option(help="CSV of the plan; a picture goes beside it.")] = None,
+    folder: Annotated[Path | None, typer.Option(help="New campaign folder, whose measurement columns are empty.")] = None,
+    poses: Annotated[int, typer.Option(min=1, help="Poses to fit.")] = 20,
+    held_out: Annotated[int, typer.Option(min=3, help="Poses that judge the result and choose nothing, drawn at random.")] = 9,
+    accuracy: Annotated[str | None, typer.Option(help="Wanted accuracy such as 0.1mm: as few poses as reach it.")] = None,
+    number: Annotated[int, typer.Option("--candidates", min=10, help="Configurations among which is chosen.")] = 10_000,
+    criterion: Annotated[str, typer.Option(help="D, A or I: determinant, parameters, error over the workspace.")] = "D",
+    force: Annotated[float, typer.Option(min=0.0, help="Force of the load in N; 0 for none.")] = 0.0,
+    pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction; otherwise it hangs.")] = False,
+    measured: Annotated[str, typer.Option(help="position or pose.")] = "position",
+    base_known: Annotated[bool, typer.Option("--base-known", help="Measurements are in the base frame.")] = False,
+    target: Annotated[
+        list[str] | None, typer.Option(help="Measuring point with a reflector, as POINT or POINT=x,y,z in m.")
+    ] = None,
+    tracker: Annotated[str | None, typer.Option(help="Where the tracker stands, x,y,z in m, base axes.")] = None,
+    box: Annotated[list[str] | None, typer.Option(help="Keep out of xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
+    noise: Annotated[str, typer.Option(help="Standard deviation of a coordinate.")] = "0.03mm",
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
+) -> None:
+    """Choose configurations and loads that say most about a robot, among those that arm, cell and tracker allow."""
+    import numpy as np
+
+    from elastocal.application.inverse_kinematics import reach_m
+    from elastocal.application.planning.cell import RADIUS_SHARE, Cell
+    from elastocal.application.planning.criteria import CRITERIA
+    from elastocal.application.planning.plan import Loads, candidates, fewest_poses, planned, poses_needed
+    from elastocal.application.planning.sheet import sheet
+    from elastocal.application.planning.survey import Survey
+    from elastocal.campaigns.reading import read_robot
+    from elastocal.figures.plan import plan_picture
+    from elastocal.figures.style import save
+    from elastocal.io.data_frames import write_csv
+
+    console = Console(stderr=True)
+    arm = read_robot(robot)
+    for name, value, known in (("criterion", criterion, CRITERIA), ("measured", measured, ("position", "pose"))):
+        if value not in known:
+            raise InputError(f"--{name}", "", repr(value), ", ".join(known))
+    if output is None and folder is None:
+        raise InputError("plan", "", "neither --output nor --folder", "where the plan shall go")
+    if folder is not None and folder.exists():
+        raise InputError(folder, "", "a folder that is there", "a new one")
+    loads = Loads(force, pull)
+    targets = _targets(target or [arm.chain.end_effector.name], arm.chain)
+    deviation = length_m("--noise", noise)
+    survey = Survey(arm, targets, not base_known, measured, loads.shares, deviation, deviation)
+    boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in box or ())
+    for corner in boxes:
+        if (corner[:, 0] >= corner[:, 1]).any():
+            raise InputError(
+                "--box", "", str(corner.ravel().tolist()), "xmin,xmax,ymin,ymax,zmin,zmax with each min below its max"
+            )
+    cell = Cell(boxes, None if tracker is None else numbers("--tracker", tracker, 3), RADIUS_SHARE * reach_m(arm))
+    wanted = None if accuracy is None else length_m("--accuracy", accuracy)
+    with console.status("planning"):
+        some = candidates(survey, cell, loads, number, seed)
+        found = planned(survey, some, poses, held_out, criterion, seed)
+        if wanted is not None:
+            enough = poses_needed(found.accuracy_m, wanted)
+            if enough is None:
+                best = f"{1e3 * found.accuracy_m[-1]:.3f} mm with {poses} poses"
+                raise InputError("--accuracy", "", best, "more poses, or an accuracy that they reach")
+            found = planned(survey, some, max(enough, fewest_poses(survey)), held_out, criterion, seed)
+    table = sheet(survey, found)
+    if folder is not None:
+        _write_folder(folder, robot, survey, found, table)
+        output = output or folder / "plan.csv"
+    assert output is not None
+    write_csv(output, table.assign(expected_accuracy_m=float(found.accuracy_m[-1])))
+    save(plan_picture(arm, cell, found), str(output.with_suffix(".pdf")), str(output.with_suffix(".png")))
+    random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
+    lines = [
+        f"{len(found.fitted.joint_angles)} poses to fit and {held_out} held out of {len(some.joint_angles):,} allowed ones: "
+        f"{len(table)} measurements",
+        f"position error that the fit leaves, RMS: {1e3 * found.accuracy_m[-1]:.3f} mm; with random poses "
+        f"{random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f})",
+        f"{criterion}-efficiency: at least {found.efficiency:.2f} of the best design with as many poses",
+        f"    {output}, {output.with_suffix('.pdf')}" + (f", {folder}" if folder else ""),
+    ]
+    for line in lines:
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
+    """Reflectors on measuring points, at a known offset or an unknown one."""
+    from elastocal.campaigns.campaign import Target
+
+    found = []
+    for text in described:
+        point, _, offset = text.partition("=")
+        known = [place.name for place in chain.points]
+        if point not in known:
+            raise InputError("--target", "", repr(point), ", ".join(known))
+        found.append(Target(point, point, tuple(numbers("--target", offset, 3).tolist()) if offset else None))
+    return tuple(found)
+
+
+def _write_folder(folder: Path, robot: Path, survey: Survey, found: Plan, table: pd.DataFrame) -> None:
+    """A campaign to fill in: campaign.yaml, the robot file, and a sheet whose measurement columns are empty."""
+    import shutil
+
+    import yaml
+
+    from elastocal.application.planning.sheet import campaign_document
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.measurements import CSV
+    from elastocal.io.atomic_writes import write_text
+    from elastocal.io.data_frames import write_csv
+
+    folder.mkdir(parents=True)
+    shutil.copyfile(robot, folder / "robot.yaml")
+    write_csv(folder / CSV, table)
+    document = campaign_document(folder.name, "robot.yaml", survey, found)
+    write_text(folder / DOCUMENT, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))

@@ -1,0 +1,71 @@
+"""What a configuration tells is what the fit would learn from it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_surveys import made_candidates, made_survey
+
+from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise import Noise
+from elastocal.fitting.parameters import parameters
+from elastocal.fitting.prediction import predict
+
+
+@pytest.mark.parametrize("measured", ["position", "pose"])
+def test_information_is_the_inverse_of_the_covariance_of_a_fit_with_priors(measured):
+    survey = made_survey(measured=measured)
+    some = made_candidates(survey, 40)
+    model, estimate = model_of(survey)
+    # The fit takes the priors that the plan takes: a plausible size each.
+    effects = tuple(
+        replace(e, parameters=tuple(replace(p, prior_std=p.plausible) for p in e.parameters)) for e in model.effects[1:]
+    )
+    model = replace(model, effects=(model.effects[0], *effects))
+    seen = observed(survey, some.joint_angles, some.force)
+    position, rotation = predict(model, estimate, seen, conditions(model, estimate, seen.states))
+    exact = replace(seen, position=position, rotation=None if seen.rotation is None else rotation)
+    noise = Noise("declared", survey.position_m, survey.orientation_rad, np.zeros(6))
+    found = fit(model, exact, noise, estimate)
+    rows = information(survey, some.joint_angles, some.force).rows.astype(float)
+    scale = np.array([p.plausible for _, p in parameters(model, estimate)])
+    free = np.array([owner.startswith(("frame", "target", "joint_compliance")) for owner, _ in parameters(model, estimate)])
+    prior = np.diag(np.where(free, 0.0, 1.0))
+    here = np.flatnonzero(~found.held)
+    assert len(here) > 30
+    matrix = (prior + np.einsum("nki,nkj->ij", rows, rows))[np.ix_(here, here)]
+    expected = np.linalg.inv(matrix) * np.outer(scale[here], scale[here])
+    std = np.sqrt(np.diag(found.covariance))[here]
+    np.testing.assert_allclose(std, np.sqrt(np.diag(expected)), rtol=0.02)
+
+
+def test_a_survey_without_loads_says_nothing_of_compliances():
+    from elastocal.application.planning.plan import Loads
+
+    assert not any(owner == "joint_compliance" for owner, _ in information_names(made_survey(loads=Loads(0.0, False))))
+    assert any(owner == "joint_compliance" for owner, _ in information_names(made_survey()))
+
+
+def information_names(survey):
+    some = made_candidates(survey, 3)
+    return information(survey, some.joint_angles, some.force).names
+
+
+def test_accuracy_counts_the_frame_in_which_it_is_measured():
+    survey = made_survey()
+    some = made_candidates(survey, 4)
+    rows = accuracy_rows(survey, some.joint_angles, some.force)
+    names = information(survey, some.joint_angles, some.force).names
+    assert rows.shape == (4, 3, len(names))
+    shift = [number for number, (owner, name) in enumerate(names) if owner == "frame 0" and name.startswith("d")]
+    np.testing.assert_allclose(rows[:, :, shift], np.broadcast_to(np.eye(3), (4, 3, 3)), atol=1e-6)
+
+
+def test_every_target_is_seen_under_every_share_in_the_order_of_the_rows():
+    survey = made_survey()
+    some = made_candidates(survey, 2)
+    seen = observed(survey, some.joint_angles, some.force)
+    assert seen.state.tolist() == [0, 1, 2, 3, 4, 5]
+    np.testing.assert_allclose(seen.states.wrench[[1, 2], :3], [some.force[0], -some.force[0]])

@@ -1,0 +1,22 @@
+"""The picture of a plan names what is in it."""
+
+import numpy as np
+from made_surveys import OPEN, made_candidates, made_survey
+
+from elastocal.application.planning.cell import Cell
+from elastocal.application.planning.plan import planned
+from elastocal.figures.plan import plan_picture
+
+
+def test_views_show_boxes_tracker_and_both_kinds_of_poses():
+    survey = made_survey()
+    plan = planned(survey, made_candidates(survey, 300), 14, 4, "D", 1)
+    cell = Cell((np.array([[1.0, 2.0], [0.0, 1.0], [0.0, 1.0]]),), np.array([3.0, 1.0, 1.0]), 0.1)
+    figure = plan_picture(survey.robot, cell, plan)
+    assert [axis.get_title() for axis in figure.axes] == ["from above", "from the side", "what each pose is worth"]
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["to fit", "held out", "kept out of", "tracker", "base"]
+    bare = plan_picture(survey.robot, OPEN, plan)
+    assert [text.get_text() for text in bare.legends[0].get_texts()] == ["to fit", "held out", "base"]
+    last = figure.axes[2].lines[-1].get_ydata()[-1]
+    np.testing.assert_allclose(last, 1e3 * plan.accuracy_m[-1])

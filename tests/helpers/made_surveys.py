@@ -1,0 +1,30 @@
+"""Small surveys and candidates to plan with."""
+
+import numpy as np
+from analysed_robots import analysed
+
+from elastocal.application.planning.cell import Cell
+from elastocal.application.planning.plan import Loads, candidates
+from elastocal.application.planning.survey import Survey
+from elastocal.campaigns.campaign import Target
+
+OPEN = Cell((), None, 0.1)
+PULL = Loads(100.0, True)
+
+
+def made_survey(name="ur10", loads=PULL, measured="position", unknown_base=True):
+    """One reflector at an unknown place of the end effector."""
+    robot = analysed(name)
+    target = Target("T", robot.chain.end_effector.name, None)
+    return Survey(robot, (target,), unknown_base, measured, loads.shares, 6e-5, 6e-5)
+
+
+def made_rows(count=40, numbers=6, parameters=5, seed=1):
+    """Rows of candidates of unlike size and direction."""
+    draws = np.random.default_rng(seed)
+    return (draws.standard_normal((count, numbers, parameters)) * draws.uniform(0.1, 3.0, (count, 1, 1))).astype(np.float32)
+
+
+def made_candidates(survey, count=200, cell=OPEN, loads=PULL):
+    """Configurations that a cell allows."""
+    return candidates(survey, cell, loads, count, 1)
