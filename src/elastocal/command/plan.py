@@ -47,7 +47,7 @@ def plan(
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import RADIUS_SHARE, Cell
     from elastocal.application.planning.criteria import CRITERIA
-    from elastocal.application.planning.plan import Loads, candidates, fewest_poses, planned, poses_needed
+    from elastocal.application.planning.plan import Loads, allowed_candidates, fewest_poses, planned, poses_needed
     from elastocal.application.planning.sheet import sheet
     from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.reading import read_robot
@@ -77,7 +77,7 @@ def plan(
     cell = Cell(boxes, None if tracker is None else numbers("--tracker", tracker, 3), RADIUS_SHARE * reach_m(arm))
     wanted = None if accuracy is None else length_m("--accuracy", accuracy)
     with console.status("planning"):
-        some = candidates(survey, cell, loads, number, seed)
+        some = allowed_candidates(survey, cell, loads, number, seed)
         found = planned(survey, some, poses, held_out, criterion, seed)
         if wanted is not None:
             enough = poses_needed(found.accuracy_m, wanted)

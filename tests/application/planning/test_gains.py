@@ -1,4 +1,4 @@
-"""What planning is worth, and that fits to simulated readings agree with the linear model."""
+"""What planning is worth, and that fits to simulated measurements agree with the linear model."""
 
 import pytest
 from made_surveys import OPEN, PULL, made_survey

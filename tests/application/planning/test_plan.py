@@ -5,7 +5,7 @@ import pytest
 from made_surveys import OPEN, PULL, made_candidates, made_survey
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Loads, candidates, planned, poses_needed, tour
+from elastocal.application.planning.plan import Loads, allowed_candidates, planned, poses_needed, tour
 from elastocal.errors import InputError
 
 
@@ -40,7 +40,7 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, som
     angles = robot.model_angles(some.joint_angles)
     assert (angles >= low).all() and (angles <= high).all()
     np.testing.assert_allclose(np.linalg.norm(some.force, axis=1), 100.0)
-    hung = candidates(survey, OPEN, Loads(50.0, False), 20, 1)
+    hung = allowed_candidates(survey, OPEN, Loads(50.0, False), 20, 1)
     np.testing.assert_allclose(hung.force, np.tile([0, 0, -50.0], (20, 1)))
     assert Loads(0.0, False).shares == (0.0,) and PULL.shares == (0.0, 1.0, -1.0)
 
@@ -48,13 +48,13 @@ def test_candidates_lie_within_the_limits_and_the_loads_pull_or_hang(survey, som
 def test_a_box_around_the_robot_is_refused(survey):
     everywhere = Cell((np.array([[-5.0, 5.0]] * 3),), None, 0.1)
     with pytest.raises(InputError, match="no room"):
-        candidates(survey, everywhere, PULL, 50, 1)
+        allowed_candidates(survey, everywhere, PULL, 50, 1)
 
 
 def test_a_tracker_inside_of_the_robot_is_refused(survey):
     inside = Cell((), np.array([0.0, 0.0, 0.13]), 0.02)
     with pytest.raises(InputError, match="sees the targets in none"):
-        candidates(survey, inside, PULL, 50, 1)
+        allowed_candidates(survey, inside, PULL, 50, 1)
 
 
 def test_too_few_poses_are_refused_with_how_many_it_takes(survey, some):

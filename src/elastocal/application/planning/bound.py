@@ -74,8 +74,8 @@ def efficiency(criterion: Criterion, matrix: np.ndarray, bound: float) -> float:
         D: by determinants, per parameter that the measurements tell more of than the prior; A, I: of variances.
     """
     if criterion.weight is None:
-        told = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))
-        return float(np.exp((criterion.value(matrix) - bound) / told))
+        learned = float(np.trace(np.eye(len(matrix)) - np.linalg.inv(matrix)))
+        return float(np.exp((criterion.value(matrix) - bound) / learned))
     return bound / criterion.value(matrix)
 
 

@@ -1,4 +1,4 @@
-"""How many random poses it takes to know a robot as well as by a plan, and whether fits to simulated readings agree."""
+"""How many random poses it takes to know a robot as well as by a plan, and whether fits to simulated measurements agree."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.application.planning.criteria import Criterion, mean_squares
 from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
-from elastocal.application.planning.plan import candidates
+from elastocal.application.planning.plan import allowed_candidates
 from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
@@ -56,7 +56,7 @@ def gains(survey: Survey, cell: Cell, loads: Loads, poses: int, count: int, seed
         robots.
     """
     draws = np.random.default_rng(seed)
-    some = candidates(survey, cell, loads, count, seed)
+    some = allowed_candidates(survey, cell, loads, count, seed)
     rows = information(survey, some.joint_angles, some.force).rows
     places = some.at(draws.permutation(len(rows))[:_PLACES])
     weight = mean_squares(accuracy_rows(survey, places.joint_angles, places.force))

@@ -101,7 +101,7 @@ class Plan:
     random_m: np.ndarray
 
 
-def candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
+def allowed_candidates(survey: Survey, cell: Cell, loads: Loads, count: int, seed: int) -> Candidates:
     """Configurations within the limits that the cell allows.
 
     Parameters

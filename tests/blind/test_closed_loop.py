@@ -1,0 +1,93 @@
+"""The loop closed on the plant, in small: what is wanted, what each model leaves, and what the plant itself makes the floor."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS, analysed
+
+from elastocal.blind import closed_loop as module
+from elastocal.blind.closed_loop import (
+    DECLARED,
+    FOUND,
+    GEOMETRY,
+    MODELS,
+    PARTS,
+    TRUE,
+    UNCORRECTED,
+    cases,
+    closed_loop,
+    hidden_effects,
+    schema,
+)
+from elastocal.blind.rehearsal import hidden_robot
+from elastocal.io.storage import read_table, write_table
+
+
+@pytest.fixture(scope="module")
+def table():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_POSES", 6)
+        patch.setattr(module, "_PATH", 12)
+        return pd.DataFrame(closed_loop(ROBOTS / "gp180.yaml", ROBOTS, "compensator_torque", 768481013))
+
+
+def rms(table, model):
+    return np.sqrt((table.loc[table["model"] == model, "reached_error_m"] ** 2).mean())
+
+
+def test_each_wanted_pose_is_commanded_by_every_model(table):
+    assert table.groupby(["part", "model"]).size().to_dict() == {
+        (part, model): 12 if part == "milling" else 6 for part in PARTS for model in MODELS
+    }
+    assert table.loc[table["model"].isin([FOUND, TRUE]), "corrected"].all()
+
+
+def test_the_model_found_is_nearer_than_the_declared_one_and_that_nearer_than_a_rigid_robot(table):
+    assert rms(table, TRUE) < rms(table, FOUND) < rms(table, DECLARED)
+    assert rms(table, DECLARED) < min(rms(table, GEOMETRY), rms(table, UNCORRECTED))
+    assert table["named"].all()
+
+
+def test_the_plants_own_inverse_leaves_its_repeatability(table):
+    """Six joints of 5 µrad at levers of up to 3 m."""
+    assert 1e-6 < rms(table, TRUE) < 4e-5
+
+
+def test_the_tracker_adds_its_noise(table):
+    mine = table[table["model"] == TRUE]
+    assert 4e-5 < np.sqrt((mine["measured_error_m"] ** 2).mean()) < 2e-4
+
+
+def test_the_milling_path_is_smooth_at_one_orientation_and_pushes_against_the_feed():
+    robot, plant = analysed("gp180"), hidden_robot(ROBOTS / "gp180.yaml", 3, ["payload"])[0]
+    wanted = module._wanted(robot, plant, 3)
+    path = wanted.part == "milling"
+    at = wanted.position[path]
+    assert np.ptp(at[:, 2]) < 1e-12
+    assert np.abs(np.diff(wanted.start[path], axis=0)).max() < 0.1
+    np.testing.assert_array_equal(wanted.rotation[path], np.broadcast_to(wanted.rotation[path][0], (path.sum(), 3, 3)))
+    force = wanted.wrench[path, :3]
+    np.testing.assert_allclose(np.linalg.norm(force, axis=1), 500.0, rtol=1e-9)
+    assert ((np.gradient(at, axis=0) * force).sum(axis=1) < 0).all()
+    assert not wanted.wrench[wanted.part == "unloaded"].any()
+
+
+def test_every_hidden_effect_moves_the_robot_and_needs_no_covariate():
+    found = hidden_effects(hidden_robot(ROBOTS / "iiwa14.yaml", 1)[0])
+    assert "lost_motion" in found and "payload" in found
+    assert not {"tracker_scale", "force_bias", "frame_drift", "hysteresis", "thermal_growth", "joint_offset"} & set(found)
+
+
+def test_cases_are_fresh_by_the_seed_and_each_effect_comes_as_often():
+    some = list(cases(ROBOTS / "gp180.yaml", 1, 2))
+    assert len(some) == 2 * len({effect for effect, _ in some})
+    assert set(some) != set(cases(ROBOTS / "gp180.yaml", 2, 2))
+    assert some == list(cases(ROBOTS / "gp180.yaml", 1, 2))
+
+
+def test_the_table_goes_to_a_file_and_back(table, tmp_path):
+    columns = {name: table[name].to_numpy() for name in table}
+    write_table(tmp_path / "t.parquet", schema(6), [columns], {})
+    back = read_table(tmp_path / "t.parquet", schema(6))
+    np.testing.assert_array_equal(back["reached_error_m"], table["reached_error_m"])
+    assert set(back["effect"]) == {"compensator_torque"}
