@@ -197,7 +197,7 @@ def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
     wrench = np.zeros((2 * _POSES, 6))
     direction = draws.standard_normal((_POSES, 3))
     wrench[_POSES:, :3] = force * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    path_position, path_rotation, path_shown = _milling_path(robot, plant, draws)
+    path_position, path_rotation, path_shown = bow(robot, _PATH_SHARE * plant.arm.reach_m, _PATH, draws)
     along = np.gradient(path_position, axis=0)
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # Half against the feed and the rest upwards off the part.
@@ -211,19 +211,35 @@ def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
     )
 
 
-def _milling_path(robot: Robot, plant: PhysicalRobot, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A bow in a level plane at one orientation, in a posture that keeps within the limits: positions, rotations, angles."""
+def bow(robot: Robot, length_m: float, count: int, draws: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """A path in a level plane at one orientation, in a posture that keeps within the limits, as for milling.
+
+    Parameters
+    ----------
+    robot : Robot
+    length_m : float
+    count : int
+        Of its poses.
+    draws : numpy.random.Generator
+        Of where it lies.
+
+    Returns
+    -------
+    position, rotation : ndarray (count, 3), (count, 3, 3)
+        m, base axes.
+    reported_angles : ndarray (count, n)
+        Of the rigid robot, rad.
+    """
     low, high = robot.joint_limits.T
-    share = np.linspace(-0.5, 0.5, _PATH)[:, None]
-    length = _PATH_SHARE * plant.arm.reach_m
+    share = np.linspace(-0.5, 0.5, count)[:, None]
     for _ in range(_TRIES):
         middle = (low + (high - low) * (0.5 + 0.5 * (draws.random(robot.joints) - 0.5)))[None]
         heading = draws.uniform(0.0, 2.0 * np.pi)
         ahead, aside = np.array([np.cos(heading), np.sin(heading), 0.0]), np.array([-np.sin(heading), np.cos(heading), 0.0])
         at, turned = nominal_forward(robot, robot.reported_angles(middle))
-        position = at + length * (share * ahead + share**2 * aside)
-        rotation = np.broadcast_to(turned, (_PATH, 3, 3))
-        angles, left = refined(robot, position, rotation, np.repeat(middle, _PATH, axis=0))
+        position = at + length_m * (share * ahead + share**2 * aside)
+        rotation = np.broadcast_to(turned, (count, 3, 3))
+        angles, left = refined(robot, position, rotation, np.repeat(middle, count, axis=0))
         smooth = np.abs(np.diff(angles, axis=0)).max() < 0.1
         if left.max() < SOLVED_M and not beyond_limits(robot, angles).any() and smooth:
             return position, rotation, robot.reported_angles(angles)

@@ -6,6 +6,7 @@ To rehearse a calibration, from the robot's file to the corrected robot, before 
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +23,13 @@ from elastocal.plant.tracker import rotation_vector
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
     from typing import Any
 
     from elastocal.plant.arm import Arm
 
 # What every arm has that was never calibrated, at each of its joints, beside other gears and weights than its file says.
 ERRORS_OF_GEOMETRY = ("joint_offset", "link_geometry")
+_COMPENSATORS = ("compensator_stiffness", "compensator_torque")
 # 10 µm at the end of an arm of 2 m.
 _JOINT_REPEATABILITY_RAD = 5e-6
 _SECONDS_PER_STATE = 25.0
@@ -67,6 +68,9 @@ def hidden_robot(robot_file: str | Path, seed: int, effects: Sequence[str] = ())
     for name in effects:
         if name not in possible:
             raise InputError("rehearsal", "effects", repr(name), ", ".join(possible))
+    # Nobody's catalogue offers a compensator to an arm whose file has none.
+    if "compensator:" not in Path(robot_file).read_text(encoding="utf-8"):
+        possible = [name for name in possible if name not in _COMPENSATORS]
     chosen = tuple(effects) or (possible[stream(seed, "hidden effect").integers(len(possible))],)
     defects = [*_errors_of_geometry(arm, seed), *(drawn_defect(name, arm, seed) for name in chosen)]
     robot = specimen(arm, seed)

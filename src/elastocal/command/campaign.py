@@ -33,3 +33,21 @@ def diagnosed(folder: Path) -> Diagnosed:
 
     top = checkout()
     return load_diagnosed(folder, top / "config" / "robots", top / "results" / "loop")
+
+
+def held_out_rms_m(name: str) -> float | None:
+    """What the model of a campaign missed its held-out poses by (RMS), m; None where no verdict says so.
+
+    Parameters
+    ----------
+    name : str
+        Of the campaign.
+
+    Returns
+    -------
+    float or None
+    """
+    from elastocal.io.json_files import read_json
+
+    path = checkout() / "reports" / "loop" / name / "verdict.json"
+    return read_json(path)["heldout"]["after"]["rms_m"] if path.is_file() else None

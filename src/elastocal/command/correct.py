@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from elastocal.command.campaign import diagnosed
+from elastocal.command.campaign import diagnosed, held_out_rms_m
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ def correct(
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
-    calibrated = diagnosed(folder).calibrated
+    campaign = diagnosed(folder)
+    calibrated = campaign.calibrated
     wanted = read_target_path(path, calibrated.robot.joints)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     for line in assumptions(calibrated, operating):
@@ -56,6 +57,10 @@ def correct(
         raise InputError(path, "", rows + more, "poses that the robot reaches within its limits, or --partial")
     write_csv(output, joint_targets(found))
     console.print(summary(found), markup=False, highlight=False, soft_wrap=True)
+    missed = held_out_rms_m(campaign.name)
+    if missed is not None:
+        line = f"the campaign's held-out poses were missed by {1e3 * missed:.3f} mm (RMS, with the tracker's noise)"
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"    {output}", markup=False, highlight=False, soft_wrap=True)
 
 
