@@ -8,6 +8,7 @@ import typer
 
 from elastocal.command.correct import correct
 from elastocal.command.diagnose import diagnose
+from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.plan import plan
 from elastocal.errors import InputError
@@ -16,6 +17,7 @@ app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, 
 app.command()(diagnose)
 app.command()(correct)
 app.command()(plan)
+app.command()(export)
 app.add_typer(importing)
 
 

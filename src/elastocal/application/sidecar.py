@@ -1,0 +1,81 @@
+"""What goes beside a calibrated robot file: effects that it cannot hold, springs with their errors, conventions in words."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal import __version__
+from elastocal.application.calibrated import forward
+from elastocal.application.calibrated_geometry import SPRINGS, folded
+
+if TYPE_CHECKING:
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+
+CONVENTIONS = {
+    "base": "poses are in the robot's base frame: the frame of the chain before its first transform, as the fit placed it",
+    "joint_angles": "q = matrix * reported + offset of the robot file, rad; reported angles are the controller's",
+    "links": "errors of link k act at its far end, before joint k + 1: Tx Ty Tz Rx Ry Rz in the frame of the chain there",
+    "wrench": "external force and moment on the robot at the last measuring point's origin, base axes, N and N m",
+    "joint_compliance": "a joint turns by its compliance (rad/(N m)) times the torque of wrench and weight about it",
+    "effects": "added to joints and links at the commanded angles; laws by name in the catalogue, elastocal.effects",
+}
+
+
+def sidecar(calibrated: CalibratedRobot, name: str, date: str) -> dict[str, Any]:
+    """Contents of the sidecar.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+    name : str
+        Of the campaign.
+    date : str
+        Of the export, ISO 8601.
+
+    Returns
+    -------
+    dict
+    """
+    deviations = np.sqrt(np.diag(calibrated.covariance))
+    kept = folded(calibrated).left_out
+    entries, springs, start = [], [], 0
+    for number, effect in enumerate(calibrated.model.effects):
+        values = np.concatenate([calibrated.estimate.coefficients[number], calibrated.estimate.shapes[number]])
+        described = [*((p.name, p.unit) for p in effect.parameters), *((s.name, s.unit) for s in effect.shapes)]
+        mine = deviations[start : start + len(values)]
+        start += len(values)
+        listed = [
+            {"name": label, "unit": unit, "value": float(value), "std_error": float(error)}
+            for (label, unit), value, error in zip(described, values, mine, strict=True)
+        ]
+        if effect.effect == SPRINGS:
+            springs = listed
+        elif number in kept:
+            entries.append({"key": effect.key, "effect": effect.effect, "joints": list(effect.joints), "parameters": listed})
+    return {
+        "campaign": name,
+        "robot": calibrated.robot.name,
+        "date": date,
+        "elastocal_version": __version__,
+        "conventions": CONVENTIONS,
+        "joint_compliance": springs,
+        "effects": entries,
+    }
+
+
+def left_out_m(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> np.ndarray:
+    """How far the effects that a robot file cannot hold move the end effector, ndarray (N,), m.
+
+    Parameters
+    ----------
+    calibrated, reported_angles, operating
+        As in `calibrated.forward`.
+    """
+    kept = set(folded(calibrated).left_out)
+    values = tuple(0.0 * v if number in kept else v for number, v in enumerate(calibrated.estimate.coefficients))
+    bare = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+    positions = [forward(each, reported_angles, operating)[0] for each in (calibrated, bare)]
+    return np.linalg.norm(positions[0] - positions[1], axis=1)

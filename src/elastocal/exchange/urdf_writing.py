@@ -1,0 +1,143 @@
+"""A robot file's chain as URDF: joints with their origins, axes and limits, masses, and measuring points as links.
+
+URDF [1]_ is rigid: compliances are not in it. Joint values are the controller's where it counts each joint by itself, in
+either sense; where it couples joints they are the angles of the chain, and a comment says so. A joint that stands in two places
+becomes a mimic joint. Masses are point masses.
+
+References
+----------
+.. [1] ROS, XML Robot Description Format (URDF), https://wiki.ros.org/urdf/XML
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from elastocal.exchange.fixed_transforms import rotation_about, yaw_pitch_roll
+
+if TYPE_CHECKING:
+    from elastocal.mechanics.chain import Transform
+    from elastocal.mechanics.robot import Robot
+
+# URDF asks for them; nothing here depends on them.
+_EFFORT, _VELOCITY = "0", "0"
+
+
+def urdf_of(robot: Robot, comment: str = "") -> str:
+    """A robot as URDF.
+
+    Parameters
+    ----------
+    robot : Robot
+    comment : str
+        Stands at the top.
+
+    Returns
+    -------
+    str
+        Links ``base``, ``link_1 .. link_n``, and one for each measuring point by its name.
+    """
+    own = _counts_by_itself(robot)
+    sense = np.diag(robot.reported_matrix) if own else np.ones(robot.joints)
+    zero = robot.reported_offset if own else np.zeros(robot.joints)
+    names = robot.joint_names or tuple(f"joint_{j}" for j in range(1, robot.joints + 1))
+    root = Xml.Element("robot", name=robot.name.replace(" ", "_"))
+    coupled = "" if own else " Joint values are angles of the chain: the controller couples joints, see the robot file."
+    root.append(Xml.Comment(f" {comment}{coupled} ".replace("--", "- -")))
+    _link(root, robot, 0, "base")
+    parent, here, places = "base", np.eye(4), {point.after: point for point in robot.chain.points}
+    for place in range(len(robot.chain.transforms) + 1):
+        if place in places:
+            point = places[place]
+            offset = np.eye(4)
+            offset[:3, 3] = point.offset_m
+            _fixed(root, parent, point.name, here @ offset)
+            if not any(point.offset_m):
+                parent, here = point.name, np.eye(4)
+        if place == len(robot.chain.transforms):
+            break
+        transform = robot.chain.transforms[place]
+        if transform.coordinate is None:
+            here = here @ _moved(transform, transform.constant)
+            continue
+        joint, passive = transform.coordinate, robot.chain.is_passive(place)
+        start = here @ _moved(transform, transform.sign * zero[joint])
+        name = f"{names[joint]}_again_{place}" if passive else names[joint]
+        child = f"passive_{place}" if passive else f"link_{joint + 1}"
+        _joint(root, robot, transform, name, parent, child, start, sense[joint], zero[joint], names[joint] if passive else "")
+        _link(root, robot, None if passive else joint + 1, child)
+        parent, here = child, np.eye(4)
+    Xml.indent(root)
+    return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
+
+
+def _counts_by_itself(robot: Robot) -> bool:
+    """Whether the controller counts each joint by itself, in steps of its own size."""
+    return bool(np.allclose(np.abs(robot.reported_matrix), np.eye(robot.joints), atol=0.0))
+
+
+def _moved(transform: Transform, amount: float) -> np.ndarray:
+    found = np.eye(4)
+    if transform.kind == "T":
+        found[transform.axis, 3] = amount
+    else:
+        found[:3, :3] = rotation_about("xyz"[transform.axis], amount)
+    return found
+
+
+def _joint(
+    root: Xml.Element,
+    robot: Robot,
+    transform: Transform,
+    name: str,
+    parent: str,
+    child: str,
+    start: np.ndarray,
+    sense: float,
+    zero: float,
+    master: str,
+) -> None:
+    joint = transform.coordinate
+    assert joint is not None
+    kind = "prismatic" if transform.kind == "T" else "revolute"
+    element = Xml.SubElement(root, "joint", name=name, type=kind)
+    _origin(element, start)
+    Xml.SubElement(element, "parent", link=parent)
+    Xml.SubElement(element, "child", link=child)
+    axis = transform.sign * sense * np.eye(3)[transform.axis]
+    Xml.SubElement(element, "axis", xyz=_numbers(axis + 0.0))
+    low, high = sorted((limit - zero) / sense for limit in robot.joint_limits[joint])
+    Xml.SubElement(element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort=_EFFORT, velocity=_VELOCITY)
+    if master:
+        Xml.SubElement(element, "mimic", joint=master, multiplier="1", offset="0")
+
+
+def _link(root: Xml.Element, robot: Robot, body: int | None, name: str) -> None:
+    link = Xml.SubElement(root, "link", name=name)
+    for mass in robot.masses:
+        if mass.link == body:
+            inertial = Xml.SubElement(link, "inertial")
+            Xml.SubElement(inertial, "origin", xyz=_numbers(np.array(mass.centre_m)), rpy="0 0 0")
+            Xml.SubElement(inertial, "mass", value=repr(float(mass.mass_kg)))
+            Xml.SubElement(inertial, "inertia", dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0"))
+
+
+def _fixed(root: Xml.Element, parent: str, name: str, at: np.ndarray) -> None:
+    element = Xml.SubElement(root, "joint", name=f"to_{name}", type="fixed")
+    _origin(element, at)
+    Xml.SubElement(element, "parent", link=parent)
+    Xml.SubElement(element, "child", link=name)
+    Xml.SubElement(root, "link", name=name)
+
+
+def _origin(element: Xml.Element, at: np.ndarray) -> None:
+    yaw, pitch, roll = yaw_pitch_roll(at[:3, :3])
+    Xml.SubElement(element, "origin", xyz=_numbers(at[:3, 3]), rpy=_numbers(np.array([roll, pitch, yaw])))
+
+
+def _numbers(values: np.ndarray) -> str:
+    return " ".join(repr(float(value)) if math.isfinite(value) else "0" for value in values)

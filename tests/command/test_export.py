@@ -1,0 +1,37 @@
+"""The calibrated robot as files that are read again."""
+
+import json
+
+import pytest
+from analysed_robots import ROBOTS, analysed
+from diagnosed_folders import diagnosed_folder
+from typer.testing import CliRunner
+
+from elastocal.campaigns.reading import read_robot
+from elastocal.command import campaign
+from elastocal.command.main import app
+from elastocal.exchange.urdf import robot_from_urdf
+
+
+@pytest.fixture(scope="module")
+def cell(tmp_path_factory):
+    top = tmp_path_factory.mktemp("cell")
+    (top / "config").mkdir()
+    (top / "config" / "robots").symlink_to(ROBOTS)
+    folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
+    (top / "results" / "loop").mkdir()
+    (results / "made").rename(top / "results" / "loop" / "made")
+    return top, folder
+
+
+def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, cell):
+    monkeypatch.setattr(campaign, "checkout", lambda: cell[0])
+    result = CliRunner().invoke(app, ["export", str(cell[1]), "--output", str(tmp_path / "out"), "--date", "2026-11-23"])
+    assert result.exit_code == 0, result.output
+    robot = read_robot(tmp_path / "out" / "robot.yaml")
+    nominal = analysed("kuka")
+    assert abs(robot.reported_offset[2] - nominal.reported_offset[2]) == pytest.approx(3e-4, rel=0.2)
+    assert (robot.compliance != nominal.compliance).any()
+    assert robot_from_urdf(tmp_path / "out" / "robot.urdf", "base", robot.chain.end_effector.name).robot.joints == 6
+    document = json.loads((tmp_path / "out" / "effects.json").read_text())
+    assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6

@@ -1,0 +1,57 @@
+"""A robot as URDF, where pinocchio has it and as it is read back."""
+
+import numpy as np
+import pytest
+from analysed_robots import analysed
+from made_urdf import Pinocchio
+
+from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.exchange.urdf_writing import urdf_of
+from elastocal.mechanics.kinematics import poses
+
+ROBOTS = ("gp180", "iiwa14", "ur10", "fanuc_static", "abb", "wam", "kuka")
+
+
+def written(folder, robot):
+    path = folder / "arm.urdf"
+    path.write_text(urdf_of(robot, "made for a test"))
+    return path
+
+
+def drawn(robot):
+    low, high = robot.joint_limits.T
+    return low + (high - low) * np.random.default_rng(2).random((12, robot.joints))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
+    robot = analysed(name)
+    end = robot.chain.end_effector
+    others = [point.name for point in robot.chain.points[:-1]]
+    back = robot_from_urdf(written(tmp_path, robot), "base", end.name, others).robot
+    angles = drawn(robot)
+    own = np.abs(robot.reported_matrix).tolist() == np.eye(robot.joints).tolist()
+    values = robot.reported_angles(angles) if own else angles
+    for point in robot.chain.points:
+        mine, theirs = (poses(r.chain, q, r.chain.point(point.name)) for r, q in ((robot, angles), (back, values)))
+        np.testing.assert_allclose(theirs[0], mine[0], atol=1e-9)
+        np.testing.assert_allclose(theirs[1], mine[1], atol=1e-9)
+    assert [mass.mass_kg for mass in back.masses] == [m.mass_kg for m in robot.masses]
+
+
+def test_pinocchio_reads_it_too(tmp_path):
+    robot = analysed("fanuc_static")
+    path = written(tmp_path, robot)
+    names = [f"joint_{j}" for j in range(1, 7)]
+    angles = drawn(robot)
+    position, rotation = poses(robot.chain, angles, robot.chain.end_effector)
+    by_pinocchio = Pinocchio(path)
+    for number, values in enumerate(robot.reported_angles(angles)):
+        at = by_pinocchio.pose("base", robot.chain.end_effector.name, dict(zip(names, values, strict=True)))
+        np.testing.assert_allclose(at[0], position[number], atol=1e-9)
+        np.testing.assert_allclose(at[1], rotation[number], atol=1e-9)
+
+
+def test_a_controller_that_couples_joints_is_said_in_a_comment(tmp_path):
+    assert "couples joints" in urdf_of(analysed("fanuc_cpa"))
+    assert "couples joints" not in urdf_of(analysed("gp180"))
