@@ -6,6 +6,7 @@ import sys
 
 import typer
 
+from elastocal.command.check import check
 from elastocal.command.correct import correct
 from elastocal.command.diagnose import diagnose
 from elastocal.command.export import export
@@ -17,6 +18,7 @@ app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, 
 app.command()(diagnose)
 app.command()(correct)
 app.command()(plan)
+app.command()(check)
 app.command()(export)
 app.add_typer(importing)
 

@@ -1,0 +1,137 @@
+"""What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
+
+Held-out poses are counted and no more.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.campaigns.columns import columns_of
+from elastocal.data_checks.catalogue import faults
+from elastocal.diagnosis.linearize import linearized, searched_part
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.case import case_from
+from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.loop.loading import load_campaign
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from elastocal.campaigns.campaign import Campaign
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+
+# Held-out poses of which a 95 % interval of an RMS is wider than a factor of two.
+FEWEST_HELD_OUT = 6
+# Loads whose directions span less than this share of the largest in a second direction pull in one line.
+_ONE_DIRECTION = 0.05
+_FEW_ANGLES = re.compile(r"\d+ angles of joint \d+ where \d+ are needed")
+
+
+def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
+    """Look through a campaign.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `reading.read_campaign`.
+
+    Returns
+    -------
+    dict
+        ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
+        measurements, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
+        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters`` and ``held`` (those that are not
+        identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
+        ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``.
+
+    Raises
+    ------
+    InputError
+    """
+    descriptions, training, held_out = load_campaign(folder, robots_folder)
+    case = case_from(descriptions, columns_of(training))
+    campaign, states = case.campaign, case.observations.states
+    found = faults(campaign, campaign.measurements)
+    noise, warnings = estimated_noise(case)
+    declared = fit(case.model, case.observations, noise)
+    decisive = any(fault.decisive for fault in found)
+    facts: dict[str, Any] = {
+        "campaign": campaign.name,
+        "robot": campaign.robot.name,
+        "joints": campaign.robot.joints,
+        "targets": [target.name for target in campaign.targets],
+        "frame": campaign.frame,
+        "measured": campaign.measured,
+        "training": {"poses": _poses(training.session, training.pose)},
+        "held_out": {"poses": _poses(held_out.session, held_out.pose)},
+        "states": len(states),
+        "measurements": len(training),
+        "loads": sorted({int(load) for load in states.load}),
+        "repeats": int(states.repeats.max()),
+        "sessions": len(np.unique(states.session)),
+        "largest_force_N": float(np.linalg.norm(states.wrench[:, :3], axis=1).max()),
+        "noise": {"source": noise.source, "position_m": noise.position_m, "orientation_rad": noise.orientation_rad},
+        "faults": [{"name": f.name, "sentence": f.detail, "decisive": f.decisive} for f in found],
+        "residual_rms_m": float(np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())),
+        "diagnosable": not decisive,
+    }
+    return (
+        facts
+        | _identified(declared)
+        | _testable(case, declared)
+        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case)]}
+    )
+
+
+def _poses(session: np.ndarray, pose: np.ndarray) -> int:
+    return len(np.unique(np.column_stack([session, pose]), axis=0))
+
+
+def _identified(declared: Fit) -> dict[str, Any]:
+    named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
+    found: dict[str, Any] = {
+        "parameters": int((~declared.held).sum()),
+        "held": [name for name, held in zip(named, declared.held, strict=True) if held],
+    }
+    if declared.model.identifies_compliance:
+        mine = np.array([owner == "joint_compliance" for owner, _ in declared.parameters])
+        values = joint_compliances(declared.model, declared.estimate)
+        errors = np.sqrt(np.diag(declared.covariance))[mine]
+        found["compliance"] = [
+            {"value_urad_per_Nm": 1e6 * float(value), "relative_std_error": None if held else float(abs(error / value))}
+            for value, error, held in zip(values, errors, declared.held[mine], strict=True)
+        ]
+    return found
+
+
+def _testable(case: Case, declared: Fit) -> dict[str, Any]:
+    about, searched = searched_part(declared, case.observations, Settings())
+    found = linearized(about, searched, list(case.candidates.values()), Settings())
+    reasons = Counter(_FEW_ANGLES.sub("too few different angles of a joint", reason) for reason in found.untestable.values())
+    return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
+
+
+def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case) -> list[str]:
+    found, states = [], case.observations.states
+    if facts["repeats"] == 1:
+        found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
+    if facts["held_out"]["poses"] < FEWEST_HELD_OUT:
+        found.append(f"{facts['held_out']['poses']} held-out poses say little of the error: {FEWEST_HELD_OUT} or more would")
+    forces = states.wrench[states.wrench.any(axis=1), :3]
+    if len(forces):
+        spread = np.linalg.svd(forces, compute_uv=False)
+        if spread[1] < _ONE_DIRECTION * spread[0]:
+            found.append("all loads pull along one line: compliances across it are not shown")
+    elif campaign.compliance == "identify":
+        found.append("no measurement is under a load: compliances are not identifiable")
+    if len(facts["loads"]) == 2:
+        found.append("one load beside none: what is not linear in the load cannot be distinguished")
+    return found

@@ -1,0 +1,60 @@
+"""What is said of a campaign before it is diagnosed."""
+
+import json
+
+import numpy as np
+import pytest
+from made_folders import made_folder, made_table
+
+from elastocal.loop.overview import overview
+
+
+@pytest.fixture(scope="module")
+def facts(kuka, config_folder, tmp_path_factory):
+    return overview(made_folder(tmp_path_factory.mktemp("o") / "made", kuka), config_folder / "robots")
+
+
+def test_what_was_read_is_counted(facts):
+    assert facts["training"]["poses"] + facts["held_out"]["poses"] == 14
+    assert facts["targets"] == ["3DoF", "6DoF"] and facts["joints"] == 6
+    assert facts["loads"] == [0, 1] and facts["repeats"] == 2
+    assert facts["largest_force_N"] == pytest.approx(800.0)
+    json.dumps(facts)
+
+
+def test_springs_have_their_errors_and_candidates_their_reasons(facts):
+    assert facts["diagnosable"] and facts["faults"] == []
+    assert all(0 < spring["relative_std_error"] < 1 for spring in facts["compliance"][:5])
+    assert facts["testable"] > 20
+    assert sum(facts["untestable"].values()) > 0 and all(facts["untestable"])
+    assert any("one load beside none" in sentence for sentence in facts["suspicious"])
+    assert any("held-out poses say little" in sentence for sentence in facts["suspicious"])
+
+
+def test_a_decisive_fault_is_said_and_the_campaign_is_not_diagnosable(kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made")
+    table["q3"] = -table["q3"]
+    facts = overview(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    assert not facts["diagnosable"]
+    assert any(fault["decisive"] and "joint 3" in fault["sentence"] for fault in facts["faults"])
+
+
+def test_loads_along_one_line_are_suspicious(kuka, config_folder, tmp_path):
+    table = made_table(kuka, "made")
+    for name in ("fx", "fy"):
+        table[name] = np.zeros_like(table[name])
+    facts = overview(made_folder(tmp_path / "made", kuka, table=table), config_folder / "robots")
+    assert any("along one line" in sentence for sentence in facts["suspicious"])
+
+
+def test_held_out_values_change_nothing_that_is_said(kuka, config_folder, tmp_path, facts):
+    """The wall: their readings may be anything."""
+    document = {"poses": [11, 12, 13]}
+    results = []
+    for number, off in enumerate((0.0, 1e-3)):
+        table = made_table(kuka, "made")
+        held = np.isin(table["pose"], document["poses"])
+        table["x"] = table["x"] + off * held
+        folder = made_folder(tmp_path / f"made{number}", kuka, "made", table=table, holdout=document)
+        results.append(overview(folder, config_folder / "robots"))
+    assert results[0] == results[1]
