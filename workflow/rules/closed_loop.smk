@@ -17,7 +17,6 @@ rule close_loop:
     benchmark:
         "results/timings/close_loop/{robot}.tsv"
     params:
-        robots="config/robots",
         each=CLOSED_LOOP["each"],
         seed=config["seed"],
     script:

@@ -11,9 +11,9 @@ from job import Job, run
 
 
 def close_loop(job: Job) -> None:
-    robot, robots = job.input.robot, job.params.robots
-    blocks = (closed_loop(robot, robots, *case) for case in cases(robot, job.params.seed, job.params.each))
-    write_table(job.output.moved, schema(read_robot(Path(robot)).joints), blocks, provenance(job.params, **job.wildcards))
+    robot = Path(job.input.robot)
+    blocks = (closed_loop(str(robot), str(robot.parent), *case) for case in cases(str(robot), job.params.seed, job.params.each))
+    write_table(job.output.moved, schema(read_robot(robot).joints), blocks, provenance(job.params, **job.wildcards))
 
 
 run(close_loop, snakemake)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.ticker import StrMethodFormatter
 
 from elastocal.figures.style import PALETTE, panels, styled
 
@@ -44,6 +45,7 @@ def closed_loop(table: pd.DataFrame) -> Figure:
             limits = np.abs(mine[["rms_mm_low", "rms_mm_high"]].to_numpy().T - mine["rms_mm"].to_numpy())
             axis.errorbar(mine["rms_mm"], place, xerr=limits, fmt="o", ms=3.5, lw=1.2, color=PALETTE[number], label=robot)
         axis.set_xscale("log")
+        axis.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.set_title(words)
         axis.set_xlabel("position error, RMS (mm)")
     axes[0, 0].set_yticks(np.arange(len(_WORDS))[::-1], list(_WORDS.values()))
