@@ -1,10 +1,11 @@
 """YAML documents: read, and refused in one line that names file, key and what is allowed."""
 
 import pytest
+import yaml
 from support import changed, refused
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, read_document, read_schema
+from elastocal.io.documents import check_document, one_line, read_document, read_schema
 
 ROBOT = {
     "name": "one joint",
@@ -144,3 +145,9 @@ def test_a_urdf_for_a_document_is_told_how_it_is_imported(tmp_path, start):
     path.write_text(start, encoding="utf-8")
     with refused(path, "", "XML", "elastocal import urdf"):
         read_document(path)
+
+
+@pytest.mark.parametrize("value", ["a: b", "# a", 6e-5, [1, [2.5, None]], {"ü": "x" * 300}, "", True])
+def test_a_value_on_one_line_reads_back(value):
+    text = one_line(value)
+    assert "\n" not in text and yaml.safe_load(f"key: {text}") == {"key": value}

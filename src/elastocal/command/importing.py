@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from elastocal.command.import_csv import csv
 from elastocal.command.import_dh import dh
 from elastocal.command.import_urdf import urdf
 
@@ -17,3 +18,4 @@ def import_() -> None:
 
 importing.command()(urdf)
 importing.command()(dh)
+importing.command()(csv)

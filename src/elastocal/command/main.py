@@ -11,10 +11,12 @@ from elastocal.command.correct import correct
 from elastocal.command.diagnose import diagnose
 from elastocal.command.export import export
 from elastocal.command.importing import importing
+from elastocal.command.init import init
 from elastocal.command.plan import plan
 from elastocal.errors import InputError
 
 app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+app.command()(init)
 app.command()(diagnose)
 app.command()(correct)
 app.command()(plan)

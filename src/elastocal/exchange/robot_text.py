@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
-from elastocal.io.documents import check_document
+from elastocal.io.documents import check_document, one_line
 from elastocal.mechanics.robot_file import robot_from_document
 
 if TYPE_CHECKING:
@@ -166,18 +164,13 @@ def _lines(key: str, value: Any) -> list[str]:
     if key == "chain":
         return ["chain: >-", *textwrap.wrap(value, _WIDTH, initial_indent=_INDENT, subsequent_indent=_INDENT, **_WHOLE_WORDS)]
     if key == "masses":
-        return ["masses:", *(f"{_INDENT}- {_flow(entry)}" for entry in value)]
+        return ["masses:", *(f"{_INDENT}- {one_line(entry)}" for entry in value)]
     if key == "joint_limits_deg":
-        return textwrap.wrap(f"{key}: {_flow(value)}", _WIDTH, subsequent_indent=_INDENT, **_WHOLE_WORDS)
-    return [f"{key}: {_flow(value)}"]
+        return textwrap.wrap(f"{key}: {one_line(value)}", _WIDTH, subsequent_indent=_INDENT, **_WHOLE_WORDS)
+    return [f"{key}: {one_line(value)}"]
 
 
 _WHOLE_WORDS: dict[str, Any] = {"break_on_hyphens": False, "break_long_words": False}
-
-
-def _flow(value: Any) -> str:
-    text = yaml.safe_dump(value, default_flow_style=True, width=math.inf, sort_keys=False, allow_unicode=True)
-    return text.removesuffix("\n").removesuffix("\n...")
 
 
 def refuse_existing(path: str | Path, force: bool) -> None:

@@ -78,6 +78,21 @@ def read_document(path: str | Path) -> Any:
         raise InputError(path, where, getattr(error, "problem", None) or str(error), "YAML") from None
 
 
+def one_line(value: Any) -> str:
+    """A value as YAML on one line.
+
+    Parameters
+    ----------
+    value : object
+
+    Returns
+    -------
+    str
+    """
+    text: str = yaml.safe_dump(value, default_flow_style=True, width=math.inf, sort_keys=False, allow_unicode=True)
+    return text.removesuffix("\n").removesuffix("\n...")
+
+
 @cache
 def read_schema(name: str) -> dict[str, Any]:
     """One of the package's schemas: ``config``, ``robot`` or ``strategy``."""

@@ -1,0 +1,135 @@
+"""`elastocal import csv`: measurements from another program's table."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from elastocal.exchange.measurement_table import ImportedMeasurements, ImportOptions
+
+
+class Separator(StrEnum):
+    """What stands between cells."""
+
+    TAB, SEMICOLON, BAR, COMMA, SPACE = "tab", "semicolon", "bar", "comma", "space"
+
+
+class Decimal(StrEnum):
+    """Decimal marks."""
+
+    POINT, COMMA = "point", "comma"
+
+
+class Wrench(StrEnum):
+    """What forces act on."""
+
+    ON_ROBOT, BY_ROBOT = "on-robot", "by-robot"
+
+
+def csv(
+    file: Annotated[Path, typer.Argument(help="The table: CSV, tabs, semicolons, spaces; UTF-8 or UTF-16.")],
+    folder: Annotated[Path, typer.Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
+    angles: Annotated[str | None, typer.Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
+    lengths: Annotated[str | None, typer.Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
+    rotation: Annotated[
+        str | None,
+        typer.Option(
+            help="Orientations: none, vector, quaternion, matrix, homogeneous, euler:ZYX (moving axes), euler:xyz (fixed)."
+        ),
+    ] = None,
+    column: Annotated[list[str] | None, typer.Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
+    unit: Annotated[list[str] | None, typer.Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
+    target: Annotated[str | None, typer.Option(help="Name of the target where no column has it.")] = None,
+    wrench: Annotated[Wrench | None, typer.Option(help="Forces on the robot, or those that it exerts.")] = None,
+    skip_empty: Annotated[bool, typer.Option("--skip-empty", help="Leave out rows without a position.")] = False,
+    separator: Annotated[Separator | None, typer.Option(help="Found out where not given.")] = None,
+    decimal: Annotated[Decimal | None, typer.Option(help="Found out where not given.")] = None,
+    header: Annotated[int | None, typer.Option(min=1, help="Line of the names of columns; found out where not given.")] = None,
+    options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is there.")] = False,
+) -> None:
+    """Make measurements.csv of another program's table.
+
+    Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
+    load, repeat, target, time), units by brackets or endings ("X [mm]", x_mm). What is ambiguous is asked for. Poses, loads and
+    repeats that no column numbers are counted. The options, and what was found out, are written to import.yaml.
+    """
+    from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
+    from elastocal.exchange.import_options import IMPORT, import_options_text, read_import_options
+    from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+    from elastocal.io.atomic_writes import atomic_write, write_text
+
+    if (folder / PARQUET).exists() or ((folder / CSV).exists() and not force and _is_filled(folder / CSV)):
+        raise InputError(
+            folder, "", "measurements that are there already", "another folder, or --force to replace measurements.csv"
+        )
+    earlier = read_import_options(options) if options else ImportOptions()
+    units = _pairs("--unit", unit) | {
+        key: value for key, value in (("angles", angles), ("lengths", lengths)) if value is not None
+    }
+    chosen = ImportOptions(
+        separator=separator.value if separator else earlier.separator,
+        decimal=decimal.value if decimal else earlier.decimal,
+        header=header or earlier.header,
+        columns=dict(earlier.columns or {}) | _pairs("--column", column),
+        units=dict(earlier.units or {}) | units,
+        rotation=rotation or earlier.rotation,
+        target=target or earlier.target,
+        wrench=wrench.value if wrench else earlier.wrench,
+        skip_empty=skip_empty or earlier.skip_empty,
+    )
+    found = read_measurement_table(file, chosen)
+    folder.mkdir(parents=True, exist_ok=True)
+    with atomic_write(folder / CSV) as partial:
+        write_measurements(partial, found.table, found.joints)
+    write_text(folder / IMPORT, import_options_text(found.options, file))
+    typer.echo(
+        "\n".join([*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"])
+    )
+
+
+def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
+    found = {}
+    for text in texts or ():
+        name, equals, value = text.partition("=")
+        if not (name and equals and value):
+            raise InputError(option, "", repr(text), "NAME=VALUE")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def _is_filled(path: Path) -> bool:
+    """Whether a sheet holds a measurement: one of `init`, a header alone, may be replaced."""
+    with path.open(encoding="utf-8") as file:
+        return sum(1 for line in file if line.strip()) > 1
+
+
+def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
+    import numpy as np
+
+    from elastocal.mechanics.components import WRENCH_NAMES
+
+    table = found.table
+    poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
+    targets = ", ".join(sorted(set(table["target"].tolist())))
+    first = [f"{len(table['pose'])} measurements of {targets} at {poses} poses, {found.joints} joints"]
+    if found.skipped:
+        first.append(f"left out: {found.skipped} rows without a position")
+    read = [f"{name} from {header!r}" + (f" in {options.units[name]}" if options.units and name in options.units else "")
+            for name, header in (options.columns or {}).items()]  # fmt: skip
+    counted = [name for name in ("pose", "load", "repeat") if name not in (options.columns or {})]
+    lines = [*first, f"read: {'; '.join(read)}", f"orientations: {options.rotation}"]
+    if counted:
+        lines.append(f"counted, as no column has it: {', '.join(counted)}")
+    forces = [name for name in WRENCH_NAMES if name not in (options.columns or {})]
+    if forces:
+        lines.append(f"taken for zero, as no column has it: {', '.join(forces)}")
+    if found.ignored:
+        lines.append(f"not used: {', '.join(found.ignored)}")
+    return lines

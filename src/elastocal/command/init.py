@@ -1,0 +1,43 @@
+"""`elastocal init`: a campaign's folder to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from elastocal.errors import InputError
+
+
+def init(
+    folder: Annotated[Path, typer.Argument(help="New folder, or one that has measurements or a robot file already.")],
+    robot: Annotated[Path | None, typer.Option(help="Robot file to copy there; a template where there is none.")] = None,
+) -> None:
+    """Write a campaign.yaml with every key explained, robot.yaml and the header of measurements.csv; nothing is replaced."""
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.measurements import CSV, PARQUET
+    from elastocal.campaigns.reading import read_robot
+    from elastocal.campaigns.template import campaign_template, robot_template, sheet_template
+    from elastocal.io.atomic_writes import write_text
+
+    place = folder / "robot.yaml"
+    if (folder / DOCUMENT).exists():
+        raise InputError(folder / DOCUMENT, "", "a campaign that is there already", "a folder without campaign.yaml")
+    if robot is not None and place.exists():
+        raise InputError(place, "", "a robot that is there already", "a folder without robot.yaml, or no --robot")
+    text = robot_template() if robot is None else robot.read_text(encoding="utf-8") if robot.is_file() else ""
+    source = place if place.exists() else robot
+    arm = None if source is None else read_robot(source)
+    folder.mkdir(parents=True, exist_ok=True)
+    if not place.exists():
+        write_text(place, text)
+    arm = arm or read_robot(place)
+    written = [place.name, DOCUMENT]
+    if not (folder / CSV).exists() and not (folder / PARQUET).exists():
+        write_text(folder / CSV, sheet_template(arm.joints))
+        written.append(CSV)
+    write_text(folder / DOCUMENT, campaign_template(folder.resolve().name, arm))
+    typer.echo(f"{folder.as_posix()}: {', '.join(written)}")
+    if source is None:
+        typer.echo("robot.yaml is a template: put your robot's chain and lengths there, or elastocal import urdf|dh")

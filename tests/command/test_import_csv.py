@@ -1,0 +1,46 @@
+import pytest
+from typer.testing import CliRunner
+
+from elastocal.command.main import app
+from elastocal.errors import InputError
+
+TEXT = "J1;X;Y;Z\n90;1000,5;2;3\n-90;1000;2;3\n"
+OPTIONS = ("--angles", "deg", "--lengths", "mm", "--target", "smr")
+
+
+def run(folder, *more, text=TEXT):
+    (folder / "t.csv").write_text(text)
+    return CliRunner().invoke(app, ["import", "csv", str(folder / "t.csv"), "--folder", str(folder / "cell"), *more])
+
+
+def test_a_table_becomes_measurements_and_the_options_are_kept(tmp_path):
+    result = run(tmp_path, *OPTIONS)
+    assert result.exit_code == 0, result.exception
+    assert "2 measurements of smr at 2 poses, 1 joints" in result.output and "counted" in result.output
+    lines = (tmp_path / "cell" / "measurements.csv").read_text().splitlines()
+    assert lines[0] == "pose,load,repeat,target,q1,x,y,z" and lines[1].startswith("1,0,0,smr,1.57079") and "1.0005" in lines[1]
+
+
+def test_an_import_is_repeated_by_its_options(tmp_path):
+    assert run(tmp_path, *OPTIONS).exit_code == 0
+    kept = [(tmp_path / "cell" / name).read_bytes() for name in ("measurements.csv", "import.yaml")]
+    (tmp_path / "cell" / "import.yaml").rename(tmp_path / "import.yaml")
+    assert run(tmp_path, "--options", str(tmp_path / "import.yaml"), "--force").exit_code == 0
+    assert [(tmp_path / "cell" / name).read_bytes() for name in ("measurements.csv", "import.yaml")] == kept
+
+
+def test_measurements_that_are_there_stay_unless_forced_and_an_empty_sheet_is_filled(tmp_path):
+    (tmp_path / "cell").mkdir()
+    sheet = tmp_path / "cell" / "measurements.csv"
+    sheet.write_text("pose,load\n")
+    assert run(tmp_path, *OPTIONS).exit_code == 0
+    before = sheet.read_bytes()
+    result = run(tmp_path, *OPTIONS)
+    assert isinstance(result.exception, InputError) and "--force" in str(result.exception)
+    assert sheet.read_bytes() == before
+
+
+@pytest.mark.parametrize("option", [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon")])
+def test_bad_options_leave_nothing_behind(tmp_path, option):
+    assert isinstance(run(tmp_path, *OPTIONS, *option).exception, InputError)
+    assert not (tmp_path / "cell").exists()

@@ -1,0 +1,59 @@
+"""Columns are known by what they are usually called, with their units."""
+
+import math
+
+import pytest
+
+from elastocal.exchange.column_names import UNITS, is_name, joints_in, kind_of, recognized, unit_scale, units_of
+
+
+@pytest.mark.parametrize(
+    ("header", "name", "unit"),
+    [
+        ("q1", "q1", None),
+        ("J3 [deg]", "q3", "deg"),
+        ("Joint 4 (rad)", "q4", "rad"),
+        ("A6", "q6", None),
+        ("Axis_2_deg", "q2", "deg"),
+        ("X", "x", None),
+        ("x_mm", "x", "mm"),
+        ("Position Y [mm]", "y", "mm"),
+        ("Yaw (°)", "rz", "°"),
+        ("Force X [kN]", "fx", "kN"),
+        ("mz [N m]", "mz", "Nm"),
+        ("mx (N·mm)", "mx", "Nmm"),
+        ("Time [ms]", "time_s", "ms"),
+        ("time_s", "time_s", "s"),
+        ("Temperature [°C]", "temperature_c", "°C"),
+        ("SMR", "target", None),
+        ("t14", "t14", None),
+        ("approach5", "approach5", None),
+        # Whose first joint 0 is, and what an operator is, an option has to say.
+        ("q0", None, None),
+        ("Operator", None, None),
+        ("tx", None, None),
+        ("x_furlong", None, None),
+    ],
+)
+def test_headers_are_recognized(header, name, unit):
+    assert recognized(header) == (name, unit)
+    assert name is None or is_name(name)
+
+
+def test_units_are_those_of_the_kind():
+    assert unit_scale("x", "mm") == 1e-3
+    assert unit_scale("q1", "deg") == math.pi / 180.0
+    # Of a prismatic joint.
+    assert unit_scale("q7", "mm") == 1e-3
+    assert unit_scale("x", "deg") is None
+    assert unit_scale("fx", "kgf") == 9.80665
+    assert "mm" in units_of("q2") and "mm" not in units_of("rx")
+
+
+def test_every_unit_of_every_kind_has_a_positive_value():
+    assert all(scale > 0 for units in UNITS.values() for scale in units.values())
+    assert kind_of("pose") == ("none",)
+
+
+def test_joints_are_in_their_order():
+    assert joints_in(["q10", "x", "q2", "qw"]) == ["q2", "q10"]

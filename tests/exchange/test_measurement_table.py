@@ -1,0 +1,96 @@
+"""Another program's table becomes measurements; what it leaves open is asked for."""
+
+import math
+
+import numpy as np
+import pytest
+from support import refused
+
+from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+
+PLAIN = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr")
+
+
+def table(folder, text, options=PLAIN):
+    (folder / "t.csv").write_text(text)
+    return read_measurement_table(folder / "t.csv", options)
+
+
+def test_angles_lengths_and_forces_come_in_si_units(tmp_path):
+    found = table(tmp_path, "J1;J2;X;Y;Z;Fz [kN];Time [ms]\n90;-45;1000;2;3;0,5;2000\n")
+    row = {name: values[0] for name, values in found.table.items()}
+    assert (row["q1"], row["q2"], row["x"], row["fz"], row["fx"]) == (math.pi / 2, -math.pi / 4, 1.0, 500.0, 0.0)
+    assert (row["time_s"], row["target"], row["pose"], row["load"], row["repeat"]) == (2.0, "smr", 1, 1, 0)
+
+
+def test_forces_that_the_robot_exerts_are_turned_round(tmp_path):
+    options = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr", wrench="by-robot")
+    found = table(tmp_path, "q1,x,y,z,fx,fy,fz\n0,1,2,3,5,0,-7\n", options)
+    assert [found.table[name][0] for name in ("fx", "fy", "fz")] == [-5.0, 0.0, 7.0]
+    assert not np.signbit(found.table["fy"]).any()
+
+
+def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
+    rows = ["0,0", "0,0", "0,9", "0,9", "10,0", "10,-9", "10,9", "0.001,9"]
+    found = table(tmp_path, "q1,fz,x,y,z\n" + "\n".join(f"{row},1,2,3" for row in rows))
+    # 0.001 degrees apart is the same pose; a repeat is the same state again.
+    assert found.table["pose"].tolist() == [1, 1, 1, 1, 2, 2, 2, 1]
+    assert found.table["load"].tolist() == [0, 0, 1, 1, 0, 1, 2, 1]
+    assert found.table["repeat"].tolist() == [0, 1, 0, 1, 0, 0, 0, 2]
+
+
+def test_labels_of_poses_are_numbered_and_numbers_stay(tmp_path):
+    assert table(tmp_path, "pose,q1,x,y,z\nP7,1,1,2,3\nP2,2,1,2,3\nP7,1,1,2,3\n").table["pose"].tolist() == [1, 2, 1]
+    assert table(tmp_path, "pose,q1,x,y,z\n7,1,1,2,3\n2,2,1,2,3\n").table["pose"].tolist() == [7, 2]
+
+
+def test_a_homogeneous_matrix_gives_position_and_orientation(tmp_path):
+    header = "q1," + ",".join(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))
+    found = table(tmp_path, f"{header}\n0,0,-1,0,100,1,0,0,200,0,0,1,300\n")
+    np.testing.assert_allclose([found.table[name][0] for name in ("x", "y", "z")], [0.1, 0.2, 0.3])
+    np.testing.assert_allclose([found.table[name][0] for name in ("rx", "ry", "rz")], [0, 0, math.pi / 2], atol=1e-15)
+
+
+def test_the_options_found_out_give_the_same_again(tmp_path):
+    text = "made by\nq1 [rad];X [in];Y [in];Z [in];qw;qx;qy;qz;note\n0,5;1;2;3;1;0;0;0;a\n0,6;1;2;3;0;1;0;0;b\n"
+    found = table(tmp_path, text, ImportOptions(target="smr"))
+    assert found.ignored == ("note",)
+    assert (found.options.separator, found.options.decimal, found.options.header) == ("semicolon", "comma", 2)
+    assert found.options.units == {"q1": "rad", "x": "in", "y": "in", "z": "in"}
+    again = table(tmp_path, text, found.options)
+    assert again.options == found.options
+    for name, values in found.table.items():
+        np.testing.assert_array_equal(again.table[name], values)
+
+
+def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
+    text = "q1,x,y,z\n1,1,2,3\n2,,,\n3,1,2,3\n"
+    refused(lambda: table(tmp_path, text), "line 3", "no position", "--skip-empty")
+    options = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr", skip_empty=True)
+    found = table(tmp_path, text, options)
+    assert (len(found.table["x"]), found.skipped) == (2, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "words"),
+    [
+        ("q1,x,y,z\n0,1,2,3\n", ImportOptions(target="a"), ["no unit of 'q1'", "--angles"]),
+        ("q1 [deg],x,y,z\n0,1,2,3\n", ImportOptions(target="a"), ["no unit of 'x'", "--lengths"]),
+        ("q1,x,y,z\n0,1,2,3\n", ImportOptions(units=PLAIN.units), ["no column target", "--target"]),
+        ("q1,x,y,z,rx,ry,rz\n0,1,2,3,0,0,0\n", PLAIN, ["rx, ry, rz", "euler:ZYX"]),
+        ("q1,x,y,z,Roll\n0,1,2,3,0\n", PLAIN, ["Roll", "--rotation"]),
+        ("q1,q3,x,y,z\n0,0,1,2,3\n", PLAIN, ["no column q2"]),
+        ("x,y,z\n1,2,3\n", PLAIN, ["no joint angles", "--column q1"]),
+        ("q1,J1,x,y,z\n0,0,1,2,3\n", PLAIN, ["both 'q1' and 'J1'", "--column q1=NAME"]),
+        ("q1,x,y,z\n0,1,a,3\n", PLAIN, ["line 2, column y", "'a'", "number"]),
+        ("q1,x,y,z\n0,1,nan,3\n", PLAIN, ["line 2, column y", "finite"]),
+        ("q1,x,y,z,repeat\n0,1,2,3,0.5\n", PLAIN, ["line 2, column repeat", "an integer"]),
+        ("q1,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,1,0,0\n", PLAIN, ["line 2, column qw", "length 1"]),
+        ("q1,x [bananas],y,z\n0,1,2,3\n", PLAIN, ["unit of 'x [bananas]'", "mm"]),
+        ("q1,x,y,z\n0,1,2,3\n", ImportOptions(columns={"qq": "x"}), ["--column", "'qq'"]),
+        ("q1,x,y,z\n0,1,2,3\n", ImportOptions(columns={"q1": "Q"}), ["no column 'Q'"]),
+        ("q1,x,y,z\n0,1,2,3\n", ImportOptions(units=PLAIN.units, rotation="rpy"), ["--rotation", "'rpy'", "euler:"]),
+    ],
+)
+def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(tmp_path, text, options, words):
+    refused(lambda: table(tmp_path, text, options), *words)
