@@ -36,6 +36,7 @@ def two_measurements(**others):
         "approach": [[1, -1], [0, 1]],
         "time_s": [71, 81],
         "temperature_c": [72, 82],
+        "u95_m": [73, 83],
         "row": [91, 92],
     }
     return Measurements(**{name: None if v is None else np.array(v) for name, v in (parts | others).items()})
@@ -50,7 +51,7 @@ def test_every_number_stands_in_the_column_of_its_name():
     expected = identity | {"q1": [0.1, 0.3], "q2": [0.2, 0.4]}
     expected |= {"fx": [11, 21], "fy": [12, 22], "fz": [13, 23], "mx": [14, 24], "my": [15, 25], "mz": [16, 26]}
     expected |= {"x": [31, 41], "y": [32, 42], "z": [33, 43], "rx": [51, 61], "ry": [52, 62], "rz": [53, 63]}
-    expected |= {"approach1": [1, 0], "approach2": [-1, 1], "time_s": [71, 81], "temperature_c": [72, 82]}
+    expected |= {"approach1": [1, 0], "approach2": [-1, 1], "time_s": [71, 81], "temperature_c": [72, 82], "u95_m": [73, 83]}
     assert listed(columns_of(two_measurements())) == expected
 
 

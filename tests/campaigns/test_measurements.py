@@ -61,7 +61,7 @@ def test_missing_column_is_refused(cell, missing):
 
 
 @pytest.mark.parametrize(
-    ("name", "hint"), [("Load", "'load'?"), ("temperature", "'temperature_c'?"), ("q4", "q3, for 3 joints")]
+    ("name", "hint"), [("Load", "'load'?"), ("temperature", "'temperature_c'?"), ("q4", "q3, u95_m, for 3 joints")]
 )
 def test_unknown_column_is_refused_with_the_closest_known(cell, name, hint):
     old = {"Load": "load", "temperature": "temperature_c", "q4": "q3"}[name]

@@ -48,6 +48,21 @@ def test_what_a_campaign_leaves_out_has_a_default(cell):
     assert campaign.measurements.approach is campaign.measurements.time_s is campaign.measurements.temperature_c is None
 
 
+def test_uncertainties_of_measurements_are_read_and_stand_alone(cell):
+    cell.document.pop("noise", None)
+    cell.table["u95_m"] = [1e-4] * len(cell.table["pose"])
+    np.testing.assert_array_equal(cell.read().measurements.u95_m, cell.table["u95_m"])
+    cell.document["noise"] = {"orientation_rad": 5e-5, "joint_rad": 1e-5}
+    assert cell.read().noise == cell.document["noise"]
+    cell.document["noise"] = {"position_m": 1e-4}
+    with refused(f"{cell.source}: noise.position_m", "noise.position_m", "u95_m", "one of them"):
+        cell.read()
+    cell.document.pop("noise")
+    cell.table["u95_m"][4] = 0.0
+    with refused(cell.measurements, "row 5, column u95_m", "more than 0"):
+        cell.read()
+
+
 def test_no_wrench_column_at_all_means_no_load(cell):
     keep = [index for index, load in enumerate(cell.table["load"]) if load == 0]
     cell.table = {name: [column[index] for index in keep] for name, column in cell.table.items()}
@@ -202,7 +217,9 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"declared": ["joint_ofset"]}, "declared[0]", ["'joint_ofset'", "'joint_offset'? (joint_offset, payload)"]),
         ({"declared": ["payload", "payload"]}, "declared", ["each entry once"]),
         ({"noise": {"position_m": 0}}, "noise.position_m", ["more than 0"]),
-        ({"noise": {"orientation_rad": 1e-4}}, "noise.position_m", ["nothing"]),
+        ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 numbers", "or 3"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": -1.0}}, "noise.joint_rad", ["-1"]),
     ],
 )
 def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):

@@ -50,9 +50,12 @@ def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
-    refused(lambda: read_text_table(written(tmp_path, text), is_header), *words)
+    with refused((tmp_path / "table.txt").as_posix(), "", *words):
+        read_text_table(written(tmp_path, text), is_header)
 
 
 def test_a_missing_file_and_other_encodings_are_refused(tmp_path):
-    refused(lambda: read_text_table(tmp_path / "none.csv", is_header), "none.csv", "readable")
-    refused(lambda: read_text_table(written(tmp_path, "x;y;°\n", "latin-1"), is_header), "byte 4", "UTF-8")
+    with refused((tmp_path / "none.csv").as_posix(), "", "readable"):
+        read_text_table(tmp_path / "none.csv", is_header)
+    with refused((tmp_path / "table.txt").as_posix(), "byte 4", "UTF-8"):
+        read_text_table(written(tmp_path, "x;y;°\n", "latin-1"), is_header)

@@ -15,4 +15,5 @@ def test_options_read_back_as_they_were(tmp_path):
 
 def test_an_unknown_key_is_refused(tmp_path):
     (tmp_path / "import.yaml").write_text("seperator: tab\n")
-    refused(lambda: read_import_options(tmp_path / "import.yaml"), "seperator", "'separator'?")
+    with refused((tmp_path / "import.yaml").as_posix(), "seperator", "'separator'?"):
+        read_import_options(tmp_path / "import.yaml")

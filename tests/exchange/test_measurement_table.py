@@ -65,7 +65,8 @@ def test_the_options_found_out_give_the_same_again(tmp_path):
 
 def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
     text = "q1,x,y,z\n1,1,2,3\n2,,,\n3,1,2,3\n"
-    refused(lambda: table(tmp_path, text), "line 3", "no position", "--skip-empty")
+    with refused((tmp_path / "t.csv").as_posix(), "line 3", "no position", "--skip-empty"):
+        table(tmp_path, text)
     options = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr", skip_empty=True)
     found = table(tmp_path, text, options)
     assert (len(found.table["x"]), found.skipped) == (2, 1)
@@ -93,4 +94,6 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
     ],
 )
 def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(tmp_path, text, options, words):
-    refused(lambda: table(tmp_path, text, options), *words)
+    source = words[0] if words[0].startswith("--") else (tmp_path / "t.csv").as_posix()
+    with refused(source, "", *words):
+        table(tmp_path, text, options)

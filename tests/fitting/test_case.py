@@ -115,6 +115,7 @@ def test_noise_facts_are_json_in_si_units():
         "joint_rad": [1e-6, 0.0],
         "degrees_of_freedom": 0,
         "pose_rad": 0.0,
+        "usual_m": 0.0,
     }
 
 

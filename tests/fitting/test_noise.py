@@ -19,7 +19,8 @@ SENSOR_M, SENSOR_RAD = 50e-6, 30e-6
 
 
 def campaign(robot, **noise):
-    return Campaign("c", robot, "position", "base", TARGETS, "nominal", (), noise or None, {}, None)
+    nothing = drawn(robot, 0, poses=1, repeats=1)[2]
+    return Campaign("c", robot, "position", "base", TARGETS, "nominal", (), noise or None, {}, nothing)
 
 
 def drawn(robot, seed, poses=20, repeats=5, joint_rad=0.0, rows=3, targets=TARGETS):
@@ -154,6 +155,35 @@ def test_declared_noise_is_that_of_the_campaign(fanuc):
     assert declared_noise(campaign(fanuc)) is None
     found = declared_noise(campaign(fanuc, position_m=1e-4))
     assert (found.position_m, found.orientation_rad, found.source) == (1e-4, 1e-4, "declared")
+    assert not found.joint_rad.any() and found.usual_m == 0.0
+
+
+@pytest.mark.parametrize("joints", [2e-5, [1e-5, 2e-5, 3e-5, 0.0, 0.0, 1e-6]])
+def test_repeatability_of_joints_may_be_declared_for_all_or_for_each(fanuc, joints):
+    found = declared_noise(campaign(fanuc, position_m=1e-4, joint_rad=joints))
+    np.testing.assert_array_equal(found.joint_rad, np.broadcast_to(joints, 6))
+
+
+def test_uncertainties_of_measurements_are_the_declared_noise(fanuc):
+    stated = campaign(fanuc)
+    u95 = 1.959964 * np.array([3e-5, 4e-5, 5e-5])
+    found = declared_noise(replace(stated, measurements=replace(stated.measurements, u95_m=u95)))
+    assert found.position_m == found.usual_m == pytest.approx(1e-5 * np.sqrt(50 / 3))
+
+
+def test_repeats_of_positions_that_are_stated_to_be_worse_are_weighed_accordingly(fanuc):
+    """One sensor at 50 µm for half of the poses, at 250 µm for the others; the figure is that of the usual measurement."""
+    model, estimate, fine = drawn(fanuc, 12, poses=60)
+    coarse = drawn(fanuc, 12, poses=60)[2]
+    worse = fine.pose % 2 == 1
+    extra = np.sqrt(24.0) * SENSOR_M * np.random.default_rng(5).standard_normal(fine.position.shape)
+    position = np.where(worse[:, None], coarse.position + extra, fine.position)
+    stated = replace(fine, position=position, u95_m=1.959964 * np.where(worse, 5.0, 1.0) * SENSOR_M)
+    found = noise_from_repeats(model, estimate, stated)
+    usual = SENSOR_M * np.sqrt((25.0 + 1.0) / 2.0)
+    assert found.usual_m == pytest.approx(usual, rel=1e-6)
+    # 2160 contrasts: 5 % is three standard errors. Unweighed, the figure rests on the coarse half alone.
+    np.testing.assert_allclose(found.position_m, usual, rtol=0.05)
 
 
 def test_nothing_said_of_noise_is_a_warning(fanuc):

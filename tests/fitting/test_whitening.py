@@ -38,17 +38,24 @@ def dense_covariance(seen, jacobian, noise):
     joints, common = jacobian.reshape(-1, 6) * noise.joint_rad, jacobian.reshape(-1, 6) * noise.pose_rad
     state, pose = np.repeat(seen.state, rows), np.repeat(seen.cluster, rows)
     sensor = np.tile(([noise.position_m] * 3 + [noise.orientation_rad] * 3)[:rows], len(seen))
+    if seen.position_std is not None:
+        of_positions = np.tile(np.arange(rows) < 3, len(seen))
+        sensor = sensor * np.where(of_positions, np.repeat(seen.position_std, rows) / noise.usual_m, 1.0)
     one = (joints @ joints.T) * (state[:, None] == state) + np.diag(sensor**2)
     # What a pose has in common no repeat averages.
     return one / seen.states.repeats[state] + (common @ common.T) * (pose[:, None] == pose)
 
 
+@pytest.mark.parametrize("stated", [False, True], ids=["alike", "each of its own"])
 @pytest.mark.parametrize("pose_rad", [0.0, 2e-5, 1e-3])
-def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad):
+def test_whitened_rows_are_those_of_a_dense_cholesky_factor(case, pose_rad, stated):
     """Poses of one state and of three, which share an error of the joints where there is one."""
     seen, jacobian = case
     seen = replace(seen, states=replace(seen.states, pose=np.array([0, 1, 1, 1, 2, 2, 3])))
     noise = replace(NOISE, pose_rad=pose_rad)
+    if stated:
+        seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
+        noise = replace(noise, usual_m=1e-4)
     covariance = dense_covariance(seen, jacobian, noise)
     values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
     found = whitening(seen, jacobian, noise).apply(values).reshape(-1, 5)
@@ -130,3 +137,13 @@ def test_sensitivities_to_what_displaces_a_state_are_whitened_through_the_jacobi
     displaced = np.random.default_rng(6).standard_normal((seen.state.max() + 1, jacobian.shape[-1], 4))[seen.state]
     by = whitening(seen, jacobian, replace(NOISE, pose_rad=1e-4).of_measurements)
     np.testing.assert_allclose(by.apply(jacobian) @ displaced, by.apply(jacobian @ displaced), rtol=1e-9, atol=1e-6)
+
+
+def test_stated_uncertainties_whiten_where_nothing_is_correlated(case):
+    seen, jacobian = case
+    seen = replace(seen, position_std=np.random.default_rng(3).uniform(2e-5, 3e-4, len(seen)))
+    noise = Noise("declared", 60e-6, 40e-6, np.zeros(6), usual_m=1e-4)
+    values = np.random.default_rng(2).standard_normal((len(seen), seen.rows, 5))
+    found = whitening(seen, None, noise).apply(values).reshape(-1, 5)
+    deviation = np.sqrt(np.diag(dense_covariance(seen, jacobian, noise)))
+    np.testing.assert_allclose(found, values.reshape(-1, 5) / deviation[:, None], rtol=1e-12)

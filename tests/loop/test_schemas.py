@@ -42,7 +42,7 @@ def test_measurements_and_residuals_are_in_metres_radians_newtons_and_seconds():
 
 def test_only_what_a_campaign_need_not_record_may_be_missing():
     missing = {column.name for column in schemas.measurements(2).columns if column.missing}
-    assert missing == {"rx", "ry", "rz", "approach1", "approach2", "time_s", "temperature_c"}
+    assert missing == {"rx", "ry", "rz", "approach1", "approach2", "time_s", "temperature_c", "u95_m"}
     missing = {column.name for column in schemas.residuals(2).columns if column.missing}
     assert missing == {"time_s"} | {f"{s}_{part}{axis}" for s in ("before", "after") for part in "dr" for axis in "xyz"}
 

@@ -60,6 +60,8 @@ class Measurements:
     approach : ndarray (N, n) or None
         Sense in which each of the model's joints was approached, -1, 0 (not known) or +1.
     time_s, temperature_c : ndarray (N,) or None
+    u95_m : ndarray (N,) or None
+        Expanded uncertainty of the position, 95 % of one coordinate; None where it is not stated for each measurement.
     row : ndarray of int32 (N,)
         Row in the file, 1 for the first of data; for messages.
     """
@@ -77,6 +79,7 @@ class Measurements:
     time_s: np.ndarray | None
     temperature_c: np.ndarray | None
     row: np.ndarray
+    u95_m: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.pose)
@@ -114,7 +117,7 @@ class Campaign:
     declared : tuple of str
         Effects of the catalogue that the model already has.
     noise : dict or None
-        ``position_m`` and maybe ``orientation_rad``, where the campaign declares them.
+        ``position_m``, ``orientation_rad``, ``joint_rad``, as far as the campaign declares them.
     holdout : dict
         ``fraction`` and ``seed``, ``blocks`` and ``seed``, ``session``, ``poses`` or ``campaign``.
     measurements : Measurements
@@ -127,7 +130,7 @@ class Campaign:
     targets: tuple[Target, ...]
     compliance: str
     declared: tuple[str, ...]
-    noise: dict[str, float] | None
+    noise: dict[str, Any] | None
     holdout: dict[str, Any]
     measurements: Measurements
 

@@ -25,7 +25,7 @@ def columns_of(measurements: Measurements) -> dict[str, np.ndarray]:
     columns |= dict(zip(("rx", "ry", "rz"), _or_missing(measurements.rotation_vector, (count, 3)).T, strict=True))
     approach = _or_missing(measurements.approach, (count, joints))
     columns |= {f"approach{j + 1}": approach[:, j] for j in range(joints)}
-    return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c")}
+    return columns | {name: _or_missing(getattr(measurements, name), (count,)) for name in ("time_s", "temperature_c", "u95_m")}
 
 
 def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
@@ -40,6 +40,7 @@ def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
         approach=_or_none(np.column_stack([columns[f"approach{j}"] for j in range(1, joints + 1)])),
         time_s=_or_none(columns["time_s"]),
         temperature_c=_or_none(columns["temperature_c"]),
+        u95_m=_or_none(columns["u95_m"]),
     )
 
 

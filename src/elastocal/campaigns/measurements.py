@@ -47,6 +47,7 @@ def file_columns(joints: int) -> dict[str, Column]:
         *(Column(f"approach{j}", "float64", "", f"sense of approach of joint {j}: -1, 0, +1") for j in numbers),
         Column("time_s", "float64", "s", "time since any instant"),
         Column("temperature_c", "float64", "°C", "temperature"),
+        Column("u95_m", "float64", "m", "expanded uncertainty of this position: 95 % of one coordinate"),
     ]
     return {column.name: column for column in columns}
 

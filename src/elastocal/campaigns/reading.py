@@ -63,6 +63,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     measurements = _measurements(table, robot, targets)
     check_measurements(measurements, table, robot, targets, source)
     _check_compliance(document, robot, robot_path, measurements, source)
+    _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, source)
     return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
 
@@ -214,6 +215,30 @@ def _check_compliance(
         raise InputError(source, "compliance", found, "identify, or nominal with compliance_urad_per_Nm in the robot file")
 
 
+def _uncertainties(table: MeasurementFile) -> np.ndarray | None:
+    if not table.has(["u95_m"]):
+        return None
+    stated = table.numbers(["u95_m"])[:, 0]
+    if (stated <= 0.0).any():
+        index = int(np.argmin(stated))
+        raise table.cell_fault(index, "u95_m", f"{stated[index]:g}", "metres, more than 0")
+    return stated
+
+
+def _check_noise(document: Mapping[str, Any], measurements: Measurements, joints: int, source: str) -> None:
+    """Refuse noise of positions that is declared twice or not at all, and repeatabilities of other joints."""
+    declared = document.get("noise")
+    if declared is None:
+        return
+    if "position_m" in declared and measurements.u95_m is not None:
+        raise InputError(source, "noise.position_m", "beside a column u95_m of the measurements", "one of them")
+    if "position_m" not in declared and measurements.u95_m is None:
+        raise InputError(source, "noise", "no position_m", "position_m, or a column u95_m of the measurements")
+    each = declared.get("joint_rad", 0.0)
+    if isinstance(each, list) and len(each) != joints:
+        raise InputError(source, "noise.joint_rad", f"{len(each)} numbers", f"one for all joints, or {joints}")
+
+
 def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:
     known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
     path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
@@ -257,5 +282,6 @@ def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target
         approach=approach,
         time_s=table.numbers(["time_s"])[:, 0] if table.has(["time_s"]) else None,
         temperature_c=table.numbers(["temperature_c"])[:, 0] if table.has(["temperature_c"]) else None,
+        u95_m=_uncertainties(table),
         row=table.rows,
     )

@@ -65,7 +65,7 @@ def sheet_template(joints: int) -> str:
     -------
     str
     """
-    optional = ("session", "approach", "time_s", "temperature_c", "rx", "ry", "rz")
+    optional = ("session", "approach", "time_s", "temperature_c", "u95_m", "rx", "ry", "rz")
     return ",".join(name for name in file_columns(joints) if not name.startswith(optional)) + "\n"
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from elastocal.loop.calibrated_files import Diagnosed
 
 
-def diagnosed(folder: Path) -> Diagnosed:
+def diagnosed_campaign(folder: Path) -> Diagnosed:
     """A campaign with what its diagnosis found, from the results of the pipeline.
 
     Parameters

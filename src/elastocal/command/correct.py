@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from elastocal.command.campaign import diagnosed, held_out_rms_m
+from elastocal.command.campaign import diagnosed_campaign, held_out_rms_m
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def correct(
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
-    campaign = diagnosed(folder)
+    campaign = diagnosed_campaign(folder)
     calibrated = campaign.calibrated
     wanted = read_target_path(path, calibrated.robot.joints)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)

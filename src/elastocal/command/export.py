@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from elastocal.command.campaign import diagnosed
+from elastocal.command.campaign import diagnosed_campaign
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
 
@@ -33,7 +33,7 @@ def export(
     from elastocal.mechanics.robot_file import document_of
 
     console = Console(stderr=True)
-    found = diagnosed(folder)
+    found = diagnosed_campaign(folder)
     calibrated = found.calibrated
     robot = folded(calibrated).robot
     stated = f"Calibrated by elastocal from the campaign {found.name}."

@@ -272,6 +272,7 @@ def _noise_facts(measured: Noise, left: Noise) -> dict[str, Any]:
         "joint_rad": measured.joint_rad.tolist(),
         "degrees_of_freedom": measured.degrees_of_freedom,
         "pose_rad": left.pose_rad,
+        "usual_m": measured.usual_m,
         "factor": left.position_m / measured.position_m,
     }
 

@@ -37,7 +37,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 EULER = ("e1", "e2", "e3")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 HOMOGENEOUS = tuple(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))
-COVARIATES = ("time_s", "temperature_c")
+COVARIATES = ("time_s", "temperature_c", "u95_m")
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
@@ -67,6 +67,7 @@ _ALSO = {
     "session": (),
     "time_s": ("time", "timestamp"),
     "temperature_c": ("temperature", "temp"),
+    "u95_m": ("u95", "expandeduncertainty"),
 }
 _KNOWN = {other: name for name, others in _ALSO.items() for other in (name.replace("_", ""), *others)}
 _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
@@ -88,7 +89,7 @@ def kind_of(name: str) -> tuple[str, ...]:
     if re.fullmatch(r"q\d+", name):
         # A prismatic joint reports a length.
         return ANGLE, LENGTH
-    if name in POSITION or name in ("t14", "t24", "t34"):
+    if name in (*POSITION, "t14", "t24", "t34", "u95_m"):
         return (LENGTH,)
     if name in (*VECTOR, *EULER):
         return (ANGLE,)
@@ -133,7 +134,7 @@ def recognized(header: str) -> tuple[str | None, str | None]:
         return name, _plain_unit(bracketed[2]) or None
     name = _named(header)
     if name is not None:
-        return name, {"time_s": "s", "temperature_c": "C"}.get(header.lower())
+        return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
     behind = _BEHIND.fullmatch(header)
     if behind and (name := _named(behind[1])) is not None and unit_scale(name, behind[2]) is not None:
         return name, _plain_unit(behind[2])

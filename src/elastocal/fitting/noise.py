@@ -17,13 +17,14 @@ from scipy.stats import chi2
 
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
-from elastocal.fitting.observations import each_approach, select_states, without_outlying_repeats
+from elastocal.fitting.observations import each_approach, select_states, standard_uncertainty, without_outlying_repeats
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 # Fewer contrasts of repeats than this do not separate the joints' part from the sensor's.
 FEWEST_FOR_JOINTS = 60
@@ -54,6 +55,9 @@ class Noise:
         Contrasts of repeats behind the figures; 0 where they are declared.
     pose_rad : float
         Error of each joint that all measurements of a pose have in common.
+    usual_m : float
+        Where measurements state uncertainties of their own, that with which a measurement has `position_m`; others are in
+        proportion. 0 where all are alike.
     """
 
     source: str
@@ -62,6 +66,7 @@ class Noise:
     joint_rad: np.ndarray
     degrees_of_freedom: int = 0
     pose_rad: float = 0.0
+    usual_m: float = 0.0
 
     @property
     def of_measurements(self) -> Noise:
@@ -77,13 +82,28 @@ class Noise:
             joint_rad=factor * self.joint_rad,
         )
 
+    def spread(self, observations: Observations) -> np.ndarray | None:
+        """Standard deviation of each position over `position_m`, (M,); None where all are alike."""
+        if not self.usual_m or observations.position_std is None:
+            return None
+        return observations.position_std / self.usual_m
+
 
 def declared_noise(campaign: Campaign) -> Noise | None:
-    """Noise as a campaign declares it, without a joint part; None where it does not."""
-    if not campaign.noise:
+    """Noise as a campaign, or each of its measurements, declares it; None where neither does."""
+    usual, stated = _usual(campaign.measurements), campaign.noise or {}
+    if not usual and not stated:
         return None
-    position = campaign.noise["position_m"]
-    return Noise("declared", position, campaign.noise.get("orientation_rad", position), np.zeros(campaign.robot.joints))
+    position = usual or stated["position_m"]
+    joints = np.zeros(campaign.robot.joints) + stated.get("joint_rad", 0.0)
+    return Noise("declared", position, stated.get("orientation_rad", position), joints, usual_m=usual)
+
+
+def _usual(measurements: Measurements) -> float:
+    """Root mean square of the standard deviations that measurements state, m; 0 where they do not."""
+    if measurements.u95_m is None:
+        return 0.0
+    return float(np.sqrt((standard_uncertainty(measurements.u95_m) ** 2).mean()))
 
 
 def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measurements) -> Noise | None:
@@ -124,7 +144,8 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     if min(position, orientation) < FINEST:
         # The same number again and again is a sensor that stands still or digits that were cut off, not one without noise.
         return None
-    sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total)
+    usual = _usual(measurements)
+    sensor = Noise("repeats", float(position), float(orientation), np.zeros(joints), total, usual_m=usual)
     if total < FEWEST_FOR_JOINTS:
         return sensor
     data = ([_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)],)
@@ -140,7 +161,8 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     # Each approach draws a joint once, however many targets are read.
     per_joint = max(min(total // (joints + 1), sum(len(part) for part in contrasts)), 1)
     inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
-    return Noise("repeats", float(values[0]), float(values[rows // 3 - 1]), values[rows // 3 :] * inflation, total)
+    sensors = float(values[0]), float(values[rows // 3 - 1])
+    return Noise("repeats", *sensors, values[rows // 3 :] * inflation, total, usual_m=usual)
 
 
 def chosen_noise(
@@ -175,7 +197,7 @@ def chosen_noise(
     return repeats, [f"repeats show {ratio:.2f} times the declared noise of positions; the repeats are used"]
 
 
-def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> np.ndarray:
+def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int, spread: np.ndarray | None = None) -> np.ndarray:
     """Covariance of all measurements of one approach.
 
     Parameters
@@ -185,6 +207,8 @@ def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> n
         Of the k targets, with respect to the joints.
     rows : int
         3 for positions, 6 for poses.
+    spread : ndarray (G, k), optional
+        Of `Noise.spread`.
 
     Returns
     -------
@@ -193,9 +217,30 @@ def measurement_covariances(noise: Noise, jacobians: np.ndarray, rows: int) -> n
     groups, targets = jacobians.shape[:2]
     stacked = jacobians.reshape(groups, targets * rows, -1) * noise.joint_rad
     sensor = np.tile(np.repeat([noise.position_m, noise.orientation_rad], 3)[:rows] ** 2, targets)
+    if spread is not None:
+        sensor = sensor * of_components(spread, rows).reshape(groups, -1) ** 2
     covariance = stacked @ stacked.transpose(0, 2, 1)
     covariance[:, np.arange(targets * rows), np.arange(targets * rows)] += sensor
     return covariance
+
+
+def of_components(spread: np.ndarray, rows: int) -> np.ndarray:
+    """Spread of each component of observations.
+
+    Parameters
+    ----------
+    spread : ndarray (...)
+        Of positions; orientations are alike.
+    rows : int
+        3 for positions, 6 for poses.
+
+    Returns
+    -------
+    ndarray (..., rows)
+    """
+    whole = np.ones((*spread.shape, rows))
+    whole[..., :3] = spread[..., None]
+    return whole
 
 
 def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[list[np.ndarray], list[np.ndarray]]:
@@ -222,6 +267,8 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
         return [], []
     some = select_states(observations, chosen)
     line = linearize(bare, at, some, conditions(bare, at, some.states))
+    usual = _usual(measurements)
+    spread = some.position_std / usual if some.position_std is not None else None
     state, seen = repeated[chosen], seen[chosen]
     start = np.concatenate([[0], np.cumsum(seen)[:-1]])
     first = np.flatnonzero(np.diff(state, prepend=-1))
@@ -235,6 +282,11 @@ def _contrasts(model: Model, estimate: Estimate, measurements: Measurements) -> 
         residual = line.residual[members].reshape(len(mine), repeats, -1)
         found = (helmert(repeats) @ residual).reshape(-1, residual.shape[2])
         jacobian = line.coordinate_jacobian[of_first][..., : model.sites.joints]
+        if spread is not None:
+            # As if all positions were alike; repeats of a state are taken to be.
+            each = of_components(spread[of_first], model.rows)
+            found = found / np.repeat(each.reshape(len(mine), -1), repeats - 1, axis=0)
+            jacobian = jacobian / each[..., None]
         contrasts.setdefault(count, []).append(found)
         jacobians.setdefault(count, []).append(np.repeat(jacobian, repeats - 1, axis=0))
     return [np.concatenate(parts) for parts in contrasts.values()], [np.concatenate(parts) for parts in jacobians.values()]

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Measurements this many times as far from the middle of their repeats as half of all are not noise: eight standard deviations.
 _WILD = 12.0
+# Half width of the interval that holds 95 % of a normal distribution, in standard deviations.
+_COVERAGE = 1.959964
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,8 @@ class Observations:
         m, in the frame of the session.
     rotation : ndarray (M, 3, 3) or None
         Measured orientation, where poses are measured.
+    position_std : ndarray (M,) or None
+        Stated standard deviation of one measurement of one coordinate of the position, m; None where it is not stated.
     """
 
     states: States
@@ -74,6 +78,7 @@ class Observations:
     target: np.ndarray
     position: np.ndarray
     rotation: np.ndarray | None
+    position_std: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.state)
@@ -226,7 +231,30 @@ def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
     rotation = None
     if measurements.rotation_vector is not None:
         rotation = _mean_rotations(Rotation.from_rotvec(measurements.rotation_vector), pair_of)
-    return Observations(states, pairs[:, 0], pairs[:, 1], _means(measurements.position, pair_of), rotation)
+    spread = None
+    if measurements.u95_m is not None:
+        # Of repeats that are averaged the mean square, as if they were alike.
+        spread = np.sqrt(_means(standard_uncertainty(measurements.u95_m) ** 2, pair_of))
+    return Observations(states, pairs[:, 0], pairs[:, 1], _means(measurements.position, pair_of), rotation, spread)
+
+
+def standard_uncertainty(u95: np.ndarray) -> np.ndarray:
+    """Standard deviations of one coordinate, by the quantile of the normal distribution [1]_.
+
+    Parameters
+    ----------
+    u95 : ndarray
+        Expanded uncertainties of 95 %.
+
+    Returns
+    -------
+    ndarray
+
+    References
+    ----------
+    .. [1] JCGM 100:2008, Guide to the expression of uncertainty in measurement, section 6.
+    """
+    return u95 / _COVERAGE
 
 
 def select_states(observations: Observations, kept: np.ndarray) -> Observations:
@@ -245,8 +273,9 @@ def select_states(observations: Observations, kept: np.ndarray) -> Observations:
     mask = kept[observations.state]
     number = np.cumsum(kept) - 1
     rotation = None if observations.rotation is None else observations.rotation[mask]
+    spread = None if observations.position_std is None else observations.position_std[mask]
     return Observations(
-        states, number[observations.state[mask]], observations.target[mask], observations.position[mask], rotation
+        states, number[observations.state[mask]], observations.target[mask], observations.position[mask], rotation, spread
     )
 
 
@@ -288,8 +317,9 @@ def part_at(observations: Observations, states: slice, seen: slice) -> Observati
     """
     some = _states_at(observations.states, states)
     rotation = None if observations.rotation is None else observations.rotation[seen]
+    spread = None if observations.position_std is None else observations.position_std[seen]
     return Observations(
-        some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation
+        some, observations.state[seen] - states.start, observations.target[seen], observations.position[seen], rotation, spread
     )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.fitting.noise import measurement_covariances
+from elastocal.fitting.noise import measurement_covariances, of_components
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
@@ -56,8 +56,8 @@ class Scaling:
     ----------
     precision : ndarray (rows,)
         Of one measurement: one over its standard deviation.
-    root : ndarray (M,)
-        Square root of the number of measurements of which each observation is the average.
+    root : ndarray (M,) or (M, rows)
+        Square root of the number of measurements of which each observation is the average, over their spread.
     """
 
     precision: np.ndarray
@@ -65,7 +65,7 @@ class Scaling:
 
     def apply(self, values: np.ndarray) -> np.ndarray:
         """As `Whitening.apply`."""
-        scale = self.root[:, None] * self.precision
+        scale = self.root.reshape(len(self.root), -1) * self.precision
         return values * scale.reshape(*scale.shape, *[1] * (values.ndim - 2))
 
 
@@ -112,16 +112,20 @@ def whitening(observations: Observations, jacobian: np.ndarray | None, noise: No
     .. [1] Aitken, A. C., On least squares and linear combination of observations, Proceedings of the Royal Society of Edinburgh
        55, 1935.
     """
+    spread = noise.spread(observations)
     if not noise.pose_rad and not noise.joint_rad.any():
         precision = 1.0 / np.repeat([noise.position_m, noise.orientation_rad], 3)[: observations.rows]
-        return Scaling(precision, np.sqrt(observations.states.repeats[observations.state]))
+        root = np.sqrt(observations.states.repeats[observations.state])
+        return Scaling(precision, root if spread is None else root[:, None] / of_components(spread, observations.rows))
     # Where joints err, it takes a Jacobian to see it.
     assert jacobian is not None
-    blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise)]
+    blocks = [(m, np.linalg.inv(np.linalg.cholesky(c))) for m, c in _covariances(observations, jacobian, noise, spread)]
     return Whitening(tuple(blocks))
 
 
-def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _covariances(
+    observations: Observations, jacobian: np.ndarray, noise: Noise, spread: np.ndarray | None
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Observations with correlated errors (G, k) and their covariance (G, k * rows, k * rows), for each number k.
 
     Those of a state share the approach; where poses have an error in common, those of all states of a pose share it.
@@ -129,7 +133,8 @@ def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise)
     rows, repeats = observations.rows, observations.states.repeats[observations.state]
     if not noise.pose_rad:
         for members in groups_by_size(observations.state):
-            covariance = measurement_covariances(noise, jacobian[members], rows)
+            each = None if spread is None else spread[members]
+            covariance = measurement_covariances(noise, jacobian[members], rows, each)
             yield members, covariance / repeats[members[:, 0]][:, None, None]
         return
     for members in groups_by_size(observations.cluster):
@@ -137,4 +142,5 @@ def _covariances(observations: Observations, jacobian: np.ndarray, noise: Noise)
         state = np.repeat(observations.state[members], rows, axis=1)
         alike = (state[:, :, None] == state[:, None, :]) / np.repeat(repeats[members], rows, axis=1)[:, None, :]
         common = noise.pose_rad**2 * (stacked @ stacked.transpose(0, 2, 1))
-        yield members, alike * measurement_covariances(noise, jacobian[members], rows) + common
+        each = None if spread is None else spread[members]
+        yield members, alike * measurement_covariances(noise, jacobian[members], rows, each) + common

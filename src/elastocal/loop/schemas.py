@@ -35,6 +35,7 @@ def measurements(joints: int) -> TableSchema:
             ),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
             Column("temperature_c", "float64", "°C", "temperature", missing=True),
+            Column("u95_m", "float64", "m", "expanded uncertainty of this position, 95 % of one coordinate", missing=True),
         ),
     )
 

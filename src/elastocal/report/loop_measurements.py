@@ -46,7 +46,8 @@ def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -
 
 def noise_rows(noise: Mapping[str, Any], with_orientation: bool) -> list[list[str]]:
     """Rows of the noise: name, value with unit."""
-    rows = [["sensor, each component of a position", length(noise["position_m"])]]
+    stated = ", root mean square of what the measurements state" if noise["usual_m"] else ""
+    rows = [[f"sensor, each component of a position{stated}", length(noise["position_m"])]]
     if with_orientation:
         rows.append(["sensor, each component of an orientation", f"{plain(MICRO * noise['orientation_rad'])} µrad"])
     if any(noise["joint_rad"]):

@@ -311,7 +311,9 @@ def noise_floor(fitted: Fit, observations: Observations, model: Model, estimate:
         some = part_at(observations, states, seen)
         line = linearize(model, estimate, some, conditions(model, estimate, some.states))
         jacobian = line.coordinate_jacobian[:, None, :3, : model.sites.joints]
-        variance[seen] = np.trace(measurement_covariances(fitted.noise, jacobian, 3), axis1=1, axis2=2)
+        spread = fitted.noise.spread(some)
+        each = None if spread is None else spread[:, None]
+        variance[seen] = np.trace(measurement_covariances(fitted.noise, jacobian, 3, each), axis1=1, axis2=2)
     return float(np.sqrt((variance / observations.states.repeats[observations.state]).mean()))
 
 
