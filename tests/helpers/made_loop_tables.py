@@ -222,6 +222,7 @@ def verdict_document(
             "joint_rad": [0.0] * 5 + [2e-5],
             "degrees_of_freedom": 1008 if noise == "repeats" else 0,
             "pose_rad": 1.5e-5,
+            "usual_m": 0.0,
             "factor": 1.0,
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},

@@ -18,5 +18,6 @@ elastocal plan "$work/robot.yaml" --folder "$cell" --poses 25 --force 100 --pull
 python workflow/examples/rehearse.py measure "$cell"
 elastocal diagnose "$cell"
 python workflow/examples/rehearse.py path "$cell" "$work/path.csv"
+elastocal certificate "$cell" --tolerance 0.2mm
 elastocal correct "$cell" "$work/path.csv" --output "$work/targets.csv"
 python workflow/examples/rehearse.py move "$cell" "$work/path.csv" "$work/targets.csv" --reveal

@@ -246,7 +246,7 @@ def prediction_covariance(
     ndarray (N, 6, 6)
         m and rad, base axes: displacement and rotation vector.
     """
-    model, estimate, spread = calibrated.model, calibrated.estimate, _square_root(calibrated.covariance)
+    model, estimate, spread = calibrated.model, calibrated.estimate, square_root(calibrated.covariance)
     covariance = np.zeros((len(reported_angles), 6, 6))
     for part in _parts(len(reported_angles)):
         seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
@@ -297,10 +297,18 @@ def _parts(count: int) -> list[slice]:
     return [slice(start, min(start + AT_ONCE, count)) for start in range(0, count, AT_ONCE)]
 
 
-def _square_root(covariance: np.ndarray) -> np.ndarray:
-    """A factor L with L L' the covariance, singular where parameters are held.
+def square_root(covariance: np.ndarray) -> np.ndarray:
+    """A factor L with L L' a covariance, singular where parameters are held.
 
-    Of the correlations: parameters in kilograms would drown those in radians per newton metre.
+    By the eigenvectors of the correlations: parameters in kilograms would drown those in radians per newton metre.
+
+    Parameters
+    ----------
+    covariance : ndarray (P, P)
+
+    Returns
+    -------
+    ndarray (P, P)
     """
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0, deviation, 1.0)

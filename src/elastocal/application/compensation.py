@@ -171,11 +171,12 @@ def _corrected(
         off,
         np.sqrt(variances[:, :3].sum(axis=1)),
         np.sqrt(variances[:, 3:].sum(axis=1)),
-        _repeatability(robot, angles, calibrated.noise.joint_rad),
+        repeatability_m(robot, angles, calibrated.noise.joint_rad),
         status,
     )
 
 
-def _repeatability(robot: Robot, angles: np.ndarray, joint_rad: np.ndarray) -> np.ndarray:
+def repeatability_m(robot: Robot, angles: np.ndarray, joint_rad: np.ndarray) -> np.ndarray:
+    """Root mean square distance of repeated approaches, m, ndarray (N,), by the repeatability of the joints, rad, (n,)."""
     spread = jacobians(robot.chain, angles, robot.chain.end_effector)[:, :3] * joint_rad
     return np.sqrt((spread**2).sum(axis=(1, 2)))

@@ -6,6 +6,7 @@ import sys
 
 import typer
 
+from elastocal.command.certificate import certificate
 from elastocal.command.check import check
 from elastocal.command.correct import correct
 from elastocal.command.diagnose import diagnose
@@ -22,6 +23,7 @@ app.command()(correct)
 app.command()(plan)
 app.command()(check)
 app.command()(export)
+app.command()(certificate)
 app.add_typer(importing)
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import binom
-from scipy.stats import t as student
 
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit_frames
@@ -16,6 +15,7 @@ from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import measurement_covariances
 from elastocal.fitting.observations import part_at, parts_of, select_states
 from elastocal.fitting.prediction import residuals
+from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,13 +29,7 @@ METRICS = ("mean_m", "rms_m", "p95_m", "max_m")
 _CONFIDENCE = 0.95
 _ENDS = np.array([0.5 * (1.0 - _CONFIDENCE), 0.5 * (1.0 + _CONFIDENCE)])
 _SHARE = 0.95
-# Student's t with the same standard error takes over where few poses make the bootstrap-t erratic (3: it holds 80 %, t 94 %;
-# 6: both hold the same), and where so many make both alike (300: widths differ by 3 %) and drawing costly.
-_FEWEST_TO_DRAW, _MOST_TO_DRAW = 6, 300
-# Standard errors that an interval reaches at most: those of Student's t with two degrees of freedom. Where one pose makes most
-# of the error, replicates without it reach arbitrarily far; in the simulations this costs no coverage (3 degrees: 2 %).
-_FARTHEST = student.ppf(_ENDS[1], 2)
-# Standard errors of a logarithm below this are rounding.
+# A variance of a share below this is rounding.
 _ROUNDING = 1e-12
 
 
@@ -187,14 +181,14 @@ def intervals(
     .. [5] Bickel, P. J. and Freedman, D. A., Some asymptotic theory for the bootstrap, Annals of Statistics 9, 1981.
     """
     cluster, poses = errors[0].cluster, errors[0].poses
-    weights = _drawn_poses(poses, replicates, stream)
+    weights = drawn_poses(poses, replicates, stream)
     counts = np.bincount(cluster).astype(float)
     sums = [np.bincount(cluster, one.distance) for one in errors]
     squares = [np.bincount(cluster, one.distance**2) for one in errors]
     found = [
         {
-            "mean_m": np.exp(_log_ratio_interval(total, counts, weights)[0]),
-            "rms_m": np.exp(0.5 * _log_ratio_interval(square, counts, weights)[0]),
+            "mean_m": np.exp(log_ratio_interval(total, counts, weights, _ENDS)[0]),
+            "rms_m": np.exp(0.5 * log_ratio_interval(square, counts, weights, _ENDS)[0]),
             "p95_m": _quantile_interval(one),
             "max_m": np.full(2, np.nan),
         }
@@ -224,46 +218,8 @@ def share_below_largest(poses: int) -> float:
     return float((1.0 - _CONFIDENCE) ** (1.0 / poses))
 
 
-def _drawn_poses(poses: int, replicates: int, stream: np.random.Generator) -> np.ndarray | None:
-    """How often each pose counts in each replicate, ndarray (B, P) of float; None where Student's t is taken instead."""
-    if not _FEWEST_TO_DRAW <= poses <= _MOST_TO_DRAW:
-        return None
-    weights = stream.multinomial(poses, np.full(poses, 1.0 / poses), replicates).astype(float)
-    # A replicate of one pose alone has no standard error.
-    return weights[(weights > 0).sum(axis=1) > 1]
-
-
-def _log_ratio_interval(over: np.ndarray, under: np.ndarray, weights: np.ndarray | None) -> tuple[np.ndarray, float]:
-    """Interval (2,) of the logarithm of a ratio of totals over poses (P,), and its standard error."""
-    poses = len(over)
-    if poses < 2:
-        return np.full(2, np.nan), np.nan
-    value, error = (found[0] for found in _log_ratios(np.ones((1, poses)), over, under))
-    if error <= _ROUNDING:
-        return np.full(2, value), 0.0
-    if weights is None:
-        reach = student.ppf(_ENDS, poses - 1)
-    else:
-        drawn, errors = _log_ratios(weights, over, under)
-        scattered = errors > _ROUNDING
-        reach = -np.quantile((drawn - value)[scattered] / errors[scattered], _ENDS[::-1]).clip(-_FARTHEST, _FARTHEST)
-    return value + error * reach, error
-
-
-def _log_ratios(weights: np.ndarray, over: np.ndarray, under: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Logarithms of the ratio of weighted totals, and their jackknife standard errors: ndarray (B,) each."""
-    poses = len(over)
-    tops, bottoms = weights @ over, weights @ under
-    # A pose that was not drawn cannot be left out.
-    left = np.where(weights > 0, (tops[:, None] - over) / (bottoms[:, None] - under), 1.0)
-    left = np.log(left)
-    middle = (weights * left).sum(axis=1) / poses
-    variance = (poses - 1) / poses * (weights * (left - middle[:, None]) ** 2).sum(axis=1)
-    return np.log(tops / bottoms), np.sqrt(variance)
-
-
 def _reduction(before: np.ndarray, after: np.ndarray, weights: np.ndarray | None) -> Reduction:
-    interval, error = _log_ratio_interval(after, before, weights)
+    interval, error = log_ratio_interval(after, before, weights, _ENDS)
     ratio = np.sqrt(after.sum() / before.sum())
     high, low = 1.0 - np.exp(0.5 * interval)
     return Reduction(float(low), float(high), float(0.5 * ratio * error))

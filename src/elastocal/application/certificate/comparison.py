@@ -1,0 +1,162 @@
+"""Two campaigns of one robot, before and after a crash, a repair or a year: whether it moves differently, and by what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import norm
+from statsmodels.stats.multitest import multipletests
+
+from elastocal.application.calibrated import NEUTRAL, forward, observations_of, square_root, states_of
+from elastocal.errors import InputError
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.parameters import parameters
+
+if TYPE_CHECKING:
+    from elastocal.application.calibrated import CalibratedRobot
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter that both campaigns have.
+
+    Attributes
+    ----------
+    owner, name, unit : str
+    before, after, std_error : float
+        Standard error of the difference.
+    p_value : float
+        That it did not change, adjusted for all that are compared (Holm).
+    """
+
+    owner: str
+    name: str
+    unit: str
+    before: float
+    after: float
+    std_error: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How two campaigns differ.
+
+    Attributes
+    ----------
+    rms_m : float
+        Of the distance between both robots' positions over some poses, unloaded, after the best rigid motion of their bases.
+    expected_m : float
+        The same where nothing changed, by the uncertainty of both: median.
+    p_value : float
+        That nothing changed.
+    largest_m : float
+    changes : tuple of Change
+        Most certain first; empty where the campaigns leave different parameters at their values.
+    """
+
+    rms_m: float
+    expected_m: float
+    p_value: float
+    largest_m: float
+    changes: tuple[Change, ...]
+
+
+def compared(
+    before: CalibratedRobot, after: CalibratedRobot, reported_angles: np.ndarray, draws: int, stream: np.random.Generator
+) -> Comparison:
+    """Compare what two campaigns found of one robot.
+
+    Positions are compared after the best rigid motion [1]_: where the tracker was set up is no property of the robot. The same
+    distance is drawn as it would be if nothing had changed, from the covariances of both; its rank is the p-value [2]_.
+
+    Parameters
+    ----------
+    before, after : CalibratedRobot
+    reported_angles : ndarray (N, n)
+        rad, over the workspace.
+    draws : int
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        Two robots of different chains.
+
+    References
+    ----------
+    .. [1] Kabsch, W., A solution for the best rotation to relate two sets of vectors, Acta Crystallographica A32, 1976.
+    .. [2] Davison, A. C. and Hinkley, D. V., Bootstrap Methods and their Application, section 4.2, Cambridge, 1997.
+    """
+    if before.robot.chain != after.robot.chain:
+        raise InputError("--compare", "", f"another robot, {before.robot.name}", f"a campaign of {after.robot.name}")
+    ends = [forward(each, reported_angles)[0] for each in (before, after)]
+    apart = _without_rigid_motion(ends[1] - ends[0], ends[0])
+    distance = np.linalg.norm(apart, axis=-1)
+    rms = float(np.sqrt((distance**2).mean()))
+    off = np.zeros((draws, *ends[0].shape))
+    for each in (before, after):
+        moved = _sensitivities(each, reported_angles) @ square_root(each.covariance)
+        off += np.einsum("nik,dk->dni", moved, stream.standard_normal((draws, moved.shape[-1])))
+    drawn = np.sqrt((_without_rigid_motion(off, ends[0]) ** 2).sum(axis=2).mean(axis=1))
+    p_value = (1.0 + (drawn >= rms).sum()) / (1.0 + draws)
+    return Comparison(rms, float(np.median(drawn)), float(p_value), float(distance.max()), _changes(before, after))
+
+
+def _sensitivities(calibrated: CalibratedRobot, reported_angles: np.ndarray) -> np.ndarray:
+    """Of positions to the parameters, ndarray (N, 3, P)."""
+    model, estimate = calibrated.model, calibrated.estimate
+    seen = observations_of(states_of(calibrated, reported_angles, NEUTRAL))
+    return linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities[:, :3]
+
+
+def _without_rigid_motion(displacement: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Displacements (..., N, 3) less the small rigid motion that explains most of their squares."""
+    about = position - position.mean(axis=0)
+    turns = np.zeros((len(position), 3, 6))
+    turns[:, :, :3] = np.eye(3)
+    turns[:, 0, 4], turns[:, 0, 5] = about[:, 2], -about[:, 1]
+    turns[:, 1, 3], turns[:, 1, 5] = -about[:, 2], about[:, 0]
+    turns[:, 2, 3], turns[:, 2, 4] = about[:, 1], -about[:, 0]
+    basis, _ = np.linalg.qr(turns.reshape(-1, 6))
+    flat = displacement.reshape(*displacement.shape[:-2], -1)
+    return (flat - (flat @ basis) @ basis.T).reshape(displacement.shape)
+
+
+def _changes(before: CalibratedRobot, after: CalibratedRobot) -> tuple[Change, ...]:
+    """Differences of the parameters of both, where both leave the same ones at their values."""
+    found = [_values(each) for each in (before, after)]
+    kept = [{key for key, (_, error, _) in values.items() if error > 0.0} for values in found]
+    if kept[0] != kept[1] or not kept[0]:
+        return ()
+    keys = [key for key in found[1] if key in kept[1]]
+    old, new = (np.array([values[key][:2] for key in keys]) for values in found)
+    errors = np.hypot(old[:, 1], new[:, 1])
+    raw = 2.0 * norm.sf(np.abs(new[:, 0] - old[:, 0]) / errors)
+    adjusted = multipletests(raw, method="holm")[1]
+    changes = [
+        Change(
+            key[0], key[1], found[1][key][2], float(old[row, 0]), float(new[row, 0]), float(errors[row]), float(adjusted[row])
+        )
+        for row, key in enumerate(keys)
+    ]
+    return tuple(changes[row] for row in np.argsort(raw, kind="stable"))
+
+
+def _values(calibrated: CalibratedRobot) -> dict[tuple[str, str], tuple[float, float, str]]:
+    """Value, standard error and unit by owner and name."""
+    listed = parameters(calibrated.model, calibrated.estimate)
+    pairs = zip(calibrated.estimate.coefficients, calibrated.estimate.shapes, strict=True)
+    values = np.concatenate([np.zeros(0), *(part for pair in pairs for part in pair)])
+    errors = np.sqrt(np.diag(calibrated.covariance))
+    return {
+        (owner, parameter.name): (float(value), float(error), parameter.unit)
+        for (owner, parameter), value, error in zip(listed, values, errors, strict=True)
+    }

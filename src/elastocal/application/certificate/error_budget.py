@@ -1,0 +1,150 @@
+"""What each effect costs: by how much a robot would miss its poses if that one alone were left out of the correction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.calibrated import (
+    forward,
+    nominal_forward,
+    observations_of,
+    prediction_covariance,
+    square_root,
+    states_of,
+)
+from elastocal.application.compensation import repeatability_m
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.linearization import linearize
+
+if TYPE_CHECKING:
+    from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
+
+SPRINGS = "joint_compliance"
+_ENDS = (0.025, 0.975)
+
+
+@dataclass(frozen=True)
+class Share:
+    """A line of the budget.
+
+    Attributes
+    ----------
+    name : str
+        An effect by its name in the catalogue, ``joint_compliance``, or one of `TOTAL`, `UNCERTAINTY` and `REPEATABILITY`.
+    rms_m : float
+    low_m, high_m : float or None
+        95 % interval by the covariance of the parameters; None where the line has none.
+    """
+
+    name: str
+    rms_m: float
+    low_m: float | None = None
+    high_m: float | None = None
+
+
+TOTAL, UNCERTAINTY, REPEATABILITY = "uncorrected", "uncertainty of the parameters", "repeatability"
+
+
+def error_budget(
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    operating: OperatingConditions,
+    draws: int,
+    stream: np.random.Generator,
+) -> list[Share]:
+    """Error budget of a robot over some states.
+
+    Lines do not add up: effects may work against each other, and loads meet springs.
+
+    Parameters
+    ----------
+    calibrated : CalibratedRobot
+    reported_angles : ndarray (N, n)
+        rad, as the controller reports them.
+    operating : OperatingConditions
+    draws : int
+        Of the parameters, for the intervals.
+    stream : numpy.random.Generator
+
+    Returns
+    -------
+    list of Share
+        What is missed without any correction; each effect, largest first; what uncertainty and repeatability leave.
+    """
+    model, estimate = calibrated.model, calibrated.estimate
+    whole, _ = forward(calibrated, reported_angles, operating)
+    gram, owners = _gram(calibrated, reported_angles, operating)
+    values = np.concatenate([np.zeros(0), *estimate.coefficients])
+    shares = []
+    for name in dict.fromkeys([*(effect.effect for effect in model.effects), SPRINGS]):
+        mine = [number for number, effect in enumerate(model.effects) if effect.effect == name]
+        without = _without(calibrated, name, mine)
+        rms = _rms(whole - forward(without, reported_angles, operating)[0])
+        limits: tuple[float | None, float | None] = (None, None)
+        chosen = np.flatnonzero(np.isin(owners, mine))
+        if mine and rms > 0.0:
+            limits = _limits(gram[np.ix_(chosen, chosen)], values[chosen], _covariance(calibrated, chosen), rms, draws, stream)
+        if rms > 0.0:
+            shares.append(Share(name, rms, *limits))
+    shares.sort(key=lambda share: -share.rms_m)
+    total = _rms(whole - nominal_forward(calibrated.robot, reported_angles)[0])
+    variance = np.trace(prediction_covariance(calibrated, reported_angles, operating)[:, :3, :3], axis1=1, axis2=2)
+    angles = calibrated.robot.model_angles(reported_angles)
+    back = repeatability_m(calibrated.robot, angles, calibrated.noise.joint_rad)
+    ends = [Share(UNCERTAINTY, float(np.sqrt(variance.mean()))), Share(REPEATABILITY, float(np.sqrt((back**2).mean())))]
+    return [Share(TOTAL, total), *shares, *ends]
+
+
+def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:
+    values = tuple(0.0 * v if number in mine else v for number, v in enumerate(calibrated.estimate.coefficients))
+    model = calibrated.model
+    if name == SPRINGS and not mine:
+        # Compliances as declared are no effect of the model.
+        model = replace(model, nominal_compliance=0.0 * model.nominal_compliance)
+    return replace(calibrated, model=model, estimate=replace(calibrated.estimate, coefficients=values))
+
+
+def _gram(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean products of the linear parameters' sensitivities of positions (K, K), and the number of the effect of each (K,)."""
+    model, estimate = calibrated.model, calibrated.estimate
+    seen = observations_of(states_of(calibrated, reported_angles, operating))
+    line = linearize(model, estimate, seen, conditions(model, estimate, seen.states))
+    columns = line.sensitivities[:, :3][..., _linear(calibrated)]
+    rows = columns.reshape(-1, columns.shape[-1])
+    owners = np.repeat(np.arange(len(model.effects)), [len(values) for values in estimate.coefficients])
+    return rows.T @ rows / len(reported_angles), owners
+
+
+def _linear(calibrated: CalibratedRobot) -> np.ndarray:
+    """Places of the linear parameters among all: shapes come behind those of their effect."""
+    estimate = calibrated.estimate
+    kinds = [
+        np.repeat([True, False], [len(linear), len(shape)])
+        for linear, shape in zip(estimate.coefficients, estimate.shapes, strict=True)
+    ]
+    return np.flatnonzero(np.concatenate([np.zeros(0, bool), *kinds]))
+
+
+def _covariance(calibrated: CalibratedRobot, chosen: np.ndarray) -> np.ndarray:
+    places = _linear(calibrated)[chosen]
+    return calibrated.covariance[np.ix_(places, places)]
+
+
+def _limits(
+    gram: np.ndarray, values: np.ndarray, covariance: np.ndarray, rms: float, draws: int, stream: np.random.Generator
+) -> tuple[float, float]:
+    """Ends of the interval: those of the linear contribution, on the scale of the exact one."""
+    drawn = values + stream.standard_normal((draws, len(values))) @ square_root(covariance).T
+    contributions = np.sqrt(((drawn @ gram) * drawn).sum(axis=1).clip(min=0.0))
+    linear = np.sqrt(max(values @ gram @ values, 0.0))
+    low, high = np.quantile(contributions, _ENDS) * (rms / linear if linear > 0.0 else 1.0)
+    return float(low), float(high)
+
+
+def _rms(displacement: np.ndarray) -> float:
+    return float(np.sqrt((displacement**2).sum(axis=1).mean()))

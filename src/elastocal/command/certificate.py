@@ -1,0 +1,77 @@
+"""`elastocal certificate`: how good a robot is, against a tolerance, as PDF and JSON."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.checkout import checkout
+from elastocal.command.quantities import length_m
+from elastocal.errors import InputError
+
+DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
+
+
+def certificate(
+    folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
+    tolerance: Annotated[str, typer.Option(help="On the RMS position error, such as 0.2mm.")],
+    risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
+    compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
+    serial: Annotated[str, typer.Option(help="Serial number of the robot.")] = "",
+    date: Annotated[str, typer.Option(help="Date of the certificate; today without.")] = "",
+    output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
+) -> None:
+    """Pose accuracy and repeatability, error map and budget, pass or fail with the risk of being wrong, what changed."""
+    from datetime import date as calendar
+
+    import pandas as pd
+
+    from elastocal.figures.certificate import budget_bars, workspace_map
+    from elastocal.figures.style import save
+    from elastocal.io.json_files import read_json, write_json
+    from elastocal.loop.certificate import Wanted
+    from elastocal.loop.certificate import certificate as certified
+    from elastocal.report.certificate_pages import write_certificate
+    from elastocal.report.certificate_words import certificate_facts
+
+    console = Console(stderr=True)
+    limit = length_m("--tolerance", tolerance)
+    found = diagnosed_campaign(folder)
+    other = None if compare is None else diagnosed_campaign(compare)
+    reports = checkout() / "reports" / "loop" / found.name
+    needed = [reports / name for name in ("verdict.json", "before_after.csv", "residuals.parquet")]
+    for path in needed:
+        if not path.is_file():
+            raise InputError(path, "", "no report of the diagnosis", f"elastocal diagnose {folder}")
+    verdict = read_json(needed[0])
+    if any(effect["family"] == "data" for effect in verdict["effects"]):
+        raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
+    steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2])
+    wanted = Wanted(limit, risk, serial, date or calendar.today().isoformat(), seed)
+    with console.status("working"):
+        document, maps = certified(folder, checkout() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
+        facts = certificate_facts(document)
+        place = output or reports
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory() as scratch:
+            forces = [each["force_N"] for each in document["workspace"]]
+            drawn = {
+                "workspace": workspace_map(maps, forces),
+                "budget": budget_bars(document["budget"], [row[0] for row in facts["budget"]], limit),
+            }
+            for name, figure in drawn.items():
+                save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
+            write_certificate(place / PAGES, facts, [f"{scratch}/{name}.pdf" for name in drawn])
+        write_json(place / DOCUMENT, document)
+    for line in (
+        f"{facts['decision']}: {facts['decision_sentences']}",
+        facts["now"],
+        f"    {place / PAGES}, {place / DOCUMENT}",
+    ):
+        console.print(line, markup=False, highlight=False, soft_wrap=True)

@@ -1,0 +1,200 @@
+"""A certificate of a diagnosed campaign: how good the robot is, against what, how sure that is, and what changed."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.application.calibrated import OperatingConditions
+from elastocal.application.certificate.comparison import compared
+from elastocal.application.certificate.error_budget import error_budget
+from elastocal.application.certificate.repeatability import of_sensor, repeatability
+from elastocal.application.certificate.workspace import (
+    calibration_factor,
+    drawn_angles,
+    position_covariance,
+    workspace_errors,
+)
+from elastocal.campaigns.reading import campaign_files
+from elastocal.mechanics.components import WRENCH_NAMES
+from elastocal.random_streams import stream
+from elastocal.validation.conformity import conformity
+from elastocal.validation.held_out import Errors, share_below_largest
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+
+    from elastocal.application.certificate.workspace import WorkspaceErrors
+    from elastocal.loop.calibrated_files import Diagnosed
+
+# Poses of the map: a bin of 25 by 25 has some ten.
+_POSES = 6000
+# Poses at which two campaigns are compared, and draws of what they would show if nothing had changed.
+_COMPARED, _DRAWS = 200, 2000
+_REPLICATES = 2000
+_LIBRARIES = ("elastocal", "numpy", "scipy")
+_MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What a certificate is to state.
+
+    Attributes
+    ----------
+    tolerance_m, accepted_risk : float
+    serial, date : str
+    seed : int
+    """
+
+    tolerance_m: float
+    accepted_risk: float
+    serial: str
+    date: str
+    seed: int
+
+
+def certificate(
+    folder: str | Path,
+    robots_folder: str | Path,
+    found: Diagnosed,
+    verdict: Mapping[str, Any],
+    steps: pd.DataFrame,
+    residuals: pd.DataFrame,
+    wanted: Wanted,
+    other: Diagnosed | None = None,
+) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
+    """Contents of a certificate.
+
+    Parameters
+    ----------
+    folder, robots_folder : str or Path
+        As in `reading.read_campaign`.
+    found : Diagnosed
+        The campaign.
+    verdict : dict
+        Contents of verdict.json.
+    steps, residuals : pandas.DataFrame
+        before_after.csv and residuals.parquet.
+    wanted : Wanted
+    other : Diagnosed, optional
+        An earlier campaign of the same robot.
+
+    Returns
+    -------
+    document : dict
+        JSON-serialisable.
+    maps : list of WorkspaceErrors
+        Without load, and under the largest force of the campaign where it has any, hanging.
+    """
+    calibrated, case = found.calibrated, found.case
+    robot, campaign = calibrated.robot, case.campaign
+    end = robot.chain.end_effector.name
+    held_out = residuals[residuals["held_out"]]
+    errors, rows = _errors(held_out)
+
+    def draws(purpose: str) -> np.random.Generator:
+        return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
+
+    at_end = rows[[campaign.targets[number].point == end for number in rows["target"]]]
+    factor = 1.0
+    if len(at_end):
+        operating = OperatingConditions(at_end[list(WRENCH_NAMES)].to_numpy())
+        covariance = position_covariance(calibrated, robot.reported_angles(_angles(at_end, robot.joints)), operating)
+        factor = calibration_factor(at_end["distance"].to_numpy(), covariance, calibrated.noise.position_m)
+    fitted = case.observations.states
+    every = residuals.drop_duplicates(["session", "pose", "load"])
+    reported = robot.reported_angles(_angles(every, robot.joints))
+    budget = error_budget(
+        calibrated, reported, OperatingConditions(every[list(WRENCH_NAMES)].to_numpy()), _DRAWS, draws("budget")
+    )
+    angles = drawn_angles(calibrated, _POSES, draws("workspace"))
+    largest = float(np.linalg.norm(every[list(WRENCH_NAMES[:3])].to_numpy(), axis=1).max())
+    forces = [0.0, largest] if largest > 0.0 else [0.0]
+    maps = [
+        workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]), fitted.joint_angles, factor)
+        for force in forces
+    ]
+    repeats = repeatability(campaign.measurements, campaign.targets, end)
+    document: dict[str, Any] = {
+        "campaign": found.name,
+        "robot": robot.name,
+        "serial": wanted.serial,
+        "date": wanted.date,
+        "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
+        "files": {Path(file).name: _digest(file) for file in campaign_files(folder, robots_folder)},
+        "verdict": verdict["verdict"],
+        "effects": [effect["name"] for effect in verdict["effects"]],
+        "held_out": [_step(row) for _, row in steps.iterrows()],
+        "noise_floor_rms_m": verdict["heldout"]["noise_floor_rms_m"],
+        "conformity": asdict(conformity(errors, wanted.tolerance_m, wanted.accepted_risk, _REPLICATES, draws("conformity")))
+        | {"share_below_largest": share_below_largest(errors.poses)},
+        "iso_9283": {
+            "pose_accuracy_mean_m": float(rows["distance"].mean()),
+            "pose_accuracy_largest_m": float(rows["distance"].max()),
+            "poses": errors.poses,
+            "repeatability": None if repeats is None else asdict(repeats),
+            "repeatability_of_sensor_m": of_sensor(calibrated.noise.position_m),
+        },
+        "budget": [asdict(share) for share in budget],
+        "budget_states": len(every),
+        "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
+        "bound_factor": factor,
+        "comparison": None,
+    }
+    if other is not None:
+        document["comparison"] = {"campaign": other.name} | asdict(
+            compared(other.calibrated, calibrated, angles[:_COMPARED], _DRAWS, draws("comparison"))
+        )
+    return document, maps
+
+
+def _errors(held_out: pd.DataFrame) -> tuple[Errors, pd.DataFrame]:
+    """Errors of the final model on held-out poses with repeats averaged, and the rows behind them."""
+    keys = ["session", "pose", "load", "target"]
+    rows = held_out.groupby(keys, as_index=False).mean(numeric_only=True)
+    rows["distance"] = np.linalg.norm(rows[["after_dx", "after_dy", "after_dz"]].to_numpy(), axis=1)
+    return Errors(rows["distance"].to_numpy(), rows.groupby(["session", "pose"]).ngroup().to_numpy()), rows
+
+
+def _angles(rows: pd.DataFrame, joints: int) -> np.ndarray:
+    return rows[[f"q{joint}" for joint in range(1, joints + 1)]].to_numpy()
+
+
+def _step(row: pd.Series) -> dict[str, Any]:
+    """A row of before_after.csv; an end of an interval that is open is none."""
+
+    def number(name: str) -> float | None:
+        return float(row[name]) if np.isfinite(row[name]) else None
+
+    names = [f"heldout_{metric}{end}" for metric in ("mean_m", "rms_m", "p95_m", "max_m") for end in ("", "_low", "_high")]
+    return {"model": _MODELS[row["kind"]], "step": row["step"]} | {
+        name.removeprefix("heldout_"): number(name) for name in names
+    }
+
+
+def _summary(force_N: float, errors: WorkspaceErrors) -> dict[str, Any]:
+    def quantiles(values: np.ndarray) -> dict[str, float]:
+        return {"median_m": float(np.median(values)), "p95_m": float(np.quantile(values, 0.95))}
+
+    inside = ~errors.outside
+    return {
+        "force_N": force_N,
+        "poses": len(errors.position),
+        "uncorrected": quantiles(errors.uncorrected_m),
+        "bound": quantiles(errors.bound_m),
+        "bound_inside": quantiles(errors.bound_m[inside]) if inside.any() else None,
+        "share_outside": float(errors.outside.mean()),
+    }
+
+
+def _digest(file: str) -> str:
+    return hashlib.sha256(Path(file).read_bytes()).hexdigest()

@@ -1,0 +1,249 @@
+"""What a certificate states, worded, from its contents."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.diagnosis.words import candidate_words, listed, physical_name
+from elastocal.report.first_page import TITLES
+from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled, words
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+_SHARES = {
+    "joint_compliance": "joint compliance under loads and weights",
+    "declared_weight": "errors of the declared weights",
+    "joint_offset": "joint offsets",
+    "link_geometry": "link geometry",
+    "uncorrected": "no correction at all",
+}
+_STEPS = {
+    "uncorrected": "uncorrected: the robot file, its base placed as well as possible",
+    "declared": "declared model, fitted",
+    "corrected": "with the effects found",
+}
+# From here on the tracker's noise hides the robot's own repeatability.
+_HIDDEN = 0.8
+_SHOWN_CHANGES = 12
+# Below this probability of the observed change where nothing changed, a robot counts as changed.
+_LEVEL = 0.05
+
+
+def share_name(name: str) -> str:
+    """A line of the error budget in words."""
+    return _SHARES.get(name) or physical_name(name)
+
+
+def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Facts for the pages of a certificate.
+
+    Parameters
+    ----------
+    document : dict
+        Of `loop.certificate.certificate`.
+
+    Returns
+    -------
+    dict
+        JSON-serialisable; strings ready to print, lists for tables.
+    """
+    conformity, steps = document["conformity"], document["held_out"]
+    return {
+        "campaign": document["campaign"],
+        "robot": document["robot"],
+        "identity": [
+            ["robot", document["robot"]],
+            ["serial number", document["serial"] or "not stated"],
+            ["campaign", document["campaign"]],
+            ["date of this certificate", document["date"]],
+            ["software", ", ".join(f"{name} {version}" for name, version in document["versions"].items())],
+        ],
+        "decision": conformity["decision"],
+        "decision_sentences": decision_sentences(document),
+        "verdict": verdict_sentence(document),
+        "accuracy": accuracy_sentence(document),
+        "now": what_to_do(document),
+        "steps": [
+            [
+                _STEPS[step["model"]]
+                if step["model"] != "corrected"
+                else f"with {physical_name(step['step'].removeprefix('+ '))}",
+                *(_with_interval(step, metric) for metric in ("mean_m", "rms_m", "p95_m", "max_m")),
+            ]
+            for step in steps
+        ],
+        "floor": length(document["noise_floor_rms_m"]),
+        "iso": iso_rows(document["iso_9283"]),
+        "budget": [[share_name(line["name"]), _share(line), _limits(line)] for line in document["budget"]],
+        "budget_states": counted(document["budget_states"], "state"),
+        "workspace": workspace_rows(document["workspace"]),
+        "bound_factor": plain(document["bound_factor"], 2),
+        "comparison": None if document["comparison"] is None else comparison_facts(document["comparison"]),
+        "files": [[name, digest] for name, digest in document["files"].items()],
+    }
+
+
+def decision_sentences(document: Mapping[str, Any]) -> str:
+    """Pass or fail, against what, how sure."""
+    found = document["conformity"]
+    tolerance, rms = length(found["tolerance_m"]), length(found["rms_m"])
+    poses = counted(found["poses"], "validation pose")
+    measured = f"On {poses} the corrected robot is off by {rms} RMS; the tolerance is {tolerance}."
+    risk = _percent(found["risk_above"])
+    accepted = _percent(found["accepted_risk"])
+    if found["decision"] == "pass":
+        text = f"The risk that its RMS error over all poses like these is larger is {risk}; {accepted} are accepted."
+    elif found["decision"] == "fail":
+        below = _percent(1.0 - found["risk_above"])
+        text = (
+            f"The risk that its RMS error over all poses like these is smaller after all is {below}; {accepted} are accepted."
+        )
+    else:
+        text = (
+            f"The risk that its RMS error over all poses like these is larger is {risk}: too much to pass and too little to "
+            f"fail, with {accepted} accepted. About {counted(found['poses_needed'], 'validation pose')} would decide."
+        )
+    guard = f"To pass, the RMS must stay {length(found['guard_band_m'])} below the tolerance (guard band)."
+    inside = (
+        f"In {found['poses_inside']} of {found['poses']} poses every error stays within the tolerance, which shows this for "
+        f"{percent(found['share_inside'])} of all poses at 95 % confidence."
+    )
+    return " ".join([measured, text, guard, inside])
+
+
+def verdict_sentence(document: Mapping[str, Any]) -> str:
+    """What the diagnosis found."""
+    title = capital(TITLES[document["verdict"]])
+    names = [physical_name(name) for name in document["effects"]]
+    return f"{title}: {listed(names)}." if names else f"{title}."
+
+
+def accuracy_sentence(document: Mapping[str, Any]) -> str:
+    """Errors before and after on validation poses."""
+    first, last = document["held_out"][0], document["held_out"][-1]
+    floor = document["noise_floor_rms_m"]
+    noise = f" Noise alone leaves {length(floor)}." if floor else ""
+    return (
+        f"Position error on validation poses, RMS: {_with_interval(first, 'rms_m')} uncorrected, "
+        f"{_with_interval(last, 'rms_m')} corrected (95 % intervals).{noise}"
+    )
+
+
+def what_to_do(document: Mapping[str, Any]) -> str:
+    """What follows for whoever runs the robot."""
+    decision = document["conformity"]["decision"]
+    first, last = document["held_out"][0], document["held_out"][-1]
+    change = document["comparison"]
+    moved = ""
+    if change is not None and change["p_value"] < _LEVEL:
+        moved = f" The robot moves differently than in {change['campaign']}: use the corrections of this campaign from now on."
+    elif change is not None:
+        moved = f" No change since {change['campaign']} can be shown: its corrections may stay in use."
+    if last["rms_m"] >= first["rms_m"]:
+        return "Do not correct the robot by this campaign: on validation poses it would be no better." + moved
+    if decision == "pass":
+        return "Use the robot with corrected targets (elastocal correct): it keeps the tolerance." + moved
+    if decision == "fail":
+        return (
+            "Correct the targets all the same, which lowers the error; for this tolerance the robot is not good enough, or the "
+            "tracker is not: compare the noise with the tolerance." + moved
+        )
+    return "Use corrected targets, and measure more validation poses before the tolerance is relied upon." + moved
+
+
+def iso_rows(found: Mapping[str, Any]) -> list[list[str]]:
+    """Rows of the table after ISO 9283: quantity, value, how it was taken."""
+    poses = counted(found["poses"], "validation pose")
+    rows = [
+        ["pose accuracy AP, corrected, mean", length(found["pose_accuracy_mean_m"]), poses],
+        ["pose accuracy AP, corrected, largest", length(found["pose_accuracy_largest_m"]), poses],
+    ]
+    repeats = found["repeatability"]
+    if repeats is None:
+        return [*rows, ["pose repeatability RP", "unknown", "no pose was approached again"]]
+    low, high = (length(value) for value in repeats["position_interval_m"])
+    taken = f"{counted(repeats['approaches'], 'approach', 'approaches')} to {counted(repeats['poses'], 'pose')}"
+    rows.append(["pose repeatability RP, position", f"{length(repeats['position_m'])} ({low} to {high})", taken])
+    if repeats["orientation_rad"] is not None:
+        rows.append(["pose repeatability RP, orientation", f"{plain(MICRO * repeats['orientation_rad'])} µrad", taken])
+    sensor = found["repeatability_of_sensor_m"]
+    hides = sensor > _HIDDEN * repeats["position_m"]
+    rows.append(
+        ["of RP, what the tracker's noise alone shows", length(sensor), "hides the robot's own" if hides else "by its noise"]
+    )
+    return rows
+
+
+def workspace_rows(maps: list[Mapping[str, Any]]) -> list[list[str]]:
+    """Rows of the table of the workspace: load, uncorrected, bound, bound inside the fitted range, share outside."""
+    return [
+        [
+            f"{each['force_N']:.0f} N hanging" if each["force_N"] else "none",
+            f"{length(each['uncorrected']['median_m'])} / {length(each['uncorrected']['p95_m'])}",
+            f"{length(each['bound']['median_m'])} / {length(each['bound']['p95_m'])}",
+            "–"
+            if each["bound_inside"] is None
+            else f"{length(each['bound_inside']['median_m'])} / {length(each['bound_inside']['p95_m'])}",
+            percent(each["share_outside"]),
+        ]
+        for each in maps
+    ]
+
+
+def comparison_facts(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Sentence and rows of the comparison with another campaign."""
+    changed = found["p_value"] < _LEVEL
+    apart, largest, expected = (length(found[name]) for name in ("rms_m", "largest_m", "expected_m"))
+    sentence = (
+        f"Over the workspace the robots of both campaigns lie {apart} RMS apart ({largest} at most), rigid motions of the base "
+        f"aside; {expected} would be expected if nothing had changed (p = {plain(found['p_value'], 2)}). "
+    ) + ("The robot has changed." if changed else "No change can be shown.")
+    if found["changes"]:
+        sentence += " What differs, parameter by parameter, most certain first (p adjusted for all by Holm):"
+    else:
+        sentence += " The campaigns identify different parameters, which are therefore not compared one by one."
+    rows = [_change(change) for change in found["changes"][:_SHOWN_CHANGES]]
+    return {
+        "campaign": found["campaign"],
+        "sentence": sentence,
+        "rows": rows,
+        "more": max(len(found["changes"]) - _SHOWN_CHANGES, 0),
+    }
+
+
+def _change(change: Mapping[str, Any]) -> list[str]:
+    """A parameter: where and what it is, before, after, the difference with its standard error, p."""
+    unit = change["unit"]
+    where = share_name(change["owner"]) if change["owner"] in _SHARES else candidate_words(change["owner"])
+    numbers = [
+        " ".join(scaled(value, error, unit))
+        for value, error in (
+            (change["before"], None),
+            (change["after"], None),
+            (change["after"] - change["before"], change["std_error"]),
+        )
+    ]
+    return [f"{capital(where)}: {words(change['name'])}", *numbers, plain(change["p_value"], 2)]
+
+
+def _with_interval(step: Mapping[str, Any], metric: str) -> str:
+    low, high = step[f"{metric}_low"], step[f"{metric}_high"]
+    value = length(step[metric])
+    if low is None:
+        return value
+    return f"{value} ({length(low)} to {length(high)})" if high is not None else f"{value} (from {length(low)})"
+
+
+def _limits(line: Mapping[str, Any]) -> str:
+    return "–" if line["low_m"] is None else f"{length(line['low_m'])} to {length(line['high_m'])}"
+
+
+def _share(line: Mapping[str, Any]) -> str:
+    hidden = line["name"] == "repeatability" and not line["rms_m"]
+    return "hidden by the tracker's noise" if hidden else length(line["rms_m"])
+
+
+def _percent(share: float) -> str:
+    return "below 0.1 %" if share < 0.001 else f"{100 * share:.2g} %"

@@ -1,0 +1,70 @@
+"""The error budget: exact displacements of each effect alone, and intervals by the covariance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_calibrated import USUAL, made_calibrated
+from support import robot_of
+
+from elastocal.application.calibrated import OperatingConditions, forward, nominal_forward
+from elastocal.application.certificate.error_budget import REPEATABILITY, TOTAL, UNCERTAINTY, error_budget
+
+
+def states(robot, count=60, force=300.0, seed=0):
+    rng = np.random.default_rng(seed)
+    low, high = robot.joint_limits.T
+    wrench = np.zeros((count, 6))
+    wrench[:, :3] = force * rng.standard_normal((count, 3))
+    return robot.reported_angles(rng.uniform(0.6 * low, 0.6 * high, (count, robot.joints))), OperatingConditions(wrench)
+
+
+def budget(calibrated, draws=2000, **options):
+    lines = error_budget(calibrated, *states(calibrated.robot, **options), draws, np.random.default_rng(1))
+    return {line.name: line for line in lines}
+
+
+def rms(one, other):
+    return np.sqrt(((one - other) ** 2).sum(axis=1).mean())
+
+
+def test_each_line_is_what_the_robot_misses_without_that_effect(fanuc):
+    calibrated = made_calibrated(fanuc, *USUAL)
+    found = budget(calibrated)
+    angles, operating = states(fanuc)
+    whole, _ = forward(calibrated, angles, operating)
+    assert found[TOTAL].rms_m == pytest.approx(rms(whole, nominal_forward(fanuc, angles)[0]))
+    for name in ("joint_offset", "link_geometry", "joint_compliance", "link_weight"):
+        values = tuple(
+            0.0 * value if effect.effect == name else value
+            for effect, value in zip(calibrated.model.effects, calibrated.estimate.coefficients, strict=True)
+        )
+        without = replace(calibrated, estimate=replace(calibrated.estimate, coefficients=values))
+        assert found[name].rms_m == pytest.approx(rms(whole, forward(without, angles, operating)[0]))
+    names = list(found)
+    assert names[0] == TOTAL and names[-2:] == [UNCERTAINTY, REPEATABILITY]
+    middle = [found[name].rms_m for name in names[1:-2]]
+    assert middle == sorted(middle, reverse=True)
+
+
+def test_a_parameter_known_to_a_tenth_has_a_line_known_to_a_tenth():
+    """One joint offset: the line is |a| times its lever, and so is its interval."""
+    calibrated = made_calibrated(robot_of("Rz(q1) Tx(1.0) Ry(q2) Tx(0.5) [tip]"), "joint_offset@2", identified=False)
+    value = calibrated.estimate.coefficients[0][0]
+    line = budget(replace(calibrated, covariance=np.array([[(0.1 * value) ** 2]])), 20_000)["joint_offset"]
+    assert line.rms_m == pytest.approx(0.5 * abs(value), rel=1e-3)
+    assert line.low_m / line.rms_m == pytest.approx(1 - 0.196, abs=0.01)
+    assert line.high_m / line.rms_m == pytest.approx(1 + 0.196, abs=0.01)
+
+
+def test_springs_as_declared_are_a_line_without_an_interval(fanuc):
+    found = budget(made_calibrated(fanuc, "joint_offset@2", identified=False))
+    assert found["joint_compliance"].rms_m > 0 and found["joint_compliance"].low_m is None
+    assert "joint_compliance" not in budget(made_calibrated(fanuc, "joint_offset@2", identified=False), force=0.0)
+
+
+def test_repeatability_of_the_joints_is_the_last_line(fanuc):
+    calibrated = made_calibrated(fanuc, "joint_offset@2")
+    still = budget(calibrated)[REPEATABILITY].rms_m
+    moved = replace(calibrated, noise=replace(calibrated.noise, joint_rad=np.full(6, 2e-5)))
+    assert still == 0.0 and 1e-5 < budget(moved)[REPEATABILITY].rms_m < 2e-4

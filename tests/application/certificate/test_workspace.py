@@ -1,0 +1,81 @@
+"""Errors over the workspace, and bounds that hold as often as they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_calibrated import USUAL, made_calibrated
+from scipy.stats import chi, norm
+
+from elastocal.application.calibrated import NEUTRAL, forward, nominal_forward
+from elastocal.application.certificate.workspace import (
+    calibration_factor,
+    drawn_angles,
+    position_covariance,
+    quantile_of_length,
+    workspace_errors,
+)
+from elastocal.fitting.parameters import stepped
+
+
+@pytest.fixture(scope="module")
+def calibrated(fanuc):
+    found = made_calibrated(fanuc, *USUAL)
+    return replace(found, noise=replace(found.noise, joint_rad=np.full(6, 1e-5)))
+
+
+def found_for(calibrated, count=300, factor=1.0):
+    angles = drawn_angles(calibrated, count, np.random.default_rng(0))
+    return workspace_errors(calibrated, angles, np.zeros(6), calibrated.robot.model_angles(angles[: count // 2]), factor)
+
+
+def test_the_uncorrected_error_is_the_distance_from_where_the_file_has_it(calibrated):
+    found = found_for(calibrated)
+    position, _ = forward(calibrated, found.joint_angles, NEUTRAL)
+    nominal, _ = nominal_forward(calibrated.robot, found.joint_angles)
+    np.testing.assert_allclose(found.uncorrected_m, np.linalg.norm(position - nominal, axis=1))
+    assert (found_for(calibrated, factor=2.0).bound_m == 2.0 * found.bound_m).all()
+    assert 0.0 < found.outside.mean() < 0.2
+
+
+def test_quantiles_are_those_of_one_and_of_three_directions_and_hold_between():
+    alike, single = np.eye(3), np.diag([1.0, 0.0, 0.0])
+    found = quantile_of_length(np.stack([alike, single, np.zeros((3, 3))]))
+    np.testing.assert_allclose(found, [chi.ppf(0.95, 3), norm.ppf(0.975), 0.0], rtol=1e-12)
+    rng = np.random.default_rng(1)
+    for scales in ([1.0, 0.5, 0.1], [1.0, 1.0, 0.2], [1.0, 0.1, 0.1]):
+        lengths = np.linalg.norm(rng.standard_normal((200_000, 3)) * scales, axis=1)
+        bound = quantile_of_length(np.diag(np.square(scales))[None])[0]
+        # The gamma distribution has two of the moments.
+        assert np.mean(lengths < bound) == pytest.approx(0.95, abs=0.01)
+
+
+def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(calibrated):
+    """100 robots at 100 poses; robots err at many poses alike, so that the share is known to some 2 %."""
+    rng = np.random.default_rng(2)
+    found = found_for(calibrated, 100)
+    root = np.linalg.cholesky(calibrated.covariance)
+    inside = []
+    for _ in range(100):
+        step = root @ rng.standard_normal(len(root))
+        other = replace(calibrated, estimate=stepped(calibrated.model, calibrated.estimate, step))
+        repeated = found.joint_angles + 1e-5 * rng.standard_normal(found.joint_angles.shape)
+        inside.append(np.linalg.norm(forward(other, repeated)[0] - found.position, axis=1) < found.bound_m)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
+
+
+def test_the_factor_is_the_ratio_of_what_is_missed_to_what_was_predicted_without_the_sensor():
+    covariance = np.tile(1e-10 * np.eye(3), (4000, 1, 1))
+    rng = np.random.default_rng(3)
+    missed = 3e-5 * rng.standard_normal((4000, 3)) + 5e-5 * rng.standard_normal((4000, 3))
+    # 12,000 numbers of 5.8e-5, of which 5e-5 are the sensor's: 3 % is two standard errors of what is left.
+    assert calibration_factor(np.linalg.norm(missed, axis=1), covariance, 5e-5) == pytest.approx(3.0, rel=0.05)
+    assert calibration_factor(np.full(10, 1e-6), covariance[:10], 5e-5) == 1.0
+    assert calibration_factor(np.full(10, 1e-6), np.zeros((10, 3, 3)), 0.0) == 1.0
+
+
+def test_repeatability_is_in_the_covariance(calibrated):
+    angles = drawn_angles(calibrated, 20, np.random.default_rng(0))
+    still = replace(calibrated, noise=replace(calibrated.noise, joint_rad=np.zeros(6)))
+    more = position_covariance(calibrated, angles, NEUTRAL) - position_covariance(still, angles, NEUTRAL)
+    assert (np.linalg.eigvalsh(more) > -1e-20).all() and np.trace(more, axis1=1, axis2=2).min() > 1e-11

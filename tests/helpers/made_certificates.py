@@ -1,0 +1,86 @@
+"""Contents of a certificate, made up."""
+
+
+def step(model, rms, open_above=False):
+    metrics = ("mean_m", "rms_m", "p95_m", "max_m")
+    values = {metric: rms * factor for metric, factor in zip(metrics, (0.9, 1.0, 1.6, 2.0), strict=True)}
+    values |= {f"{metric}_low": 0.8 * values[metric] for metric in metrics[:3]} | {"max_m_low": None, "max_m_high": None}
+    values |= {f"{metric}_high": 1.3 * values[metric] for metric in metrics[:2]}
+    values["p95_m_high"] = None if open_above else 2.0 * rms
+    return {"model": model, "step": {"corrected": "+ lost_motion"}.get(model, model)} | values
+
+
+def line(name, rms, known=True):
+    return {"name": name, "rms_m": rms, "low_m": 0.8 * rms if known else None, "high_m": 1.2 * rms if known else None}
+
+
+def made_document(decision="pass", comparison=None, repeats=True, **conformity):
+    quantiles = {"median_m": 1e-3, "p95_m": 2e-3}
+    return {
+        "campaign": "cell_7",
+        "robot": "arm",
+        "serial": "",
+        "date": "2026-11-23",
+        "versions": {"elastocal": "0.1.0"},
+        "files": {"campaign.yaml": "ab" * 32},
+        "verdict": "named",
+        "effects": ["lost_motion"],
+        "held_out": [step("uncorrected", 1.5e-3), step("declared", 3e-4), step("corrected", 1.2e-4, True)],
+        "noise_floor_rms_m": 1e-4,
+        "conformity": {
+            "decision": decision,
+            "tolerance_m": 2e-4,
+            "rms_m": 1.2e-4,
+            "guard_band_m": 2e-5,
+            "risk_above": 0.01,
+            "accepted_risk": 0.05,
+            "poses": 9,
+            "poses_inside": 8,
+            "share_inside": 0.57,
+            "poses_needed": 40 if decision == "undecided" else None,
+        }
+        | conformity,
+        "iso_9283": {
+            "pose_accuracy_mean_m": 1e-4,
+            "pose_accuracy_largest_m": 2.4e-4,
+            "poses": 9,
+            "repeatability": {
+                "position_m": 1e-4,
+                "position_interval_m": [8e-5, 1.2e-4],
+                "orientation_rad": 5e-5,
+                "approaches": 40,
+                "poses": 10,
+            }
+            if repeats
+            else None,
+            "repeatability_of_sensor_m": 9e-5,
+        },
+        "budget": [
+            line("uncorrected", 1.5e-3, False),
+            line("joint_compliance", 1e-3),
+            line("lost_motion", 2e-4),
+            line("uncertainty of the parameters", 2e-5, False),
+            line("repeatability", 0.0, False),
+        ],
+        "budget_states": 100,
+        "workspace": [
+            {"force_N": force, "uncorrected": quantiles, "bound": quantiles, "bound_inside": inside, "share_outside": 0.3}
+            for force, inside in ((0.0, quantiles), (100.0, None))
+        ],
+        "bound_factor": 1.3,
+        "comparison": comparison,
+    }
+
+
+def made_comparison(p_value=0.001, changes=14):
+    change = {"unit": "rad", "before": 1e-4, "after": 3e-4, "std_error": 5e-5, "p_value": 0.01}
+    owners = ["joint_compliance", *(f"joint_offset@{joint}" for joint in range(1, 20))]
+    listed = [{"owner": owner, "name": "offset"} | change for owner in owners[:changes]]
+    return {
+        "campaign": "cell_6",
+        "rms_m": 3e-4,
+        "expected_m": 4e-5,
+        "largest_m": 9e-4,
+        "p_value": p_value,
+        "changes": listed,
+    }

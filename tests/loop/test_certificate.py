@@ -1,0 +1,72 @@
+"""Contents of a certificate: those of the report where both state them, and what is wanted of it."""
+
+import hashlib
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from analysed_robots import ROBOTS
+from certified import certified_checkout
+
+from elastocal.loop.calibrated_files import load_diagnosed
+from elastocal.loop.certificate import Wanted, certificate
+
+WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
+
+
+@pytest.fixture(scope="module")
+def top(tmp_path_factory):
+    found = tmp_path_factory.mktemp("certified")
+    certified_checkout(found)
+    return found
+
+
+@pytest.fixture(scope="module")
+def parts(top):
+    reports = top / "reports" / "loop" / "made"
+    verdict = json.loads((reports / "verdict.json").read_text())
+    tables = pd.read_csv(reports / "before_after.csv"), pd.read_parquet(reports / "residuals.parquet")
+    return load_diagnosed(top / "made", ROBOTS, top / "results" / "loop"), verdict, *tables
+
+
+@pytest.fixture(scope="module")
+def found(top, parts):
+    return certificate(top / "made", ROBOTS, *parts, WANTED, parts[0])
+
+
+def test_errors_are_those_of_the_verdict(found, parts):
+    document, verdict = found[0], parts[1]
+    assert document["conformity"]["rms_m"] == pytest.approx(verdict["heldout"]["after"]["rms_m"], rel=1e-9)
+    assert document["iso_9283"]["pose_accuracy_mean_m"] == pytest.approx(verdict["heldout"]["after"]["mean_m"], rel=1e-9)
+    assert document["iso_9283"]["pose_accuracy_largest_m"] == pytest.approx(verdict["heldout"]["after"]["max_m"], rel=1e-9)
+    assert [row["model"] for row in document["held_out"]] == ["uncorrected", "declared", "corrected"]
+    assert document["held_out"][-1]["rms_m"] == pytest.approx(verdict["heldout"]["after"]["rms_m"], rel=1e-6)
+    assert document["held_out"][-1]["max_m_low"] is None
+
+
+def test_it_states_what_it_is_of(found, top):
+    document = found[0]
+    assert (document["serial"], document["date"], document["campaign"]) == ("SN 7", "2026-11-23", "made")
+    assert document["files"]["campaign.yaml"] == hashlib.sha256((top / "made" / "campaign.yaml").read_bytes()).hexdigest()
+    assert set(document["versions"]) == {"elastocal", "numpy", "scipy", "python"}
+    json.dumps(document, allow_nan=False)
+
+
+def test_the_map_is_drawn_without_load_and_under_the_largest(found, parts):
+    document, maps = found
+    largest = np.linalg.norm(parts[3][["fx", "fy", "fz"]], axis=1).max()
+    assert [each["force_N"] for each in document["workspace"]] == [0.0, pytest.approx(largest)]
+    np.testing.assert_array_equal(maps[0].joint_angles, maps[1].joint_angles)
+    assert document["bound_factor"] >= 1.0
+
+
+def test_a_campaign_compared_with_itself_has_not_changed(found):
+    comparison = found[0]["comparison"]
+    assert comparison["campaign"] == "made" and comparison["rms_m"] == 0.0 and comparison["p_value"] == 1.0
+    assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
+
+
+def test_the_same_seed_gives_the_same_certificate(found, top, parts):
+    again, _ = certificate(top / "made", ROBOTS, *parts, WANTED, parts[0])
+    assert again == found[0]
