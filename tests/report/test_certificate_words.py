@@ -38,7 +38,8 @@ def test_errors_before_and_after_have_their_intervals():
         "1.50\u00a0mm (1.20\u00a0mm to 1.95\u00a0mm) uncorrected, 120\u00a0µm (96.0\u00a0µm to 156\u00a0µm) corrected" in text
     )
     rows = certificate_facts(made_document())["steps"]
-    assert rows[-1][0] == "with lost motion (backlash)" and rows[-1][3].endswith("(from 154\u00a0µm)") and "(" not in rows[-1][4]
+    assert rows[-1][0] == "with lost motion (backlash)"
+    assert rows[-1][3].endswith("(from 154\u00a0µm)") and "(" not in rows[-1][4]
 
 
 @pytest.mark.parametrize(
