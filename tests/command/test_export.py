@@ -2,6 +2,8 @@
 
 import json
 
+import numpy as np
+import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
 from diagnosed_folders import diagnosed_folder
@@ -10,7 +12,9 @@ from typer.testing import CliRunner
 from elastocal.campaigns.reading import read_robot
 from elastocal.command import campaign
 from elastocal.command.main import app
+from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.mechanics.kinematics import poses
 
 
 @pytest.fixture(scope="module")
@@ -33,5 +37,14 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, 
     assert abs(robot.reported_offset[2] - nominal.reported_offset[2]) == pytest.approx(3e-4, rel=0.2)
     assert (robot.compliance != nominal.compliance).any()
     assert robot_from_urdf(tmp_path / "out" / "robot.urdf", "base", robot.chain.end_effector.name).robot.joints == 6
+    by_table = robot_from_dh(tmp_path / "out" / "dh.csv").robot
+    angles = 0.5 * np.linspace(-1, 1, 6)[None]
+    mine = poses(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
+    theirs = poses(by_table.chain, by_table.model_angles(angles), by_table.chain.end_effector)
+    for one, other in zip(mine, theirs, strict=True):
+        np.testing.assert_allclose(other, one, atol=1e-9)
+    deltas = pd.read_csv(tmp_path / "out" / "dh_deltas.csv").set_index("row")
+    assert abs(deltas.loc["q3", "delta_theta_deg"]) == pytest.approx(np.degrees(3e-4), rel=0.2)
+    assert (tmp_path / "out" / "dh_frames.png").stat().st_size > 10_000
     document = json.loads((tmp_path / "out" / "effects.json").read_text())
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6

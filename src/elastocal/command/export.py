@@ -1,16 +1,21 @@
-"""`elastocal export`: the calibrated robot as robot file, URDF and a sidecar with what neither can hold."""
+"""`elastocal export`: the calibrated robot as robot file, URDF and DH parameters, and a sidecar with what these cannot hold."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from elastocal.mechanics.robot import Robot
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
+DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", "dh_frames"
 
 
 def export(
@@ -18,7 +23,7 @@ def export(
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
 ) -> None:
-    """Write the calibrated robot: robot file, URDF (its geometry), and a sidecar with springs and effects."""
+    """Write the calibrated robot: robot file, URDF and DH parameters (geometry), and a sidecar with springs and effects."""
     from datetime import date as calendar
 
     import numpy as np
@@ -44,6 +49,7 @@ def export(
     document = sidecar(calibrated, found.name, date or calendar.today().isoformat())
     write_json(output / SIDECAR, document)
     lines = [f"    {output / name}" for name in (ROBOT, URDF, SIDECAR)]
+    lines += _denavit_hartenberg(calibrated.robot, robot, output)
     if document["effects"]:
         states = found.case.observations.states
         angles = calibrated.robot.reported_angles(states.joint_angles)
@@ -53,3 +59,21 @@ def export(
         lines.insert(0, f"only in {SIDECAR}: {names}; up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _denavit_hartenberg(nominal: Robot, robot: Robot, output: Path) -> list[str]:
+    """Write the DH parameters, by how much they differ from the nominal ones, and their frames; lines to print."""
+    from elastocal.exchange.dh_writing import dh_deltas, dh_frames, dh_table
+    from elastocal.figures.dh_frames import dh_frames_picture
+    from elastocal.figures.style import save
+    from elastocal.io.data_frames import write_csv
+
+    try:
+        frames = dh_frames(nominal)
+    except InputError as error:
+        return [f"no DH parameters: {error}"]
+    write_csv(output / DH, dh_table(robot, nominal), digits=12)
+    write_csv(output / DELTAS, dh_deltas(nominal, robot))
+    names = [f"frame {number}" for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
+    save(dh_frames_picture(frames, nominal.name, names), f"{output / FRAMES}.pdf", f"{output / FRAMES}.png")
+    return [f"    {output / name}" for name in (DH, DELTAS, f"{FRAMES}.png")]

@@ -41,7 +41,7 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
     str
         Links ``base``, ``link_1 .. link_n``, and one for each measuring point by its name.
     """
-    own = _counts_by_itself(robot)
+    own = robot.counts_each_joint
     sense = np.diag(robot.reported_matrix) if own else np.ones(robot.joints)
     zero = robot.reported_offset if own else np.zeros(robot.joints)
     names = robot.joint_names or tuple(f"joint_{j}" for j in range(1, robot.joints + 1))
@@ -73,11 +73,6 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
         parent, here = child, np.eye(4)
     Xml.indent(root)
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
-
-
-def _counts_by_itself(robot: Robot) -> bool:
-    """Whether the controller counts each joint by itself, in steps of its own size."""
-    return bool(np.allclose(np.abs(robot.reported_matrix), np.eye(robot.joints), atol=0.0))
 
 
 def _moved(transform: Transform, amount: float) -> np.ndarray:

@@ -59,15 +59,17 @@ def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema])
     return pd.concat(frames[1:] or frames, ignore_index=True)
 
 
-def write_csv(path: str | Path, frame: pd.DataFrame) -> None:
+def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
     """Write a data frame; the file appears whole or not at all.
 
     Parameters
     ----------
     path : str
     frame : pandas.DataFrame
+    digits : int
+        Significant ones of numbers.
     """
-    write_text(path, frame.to_csv(index=False, float_format="%.9g", lineterminator="\n"))
+    write_text(path, frame.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def write_markdown(path: str | Path, frame: pd.DataFrame) -> None:

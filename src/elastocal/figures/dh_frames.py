@@ -1,0 +1,68 @@
+"""The frames of Denavit-Hartenberg rows on a robot, as a picture."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from elastocal.figures.style import PALETTE, WIDTH_MM, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+_AXES = ("x", "y", "z")
+_COLORS = (PALETTE[1], PALETTE[2], PALETTE[0])
+# Of an axis, over the reach of the robot.
+_LENGTH_SHARE = 0.12
+
+
+@styled
+def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> Figure:
+    """Frames where the controller reports zero, joined by a line from the base to the end effector.
+
+    Parameters
+    ----------
+    frames : ndarray (F, 4, 4)
+        From `exchange.dh_writing.dh_frames`, base axes.
+    robot : str
+        Name.
+    names : sequence of str (F,)
+        What stands at each frame.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure = Figure(figsize=(WIDTH_MM / 25.4, 120 / 25.4), layout="constrained")
+    axis = figure.add_subplot(projection="3d")
+    origins = np.concatenate([np.zeros((1, 3)), frames[:, :3, 3]])
+    axis.plot(*origins.T, color="#9a9a9a", lw=2.5, zorder=1)
+    span = np.ptp(origins, axis=0).max()
+    length = _LENGTH_SHARE * span
+    for k, (name, color) in enumerate(zip(_AXES, _COLORS, strict=True)):
+        for number, frame in enumerate(frames):
+            ends = np.stack([frame[:3, 3], frame[:3, 3] + length * frame[:3, k]])
+            axis.plot(*ends.T, color=color, lw=1.6, label=f"{name} axis" if number == 0 else None)
+    placed: list[np.ndarray] = []
+    for frame, name in zip(frames, names, strict=True):
+        # Names of frames that share an origin stand one above the other.
+        above = sum(np.linalg.norm(other - frame[:3, 3]) < 0.3 * length for other in placed)
+        placed.append(frame[:3, 3])
+        axis.text(*(frame[:3, 3] + [0.15 * length, 0.0, (0.25 + 0.55 * above) * length]), name, fontsize=7.5)
+    middle = 0.5 * (origins.min(axis=0) + origins.max(axis=0))
+    half = 0.5 * span + length
+    axis.set(
+        xlim=(middle[0] - half, middle[0] + half),
+        ylim=(middle[1] - half, middle[1] + half),
+        zlim=(middle[2] - half, middle[2] + half),
+        xlabel="x of the base (m)",
+        ylabel="y of the base (m)",
+        zlabel="z of the base (m)",
+        title=f"{robot}: frames where the controller reports zero; joint k turns about the z axis of frame k - 1",
+    )
+    axis.set_box_aspect((1, 1, 1))
+    axis.view_init(elev=18, azim=-62)
+    figure.legend(loc="outside lower center", ncols=3)
+    return figure

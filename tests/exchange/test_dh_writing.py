@@ -1,0 +1,120 @@
+"""DH parameters of a robot: they bring back its poses, and change as little as the robot does."""
+
+import math
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+from analysed_robots import ROBOTS, analysed
+from made_calibrated import USUAL, made_calibrated
+from support import refused, robot_of
+
+from elastocal.application.calibrated_geometry import folded
+from elastocal.exchange.dh import robot_from_dh
+from elastocal.exchange.dh_writing import PARAMETERS, dh_deltas, dh_frames, dh_rows, dh_table
+from elastocal.mechanics.kinematics import poses
+
+NAMES = sorted(path.stem for path in ROBOTS.glob("*.yaml"))
+UR5E = """joint, theta_offset_deg, d_m, a_m, alpha_deg, type
+1, 0, 0.1625, 0, 90, R
+2, 0, 0, -0.425, 0, R
+3, 0, 0, -0.3922, 0, R
+4, 0, 0.1333, 0, 90, R
+5, 0, 0.0997, 0, -90, R
+6, 0, 0.0996, 0, 0, R
+"""
+
+
+def flange(robot, reported):
+    return poses(robot.chain, robot.model_angles(reported), robot.chain.end_effector)
+
+
+def assert_same(robot, other, count=50):
+    reported = np.random.default_rng(1).uniform(-2, 2, (count, robot.joints))
+    if not robot.counts_each_joint:
+        position, rotation = poses(robot.chain, reported, robot.chain.end_effector)
+    else:
+        position, rotation = flange(robot, reported)
+    again = flange(other, reported)
+    np.testing.assert_allclose(again[0], position, atol=1e-9)
+    np.testing.assert_allclose(again[1], rotation, atol=1e-9)
+
+
+def read_back(robot, folder, nominal=None):
+    dh_table(robot, nominal).to_csv(folder / "dh.csv", index=False)
+    return robot_from_dh(folder / "dh.csv").robot
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_table_of_every_robot_reads_back_to_its_poses(name, tmp_path):
+    robot = analysed(name)
+    assert_same(robot, read_back(robot, tmp_path))
+
+
+@pytest.mark.parametrize("name", ["fanuc", "kuka", "iiwa14"])
+def test_a_calibrated_robot_reads_back_and_its_deltas_are_as_small_as_its_errors(name, tmp_path):
+    nominal = analysed(name)
+    robot = folded(made_calibrated(nominal, *USUAL[:-2])).robot
+    assert_same(robot, read_back(robot, tmp_path, nominal))
+    deltas = dh_deltas(nominal, robot)
+    assert list(deltas["row"]) == ["base", *(f"q{j}" for j in range(1, nominal.joints + 1)), nominal.chain.end_effector.name]
+    # Errors of up to 0.3 mm and 0.3 mrad, as seen by feet of normals some metres away.
+    assert deltas[[f"delta_{p}" for p in PARAMETERS if p.endswith("_m")]].abs().to_numpy().max() < 5e-3
+    assert deltas[[f"delta_{p}" for p in PARAMETERS if p.endswith("_deg")]].abs().to_numpy().max() < 0.3
+    assert deltas["delta_theta_deg"].abs().max() > 0
+    assert not dh_deltas(nominal, nominal)[[f"delta_{p}" for p in PARAMETERS]].to_numpy().any()
+
+
+def test_parameters_of_a_published_table_come_back(tmp_path):
+    (tmp_path / "ur5e.csv").write_text(UR5E)
+    robot = robot_from_dh(tmp_path / "ur5e.csv").robot
+    rows = dh_rows(robot)[1:-1]
+    # Parallel axes 2, 3 and 4 have their d at the next pair that is not; signs of a are those of the normal.
+    assert [abs(row.a) for row in rows] == pytest.approx([0, 0.425, 0.3922, 0, 0, 0], abs=1e-9)
+    assert [abs(row.d) for row in rows[:5]] == pytest.approx([0.1625, 0, 0, 0.1333, 0.0997], abs=1e-9)
+    assert [abs(math.sin(row.alpha)) for row in rows[:5]] == pytest.approx([1, 0, 0, 1, 1], abs=1e-9)
+    assert_same(robot, read_back(robot, tmp_path))
+
+
+def test_a_tilt_of_parallel_axes_is_beta_and_not_a_kilometre(tmp_path):
+    nominal = robot_of("Rz(q1) Tx(1.0) Rz(q2) Tx(0.5) [tip]")
+    tilted = robot_of("Rz(q1) Tx(1.0) Rx(0.01deg) Ry(0.02deg) Rz(q2) Tx(0.5) [tip]")
+    deltas = dh_deltas(nominal, tilted).set_index("row")
+    assert deltas.loc["q1", "delta_beta_deg"] == pytest.approx(0.02) and deltas.loc["q1", "delta_alpha_deg"] == pytest.approx(
+        0.01
+    )
+    assert deltas["delta_d_m"].abs().max() < 1e-6
+    assert_same(tilted, read_back(tilted, tmp_path, nominal))
+
+
+def test_a_base_that_is_shifted_is_two_offsets_and_no_turn(tmp_path):
+    nominal = robot_of("Tz(0.4) Rz(q1) Tx(1.0) Ry(q2) Tx(0.5) [tip]")
+    shifted = robot_of("Tx(0.001) Ty(-0.002) Tz(0.4) Rz(q1) Tx(1.0) Ry(q2) Tx(0.5) [tip]")
+    base = dh_deltas(nominal, shifted).set_index("row").loc["base"]
+    assert (base["delta_a_m"], base["delta_b_m"]) == pytest.approx((0.001, -0.002))
+    assert base["delta_theta_deg"] == 0.0
+    assert_same(shifted, read_back(shifted, tmp_path, nominal))
+
+
+def test_angles_are_the_controllers_where_it_counts_each_joint_by_itself(tmp_path):
+    robot = robot_of("Rz(q1) Tx(1.0) Ry(q2) Tx(0.5) [tip]")
+    turned = replace(robot, reported_matrix=np.diag([-1.0, 1.0]), reported_offset=np.array([0.3, -0.2]))
+    assert_same(turned, read_back(turned, tmp_path))
+    coupled = replace(robot, reported_matrix=np.array([[1.0, 0.0], [1.0, 1.0]]))
+    assert [astuple(row) for row in dh_rows(coupled)] == [astuple(row) for row in dh_rows(robot)]
+
+
+def test_frames_have_their_z_axes_on_the_joints_and_end_at_the_flange(kuka):
+    frames = dh_frames(kuka)
+    assert len(frames) == 8
+    position, rotation = flange(kuka, np.zeros((1, 6)))
+    np.testing.assert_allclose(frames[-1][:3, 3], position[0], atol=1e-12)
+    np.testing.assert_allclose(frames[-1][:3, :3], rotation[0], atol=1e-12)
+    # Turning joint 2 by a little leaves points on its axis where they are.
+    np.testing.assert_allclose(np.abs(frames[0][:3, 2]), [0, 0, 1], atol=1e-12)
+
+
+@pytest.mark.parametrize("chain", ["Tz(q1) Ry(q2) [tip]", "Ry(q1) Tx(0.5) Ry(q2) Tx(0.2) Ry(-q2) [tip]"])
+def test_prismatic_and_passive_joints_are_refused(chain):
+    with refused("", "chain", "revolute"):
+        dh_rows(robot_of(chain))
