@@ -20,9 +20,9 @@ CONVENTIONS = {
     "links": "errors of link k act at its far end, before joint k + 1: Tx Ty Tz Rx Ry Rz in the frame of the chain there",
     "wrench": "external force and moment on the robot at the last measuring point's origin, base axes, N and N m",
     "joint_compliance": "a joint turns by its compliance (rad/(N m)) times the torque of wrench and weight about it",
-    "dh": "a row is Rz(theta) Tz(d) Tx(a) Rx(alpha) Ty(b) Ry(beta) from frame k - 1, about whose z axis joint k turns, to frame "
-    "k; the first row is from the base, the last to the end effector; b and beta only where axes are nominally parallel; theta "
-    "is what the controller's angle is added to",
+    "dh": "a row is Rz(theta) Tz(d) Tx(a) Rx(alpha) Ty(b) Ry(beta) from frame k - 1, about whose z axis joint k turns, to "
+    "frame k; the first row is from the base, the last to the end effector; b and beta only where axes are nominally parallel; "
+    "theta is what the controller's angle is added to",
     "effects": "added to joints and links at the commanded angles; laws by name in the catalogue, elastocal.effects",
 }
 

@@ -74,6 +74,6 @@ def _denavit_hartenberg(nominal: Robot, robot: Robot, output: Path) -> list[str]
         return [f"no DH parameters: {error}"]
     write_csv(output / DH, dh_table(robot, nominal), digits=12)
     write_csv(output / DELTAS, dh_deltas(nominal, robot))
-    names = [f"frame {number}" for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
+    names = [str(number) for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
     save(dh_frames_picture(frames, nominal.name, names), f"{output / FRAMES}.pdf", f"{output / FRAMES}.png")
     return [f"    {output / name}" for name in (DH, DELTAS, f"{FRAMES}.png")]

@@ -45,12 +45,16 @@ def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> F
         for number, frame in enumerate(frames):
             ends = np.stack([frame[:3, 3], frame[:3, 3] + length * frame[:3, k]])
             axis.plot(*ends.T, color=color, lw=1.6, label=f"{name} axis" if number == 0 else None)
-    placed: list[np.ndarray] = []
+    # Names of frames that lie within an axis of each other stand together.
+    origins_of_names: list[tuple[np.ndarray, list[str]]] = []
     for frame, name in zip(frames, names, strict=True):
-        # Names of frames that share an origin stand one above the other.
-        above = sum(np.linalg.norm(other - frame[:3, 3]) < 0.3 * length for other in placed)
-        placed.append(frame[:3, 3])
-        axis.text(*(frame[:3, 3] + [0.15 * length, 0.0, (0.25 + 0.55 * above) * length]), name, fontsize=7.5)
+        near = [others for origin, others in origins_of_names if np.linalg.norm(origin - frame[:3, 3]) < length]
+        if near:
+            near[0].append(name)
+        else:
+            origins_of_names.append((frame[:3, 3], [name]))
+    for origin, those in origins_of_names:
+        axis.text(*(origin + [0.0, 0.0, 0.6 * length]), ", ".join(those), fontsize=7.5, ha="center")
     middle = 0.5 * (origins.min(axis=0) + origins.max(axis=0))
     half = 0.5 * span + length
     axis.set(
@@ -60,9 +64,10 @@ def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> F
         xlabel="x of the base (m)",
         ylabel="y of the base (m)",
         zlabel="z of the base (m)",
-        title=f"{robot}: frames where the controller reports zero; joint k turns about the z axis of frame k - 1",
+        title=f"{robot}: numbered frames where the controller reports zero; joint k turns about z of frame k - 1",
     )
-    axis.set_box_aspect((1, 1, 1))
+    axis.set_box_aspect((1, 1, 1), zoom=1.1)
+    axis.locator_params(nbins=5)
     axis.view_init(elev=18, azim=-62)
     figure.legend(loc="outside lower center", ncols=3)
     return figure
