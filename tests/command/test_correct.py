@@ -63,6 +63,7 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(monkeypatch, 
     np.testing.assert_allclose(targets["predicted_error_before_m"], missed, atol=1e-7)
     assert (targets["status"] == "ok").all()
     assert (targets["predicted_std_m"] > 0).all()
+    assert targets["outside_range"].dtype == bool
 
 
 def test_a_pose_out_of_reach_is_named_and_nothing_is_written(monkeypatch, tmp_path, cell, angles):

@@ -10,7 +10,7 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import select_states
-from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
+from elastocal.validation.fitted_range import beyond_campaign, outside_fitted_range, predictive_variances
 
 FOUND = ("joint_offset@2", "joint_offset@3", "payload", "base_compliance")
 
@@ -84,3 +84,14 @@ def test_frames_of_other_sessions_do_not_count(fanuc):
     assert (variance > 0).any() and np.isfinite(variance).all()
     # Unloaded, the compliances say nothing, and the frame, which would, is not counted.
     assert (variance[other.states.load == 0] == 0).all()
+
+
+def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
+    states = planted(fanuc, {}, seed=3, poses=20).observations.states
+    angles, wrench = states.joint_angles[:4].copy(), np.zeros((4, 6))
+    assert not beyond_campaign(states, angles, None).any()
+    force, moment = (np.linalg.norm(states.wrench[:, part], axis=1).max() for part in (slice(0, 3), slice(3, 6)))
+    wrench[1, 2], wrench[2, 4] = -1.1 * force, 1.1 * moment
+    wrench[3, 0] = force
+    angles[0, 2] = states.joint_angles[:, 2].max() + 1.0
+    assert beyond_campaign(states, angles, wrench).tolist() == [True, True, True, False]

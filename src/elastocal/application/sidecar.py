@@ -10,6 +10,7 @@ import numpy as np
 from elastocal import __version__
 from elastocal.application.calibrated import forward
 from elastocal.application.calibrated_geometry import SPRINGS, folded
+from elastocal.application.forward_model import model_document
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
@@ -66,6 +67,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str) -> dict[str, Any]
         "conventions": CONVENTIONS,
         "joint_compliance": springs,
         "effects": entries,
+        "forward_model": model_document(calibrated),
     }
 
 

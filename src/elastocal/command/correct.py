@@ -13,6 +13,7 @@ from elastocal.command.campaign import diagnosed_campaign, held_out_rms_m
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
     from elastocal.application.compensation import Correction
@@ -32,6 +33,7 @@ def correct(
     from elastocal.application.compensation import OK, corrected
     from elastocal.exchange.target_path import read_target_path
     from elastocal.io.data_frames import write_csv
+    from elastocal.validation.fitted_range import beyond_campaign
 
     console = Console(stderr=True)
     campaign = diagnosed_campaign(folder)
@@ -55,7 +57,14 @@ def correct(
         rows = ", ".join(f"row {row + 1} is {found.status[row]}" for row in bad[:_NAMED])
         more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
         raise InputError(path, "", rows + more, "poses that the robot reaches within its limits, or --partial")
-    write_csv(output, joint_targets(found))
+    beyond = beyond_campaign(
+        campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles), wanted.wrench
+    )
+    write_csv(output, joint_targets(found, beyond))
+    if beyond.any():
+        share = f"{beyond.sum():,} of {len(beyond):,} targets"
+        line = f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"
+        console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(summary(found), markup=False, highlight=False, soft_wrap=True)
     missed = held_out_rms_m(campaign.name)
     if missed is not None:
@@ -64,12 +73,14 @@ def correct(
     console.print(f"    {output}", markup=False, highlight=False, soft_wrap=True)
 
 
-def joint_targets(found: Correction) -> pd.DataFrame:
+def joint_targets(found: Correction, beyond: np.ndarray) -> pd.DataFrame:
     """The file of joint targets.
 
     Parameters
     ----------
     found : Correction
+    beyond : ndarray of bool (N,)
+        Whether each lies beyond what the campaign measured.
 
     Returns
     -------
@@ -88,6 +99,7 @@ def joint_targets(found: Correction) -> pd.DataFrame:
         "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
         "predicted_rotation_std_rad": found.std_rad,
         "repeatability_m": found.repeatability_m,
+        "outside_range": beyond,
     }
     return pd.DataFrame(angles | errors | {"status": found.status} | nominal)
 

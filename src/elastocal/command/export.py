@@ -12,15 +12,23 @@ from elastocal.command.campaign import diagnosed_campaign
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.mechanics.robot import Robot
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
+TABLE = "table.csv"
+# Of the angles of the table.
+_SEED = 1
 DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", "dh_frames"
 
 
 def export(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
+    table: Annotated[
+        int, typer.Option(min=0, help="Rows of a table of errors over the joint space, for programs that cannot run the model.")
+    ] = 0,
+    force: Annotated[float, typer.Option(min=0.0, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
 ) -> None:
     """Write the calibrated robot: robot file, URDF and DH parameters (geometry), and a sidecar with springs and effects."""
@@ -50,6 +58,8 @@ def export(
     write_json(output / SIDECAR, document)
     lines = [f"    {output / name}" for name in (ROBOT, URDF, SIDECAR)]
     lines += _denavit_hartenberg(calibrated.robot, robot, output)
+    if table:
+        lines += _table(calibrated, table, force, output)
     if document["effects"]:
         states = found.case.observations.states
         angles = calibrated.robot.reported_angles(states.joint_angles)
@@ -59,6 +69,22 @@ def export(
         lines.insert(0, f"only in {SIDECAR}: {names}; up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
     for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
+def _table(calibrated: CalibratedRobot, rows: int, force: float, output: Path) -> list[str]:
+    """Write the table of errors; how well one interpolates in it."""
+    import numpy as np
+
+    from elastocal.application.calibrated import OperatingConditions
+    from elastocal.application.forward_table import forward_table, interpolation_error_m
+    from elastocal.io.data_frames import write_csv
+
+    hanging = OperatingConditions(np.array([[0.0, 0.0, -force, 0.0, 0.0, 0.0]]))
+    found = forward_table(calibrated, rows, hanging, _SEED)
+    left, whole = interpolation_error_m(calibrated, found, hanging, _SEED + 1)
+    write_csv(output / TABLE, found)
+    line = f"    {output / TABLE}: {len(found)} rows; interpolated, {1e3 * left:.3f} mm of {1e3 * whole:.3f} mm RMS remain"
+    return [line]
 
 
 def _denavit_hartenberg(nominal: Robot, robot: Robot, output: Path) -> list[str]:

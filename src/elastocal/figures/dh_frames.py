@@ -54,7 +54,7 @@ def dh_frames_picture(frames: np.ndarray, robot: str, names: Sequence[str]) -> F
         else:
             origins_of_names.append((frame[:3, 3], [name]))
     for origin, those in origins_of_names:
-        axis.text(*(origin + [0.0, 0.0, 0.6 * length]), ", ".join(those), fontsize=7.5, ha="center")
+        axis.text(origin[0], origin[1], origin[2] + 0.6 * length, ", ".join(those), fontsize=7.5, ha="center")
     middle = 0.5 * (origins.min(axis=0) + origins.max(axis=0))
     half = 0.5 * span + length
     axis.set(

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations, States
 
+# A share of forces and moments, and N or N m.
+_ROUNDING = 1e-3
+
 
 def outside_fitted_range(
     fitted_states: States, states: States, fitted_variance: np.ndarray | None = None, variance: np.ndarray | None = None
@@ -44,12 +47,41 @@ def outside_fitted_range(
     ----------
     .. [1] Vovk, V., Gammerman, A. and Shafer, G., Algorithmic Learning in a Random World, Springer, 2005.
     """
-    # Loads and repeats of a pose share its angles.
-    _, first = np.unique(state_clusters(fitted_states), return_index=True)
-    outside = beyond_range(fitted_states.joint_angles[first], states.joint_angles)
+    outside = beyond_range(_angles_of_poses(fitted_states), states.joint_angles)
     if fitted_variance is None or variance is None:
         return outside
     return outside | (variance > fitted_variance.max(initial=0.0))
+
+
+def _angles_of_poses(states: States) -> np.ndarray:
+    """Joint angles of each pose, (P, n): its loads and repeats share them."""
+    return states.joint_angles[np.unique(state_clusters(states), return_index=True)[1]]
+
+
+def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:
+    """Poses and loads beyond those that a campaign measured, before any fit is at hand.
+
+    Parameters
+    ----------
+    fitted_states : States
+    joint_angles : ndarray (N, n)
+        Of the chain, rad.
+    wrench : ndarray (N, 6) or None
+        N, N m; none where nothing loads the robot.
+
+    Returns
+    -------
+    ndarray of bool (N,)
+        By the joint angles as in `outside_fitted_range`, or by a force or moment larger than any of the campaign.
+    """
+    outside = beyond_range(_angles_of_poses(fitted_states), joint_angles)
+    if wrench is None:
+        return outside
+    for part in (slice(0, 3), slice(3, 6)):
+        largest = np.linalg.norm(fitted_states.wrench[:, part], axis=1).max()
+        # Forces of one cell are stated to a few digits.
+        outside = outside | (np.linalg.norm(wrench[:, part], axis=1) > (1.0 + _ROUNDING) * largest + _ROUNDING)
+    return outside
 
 
 def predictive_variances(
