@@ -13,11 +13,13 @@ python -m zipfile -e "$work"/rtb_data-*.whl "$work"
 cp "$work/rtbdata/xacro/kuka_description/kuka_kr16/urdf/kr16_2.urdf" "$work/arm.urdf"
 
 elastocal import urdf "$work/arm.urdf" --base base_link --tip tool0 --point link_3 --output "$work/robot.yaml"
-elastocal plan "$work/robot.yaml" --folder "$cell" --poses 25 --force 100 --pull --base-known --measured pose \
+elastocal plan "$work/robot.yaml" --folder "$cell" --poses 25 --force 200 --pull --base-known --measured pose \
     --target tool0=0,0,0 --target link_3=0,0,0 --tracker 3,1,1.5
 python workflow/examples/rehearse.py measure "$cell"
+elastocal check "$cell"
 elastocal diagnose "$cell"
 python workflow/examples/rehearse.py path "$cell" "$work/path.csv"
+elastocal export "$cell" --output "$work/calibrated" --table 1024
 elastocal certificate "$cell" --tolerance 0.2mm
 elastocal correct "$cell" "$work/path.csv" --output "$work/targets.csv"
 python workflow/examples/rehearse.py move "$cell" "$work/path.csv" "$work/targets.csv" --reveal

@@ -124,7 +124,7 @@ def count_parameters(survey: Survey) -> int:
     return len(parameters(*model_of(survey)))
 
 
-def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Information:
+def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, about: Estimate | None = None) -> Information:
     """What each configuration tells.
 
     Parameters
@@ -134,12 +134,15 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) 
         rad.
     force : ndarray (N, 3)
         N, base axes, at the last measuring point; read at each of the shares.
+    about : Estimate, optional
+        Values at which the model is linearized; those of the robot file without.
 
     Returns
     -------
     Information
     """
     model, estimate = model_of(survey)
+    estimate = about or estimate
     named = parameters(model, estimate)
     plausible = np.array([parameter.plausible for _, parameter in named])
     rows = survey.rows
