@@ -147,3 +147,24 @@ def test_stated_uncertainties_whiten_where_nothing_is_correlated(case):
     found = whitening(seen, None, noise).apply(values).reshape(-1, 5)
     deviation = np.sqrt(np.diag(dense_covariance(seen, jacobian, noise)))
     np.testing.assert_allclose(found, values.reshape(-1, 5) / deviation[:, None], rtol=1e-12)
+
+
+@pytest.mark.parametrize("noise", [NOISE, replace(NOISE, joint_rad=np.zeros(6)), replace(NOISE, pose_rad=1e-4)])
+def test_a_whitening_after_matrices_is_that_of_what_these_make(case, noise):
+    seen, jacobian = case
+    rng = np.random.default_rng(7)
+    maps = rng.standard_normal((len(seen), seen.rows, seen.rows))
+    values = rng.standard_normal((len(seen), seen.rows, 3))
+    by = whitening(seen, jacobian, noise)
+    np.testing.assert_allclose(by.after(maps).apply(values), by.apply(maps @ values), rtol=1e-8, atol=1e-6)
+
+
+def test_observations_that_follow_each_other_are_whitened_as_those_that_are_gathered(case):
+    """Each in a state of its own, in order and backwards."""
+    seen, jacobian = case
+    some = np.flatnonzero(np.diff(seen.state, prepend=-1))
+    alone = Observations(seen.states, seen.state[some], seen.target[some], seen.position[some], None)
+    values = np.random.default_rng(8).standard_normal((len(some), alone.rows, 2))
+    forward = whitening(alone, jacobian[some, : alone.rows], NOISE)
+    backward = replace(forward, blocks=tuple((members[::-1], factor[::-1]) for members, factor in forward.blocks))
+    np.testing.assert_allclose(forward.apply(values), backward.apply(values), rtol=1e-12)

@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -131,9 +131,10 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
     coefficients = np.zeros(problem.statistics.gram.shape[1])
     if model.units:
         units = [problem.units[number] for number in model.units]
-        joint = _joint(problem, units, model)
+        place = int(np.argmin(np.abs(problem.statistics.pose_error_rad - model.pose_error_rad)))
+        joint = _joint(replace(problem, statistics=problem.statistics.at(slice(place, place + 1))), units, model)
         columns = np.concatenate([unit.columns for unit in units])
-        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[np.argmax(joint.by_pose_error)]
+        coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[0]
     return coefficients
 
 
@@ -149,8 +150,8 @@ def _moments(
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
     information[places, places] += deviations**-2.0
-    covariance = np.linalg.inv(information) * max(mean_square_left(linearized.problem, model), 1.0)
-    mean = np.linalg.solve(information, equations[chosen, -1])
+    inverse = np.linalg.inv(information)
+    covariance, mean = inverse * max(mean_square_left(linearized.problem, model), 1.0), inverse @ equations[chosen, -1]
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)

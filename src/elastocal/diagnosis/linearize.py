@@ -127,7 +127,7 @@ def linearized(
     parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
     parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
     # Held, one linearisation serves the declared part and the candidates; else the declared part alone takes larger parts.
-    larger_parts = parts if held else parts_of(observations, rows_at_once(int((~found).sum()) + 60))
+    larger_parts = parts if held else parts_of(observations, rows_at_once(len(owners) + 60) // observations.rows)
     lines = [*source.lines(parts)] if held else source.lines(larger_parts)
     triangle, unit_rad = source.declared_part(lines)
     rows = len(observations) * observations.rows

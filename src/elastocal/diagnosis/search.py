@@ -48,6 +48,9 @@ _NEGLIGIBLE = 9.0
 _BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
 _UNLIKELY, _TELLING_UNITS = -9.0, 10
+# Sizes with less than this under the best model met so far are left out from there on: what comes near to that model differs
+# from it by a few units, which over a hundred orders of magnitude do not hang on.
+_OUT_OF_QUESTION = -300.0
 # Steps of the grid of the pose error to either side that measurements simulated with one size can make likely.
 REACH = 2
 
@@ -280,6 +283,9 @@ class _Searcher:
         odds = found.log_evidence - self.empty.log_evidence + prior.log_odds_of(units[n] for n in model)
         self.met[model], self.sizes[model] = odds, found.scales
         self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
+        if odds == max(self.met.values()):
+            kept = np.flatnonzero(found.log_pose > _OUT_OF_QUESTION)
+            self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
         for place, _number in enumerate(model):
             smaller = model[:place] + model[place + 1 :]
             if smaller not in self.met:

@@ -98,8 +98,13 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
             laws = effect.displacement(around, *shapes)
         columns.append(_columns(laws, jacobian, observations.state))
         columns.append(_shape_columns(effect, values, shapes, around, jacobian, observations.state))
-    sensitivities = np.concatenate(columns, axis=-1) if columns else np.empty((count, rows, 0))
-    return Linearization(residual, jacobian, sensitivities, replace(around, motion=moved))
+    # The observations of each column lie side by side here, too.
+    sensitivities = np.empty((sum(part.shape[2] for part in columns), rows, count))
+    first = 0
+    for part in columns:
+        sensitivities[first : first + part.shape[2]] = part.transpose(2, 1, 0)
+        first += part.shape[2]
+    return Linearization(residual, jacobian, sensitivities.transpose(2, 1, 0), replace(around, motion=moved))
 
 
 def effect_columns(

@@ -97,12 +97,11 @@ class Parts:
             line = self._linearized(number, part) if self.line is None else self.line
             whitener, mine = self.whiteners[number], root[seen]
             right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
-            left = _of_rotation_vectors(line.sensitivities, line.residual) * mine[:, None, None]
-            left = whitener.apply(left).reshape(len(right), -1)
-            left *= self.plausible
+            turned = whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
+            left = turned.apply(line.sensitivities).reshape(len(right), size)
             gram += left.T @ left
             along += left.T @ right
-        return gram, along
+        return gram * np.outer(self.plausible, self.plausible), along * self.plausible
 
     def distance(self) -> np.ndarray:
         """Whitened distance of each observation from the prediction, ndarray (M,)."""
@@ -173,18 +172,18 @@ class Parts:
         return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
 
 
-def _of_rotation_vectors(sensitivities: np.ndarray, residual: np.ndarray) -> np.ndarray:
-    """Sensitivities of the residual itself: where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2).
+def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:
+    """Matrices (M, rows, rows) that turn sensitivities of poses into those of the residual itself.
 
-    Bortz's equation [1]_.
+    Where a pose turns by -w, its rotation vector r grows by w + r x w / 2 + O(r^2): Bortz's equation [1]_.
 
     References
     ----------
     .. [1] Bortz, J. E., A new mathematical formulation for strapdown inertial navigation, IEEE Transactions on Aerospace and
        Electronic Systems AES-7, 1971.
     """
-    if residual.shape[1] == 3:
-        return sensitivities
-    turned = sensitivities[:, 3:]
-    exact = turned + 0.5 * np.cross(residual[:, 3:, None], turned, axis=1)
-    return np.concatenate([sensitivities[:, :3], exact], axis=1)
+    count, rows = residual.shape
+    maps = np.tile(np.eye(rows), (count, 1, 1))
+    if rows > 3:
+        maps[:, 3:, 3:] += 0.5 * np.cross(residual[:, None, 3:], np.eye(3)).transpose(0, 2, 1)
+    return maps

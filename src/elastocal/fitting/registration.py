@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.observations import Observations
 
 # Of more observations than this a sample tells where a fit starts.
-_MOST = 50_000
+_MOST = 5_000
 _ROUNDS = 200
 _SETTLED_M = 1e-9
 

@@ -40,12 +40,33 @@ class Whitening:
         -------
         ndarray (M, rows, ...)
         """
-        whitened = np.empty_like(values)
-        tail = values.shape[2:]
+        (members, factor), *others = self.blocks
+        if not others and (members.ravel() == np.arange(len(values))).all():
+            # One after the other: nothing to gather.
+            return (factor @ values.reshape(*factor.shape[:2], -1)).reshape(values.shape)
+        whitened = np.empty(values.shape)
         for members, factor in self.blocks:
             stacked = values[members].reshape(*factor.shape[:2], -1)
-            whitened[members] = (factor @ stacked).reshape(*members.shape, values.shape[1], *tail)
+            whitened[members] = (factor @ stacked).reshape(*members.shape, *values.shape[1:])
         return whitened
+
+    def after(self, maps: np.ndarray) -> Whitening:
+        """What whitens values to each of whose observations a matrix is applied first.
+
+        Parameters
+        ----------
+        maps : ndarray (M, rows, rows)
+
+        Returns
+        -------
+        Whitening
+        """
+        blocks = []
+        for members, factor in self.blocks:
+            groups, count = members.shape
+            by_member = factor.reshape(groups, -1, count, maps.shape[1]).swapaxes(1, 2)
+            blocks.append((members, (by_member @ maps[members]).swapaxes(1, 2).reshape(factor.shape)))
+        return Whitening(tuple(blocks))
 
 
 @dataclass(frozen=True)
@@ -65,8 +86,15 @@ class Scaling:
 
     def apply(self, values: np.ndarray) -> np.ndarray:
         """As `Whitening.apply`."""
-        scale = self.root.reshape(len(self.root), -1) * self.precision
+        scale = self._scale()
         return values * scale.reshape(*scale.shape, *[1] * (values.ndim - 2))
+
+    def after(self, maps: np.ndarray) -> Whitening:
+        """As `Whitening.after`."""
+        return Whitening(((np.arange(len(maps))[:, None], self._scale()[:, :, None] * maps),))
+
+    def _scale(self) -> np.ndarray:
+        return self.root.reshape(len(self.root), -1) * self.precision
 
 
 def joined(parts: Sequence[Whitening | Scaling], starts: Sequence[int]) -> Whitening | Scaling:
