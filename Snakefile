@@ -8,6 +8,8 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/identify.smk"
 include: "workflow/rules/evaluate.smk"
+include: "workflow/rules/repeat.smk"
+include: "workflow/rules/questions.smk"
 include: "workflow/rules/tables.smk"
 include: "workflow/rules/figures.smk"
 include: "workflow/rules/report.smk"
@@ -29,8 +31,15 @@ rule study:
     input:
         rules.compile_report.output.report,
         expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
-        expand("reports/tables/{table}.csv", table=["comparison", "extended", "per_dataset", "solvers"]),
+        expand("reports/tables/{table}.csv", table=["comparison", "expectations", "extended", "per_dataset", "solvers"]),
+        rules.tabulate_budget.output,
+        expand("reports/tables/{table}.csv", table=["ladder", "designs", "observability"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
+
+
+rule extended_study:
+    input:
+        "reports/tables/interpretations.csv",
 
 
 rule loop:

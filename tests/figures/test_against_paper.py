@@ -4,24 +4,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
+from made_study_tables import comparison, expectations
 from matplotlib.colors import to_hex
 
 from elastocal.figures.against_paper import scores, table2_samples
 from elastocal.figures.style import PALETTE
 
-COMPARED = pd.DataFrame(
-    [
-        ("1", "kuka", "c1", 9.9),
-        ("2", "kuka", "deviation_mean", 1.5),
-        ("2", "fanuc", "deviation_mean", -20.0),
-        ("3", "kuka", "c1", np.nan),
-        ("4", "kuka", "dev_20", 30.0),
-        ("4", "kuka", "dev_20", -2.0),
-        ("4", "fanuc", "k_sigma_20", 8.0),
-        ("text", "kuka", "ratio", 3.3),
-    ],
-    columns=["table", "robot", "quantity", "z"],
-)
+TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
 INITIAL = pd.DataFrame({"mean": np.linspace(1e-3, 2e-3, 101), "maximum": np.linspace(5e-3, 7e-3, 101)})
 INITIAL["mean_square"] = INITIAL["mean"] ** 2 + np.linspace(1e-4, 3e-4, 101) ** 2
 PRINTED = pd.DataFrame(
@@ -30,35 +19,38 @@ PRINTED = pd.DataFrame(
 )
 
 
-def points(axis, *markers):
+def drawn(axis, marker):
+    """Points with a marker: x, row, and whether they are filled with the colour of a difference."""
     return [
-        (to_hex(line.get_color()).upper(), float(x), round(float(y), 6))
+        (float(x), float(y), to_hex(line.get_markerfacecolor()).upper() == PALETTE[1])
         for line in axis.lines
-        if line.get_marker() in markers
+        if line.get_marker() == marker
         for x, y in line.get_xydata()
     ]
 
 
-def test_each_printed_figure_of_tables_2_to_4_is_a_point_at_its_distance():
-    (axis,) = scores(COMPARED).axes
-    assert row_labels(axis) == ["Table 2: deviation_mean", "Table 4: dev_20", "Table 4: k_sigma_20"]
-    # Robots stand side by side within a row, in colours of their own.
-    assert points(axis, "o") == [(PALETTE[0], 1.5, -0.22), (PALETTE[0], -2.0, 0.78), (PALETTE[1], 8.0, 2.0)]
+def test_each_printed_figure_of_table_4_stands_among_the_studies_of_its_robot():
+    figure = scores(comparison(), expectations(), TITLES)
+    heads = [axis.get_title() for axis in figure.axes[:3]]
+    assert heads == ["$k_\\Sigma$ at 20 (%)", "dev at 20 (µm)", "length until 2 µm"]
+    assert row_labels(figure.axes[0]) == ["6DoF"]
+    k_sigma, dev, _ = figure.axes[:3]
+    # After Holm's correction the first differs and the second does not.
+    assert drawn(k_sigma, "D") == [(1.5, 0.0, True)] and drawn(dev, "D") == [(1.0, 0.0, False)]
+    assert [x for x, *_ in drawn(dev, "o")] == [1.2] and [x for x, *_ in drawn(dev, "|")] == [1.22]
+    assert drawn(figure.axes[5], "D") == [(30.0, 0.0, False)]
 
 
-def test_a_distance_beyond_the_margin_is_an_arrow_at_the_margin_that_points_outwards():
-    (axis,) = scores(COMPARED).axes
-    assert points(axis, "<") == [(PALETTE[1], -8.0, 0.0)] and points(axis, ">") == [(PALETTE[0], 8.0, 0.78)]
-    low, high = axis.get_xlim()
-    assert low < -8 and high > 8
-
-
-def test_the_accepted_distances_are_shaded_and_the_legend_names_the_robots():
-    figure = scores(COMPARED)
-    band = figure.axes[0].patches[0]
-    assert (band.get_x(), band.get_x() + band.get_width()) == (-2.5, 2.5)
-    assert legend_entries(figure) == ["kuka", "fanuc"]
+def test_the_legend_says_what_is_the_papers_and_what_is_expected():
+    figure = scores(comparison(), expectations(), TITLES)
+    assert legend_entries(figure)[-1] == "expectation in closed form" and "paper" in legend_entries(figure)
     assert_nothing_cut_off(figure)
+
+
+def test_without_robots_of_the_paper_a_note_says_so():
+    table = comparison().assign(studies_mean=np.nan)
+    (axis,) = scores(table, expectations(), TITLES).axes
+    assert "prints nothing" in axis.texts[0].get_text()
 
 
 def test_samples_show_quartiles_and_nearly_the_whole_range_of_single_data_sets_in_millimetres():

@@ -12,33 +12,36 @@ def test_facts_can_be_written_as_json():
     assert json.loads(json.dumps(facts(), allow_nan=False)) == facts()
 
 
-def test_cells_within_are_those_of_tables_2_to_4_at_no_more_than_the_accepted_distance():
+def test_figures_that_differ_are_those_below_the_level_after_correction():
     found = facts()
-    assert (found["accepted_z"], found["cells"], found["within"], found["within_percent"]) == ("2.5", "7", "3", "43")
+    assert (found["level"], found["cells"], found["differ"], found["below"], found["below_expected"]) == (
+        "5",
+        "5",
+        "1",
+        "2",
+        "0.2",
+    )
     assert found["by_table"] == [
-        {"table": "2", "cells": "3", "within": "1"},
-        {"table": "3", "cells": "1", "within": "1"},
-        {"table": "4", "cells": "3", "within": "1"},
+        {"table": "2", "cells": "1", "differ": "0"},
+        {"table": "3", "cells": "1", "differ": "0"},
+        {"table": "4", "cells": "3", "differ": "1"},
     ]
 
 
-def test_every_cell_outside_is_listed_with_what_could_explain_it():
+def test_every_figure_below_the_level_before_correction_is_listed_beside_the_studies():
+    assert [list(row.values()) for row in facts()["outside"]] == [
+        ["Table 4: k_Σ at 20 (%)", "kuka", "6DoF", "1.5", "1.75 ± 0.10", "0.0004", "0.002"],
+        ["Table 4: dev at 20 (µm)", "kuka", "6DoF", "1", "1.200 ± 0.080", "0.04", "0.16"],
+    ]
+
+
+def test_expectations_are_listed_where_the_paper_prints_a_figure():
     found = facts()
-    assert [list(row.values()) for row in found["outside"]] == [
-        ["Table 2: deviation_mean", "kuka", "", "1.1", "1.000 ± 0.020", "-5.0", "a"],
-        ["Table 2: deviation_max", "other", "", "3", "", "", "a"],
-        ["Table 4: k_sigma_20", "kuka", "6DoF", "1.5", "1.80 ± 0.10", "+3.0", "c"],
-        ["Table 4: n_dev_2_um", "fanuc", "6DoF", "30", "not reached", "", "d"],
+    assert found["studies"] == "16"
+    assert [list(row.values()) for row in found["expectations"]] == [
+        ["kuka", "6DoF", "k_Σ at 20 (%), first stage", "1.80", "1.75 ± 0.10", "1.500", "0.0004"],
+        ["kuka", "6DoF", "dev at 20 (µm)", "1.22", "1.20 ± 0.08", "1.000", "0.04"],
     ]
-    # A letter that no cell refers to is not explained.
-    assert list(found["explanations"]) == ["a", "c", "d"]
-
-
-def test_a_cell_of_table_3_outside_refers_to_its_own_explanation():
-    table = comparison()
-    table.loc[table.table == "3", "z"] = -2.6
-    found = facts(comparison=table)
-    assert [row["why"] for row in found["outside"]] == ["a", "a", "b", "c", "d"] and "1/ĉ" in found["explanations"]["b"]
 
 
 def test_figures_of_the_papers_text_that_are_not_studied_are_marked():
@@ -49,9 +52,14 @@ def test_figures_of_the_papers_text_that_are_not_studied_are_marked():
 
 
 def test_table_2_is_compared_with_single_data_sets_of_the_robots_that_were_studied():
-    # One data set has 1.05 +- 0.05 mm, so that the printed 1.1 mm is one standard deviation above.
-    expected = {"robot": "kuka", "quantity": "mean", "paper": "1.100", "all": "1.000", "one": "1.05 ± 0.05", "z": "-1.0"}
+    expected = {"robot": "kuka", "quantity": "mean", "paper": "1.100", "all": "1.000", "one": "1.05 ± 0.05", "p": "0.31"}
     assert facts()["one_set"] == [expected]
+
+
+def test_a_figure_for_which_the_study_was_fitted_has_no_p_value():
+    table = comparison()
+    table.loc[table.table == "2", "p_value"] = np.nan
+    assert facts(comparison=table)["one_set"][0]["p"] == "fitted"
 
 
 def test_a_robot_has_its_best_and_its_worst_strategy_with_deviations_in_micrometres():

@@ -3,12 +3,13 @@
 import pytest
 import typst
 from drawn_figures import empty_pictures
-from made_study_tables import facts
+from made_study_tables import facts, question_facts
 
 from elastocal.report.pages import write_report
 
 FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
-FIGURES += ["scores_against_paper"]
+FIGURES += ["scores_against_paper", "ladder", "budget", "designs"]
+EVERY = facts() | question_facts()
 HEAD = {
     "table1": ["robot", "c1"],
     "table2": ["robot", "mean mm"],
@@ -28,21 +29,20 @@ def tables(figures):
 
 def test_the_report_is_a_pdf_that_the_same_facts_give_again(pictures, tmp_path):
     for name in "ab":
-        write_report(tmp_path / f"{name}.pdf", facts(), tables(FIGURES), pictures)
+        write_report(tmp_path / f"{name}.pdf", EVERY, tables(FIGURES), pictures)
     assert (tmp_path / "a.pdf").read_bytes().startswith(b"%PDF")
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
 
 
 def test_a_figure_that_the_study_has_must_be_given(pictures, tmp_path):
     with pytest.raises(typst.TypstError, match="fig5d"):
-        write_report(tmp_path / "study.pdf", facts(), tables([*FIGURES, "fig5d"]), pictures)
+        write_report(tmp_path / "study.pdf", EVERY, tables([*FIGURES, "fig5d"]), pictures)
     assert not list(tmp_path.iterdir())
 
 
 def test_a_missing_fact_is_an_error_and_no_blank(pictures, tmp_path):
-    known = facts()
-    del known["within_percent"]
-    with pytest.raises(typst.TypstError, match="within_percent"):
+    known = {name: value for name, value in EVERY.items() if name != "below_expected"}
+    with pytest.raises(typst.TypstError, match="below_expected"):
         write_report(tmp_path / "study.pdf", known, tables(FIGURES), pictures)
     assert not list(tmp_path.iterdir())
 

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_metrics import metrics_of, replicates_of
+from made_studies import studies_of
 
 from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.tables import table4
@@ -24,7 +25,10 @@ def ours(metrics, replicates):
         "table4": staged,
         "extended": empty,
     }
-    return OurResults(tables, metrics, replicates, 200.0, 20)
+    # Of single data sets with deviations of 0.90, 0.91 ... 1.10 mm.
+    initial = pd.DataFrame({"mean": np.linspace(0.9e-3, 1.1e-3, 21), "maximum": np.linspace(3e-3, 4e-3, 21)})
+    initial["mean_square"] = 2 * initial["mean"] ** 2
+    return OurResults(tables, metrics, replicates, 200.0, 20, studies_of(), {"arm": initial, "kuka_extended": initial})
 
 
 def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference():
@@ -47,6 +51,10 @@ def test_comparison_has_a_row_for_each_printed_figure_and_scores_the_difference(
     assert table.ours[[1, 2, 3, 4]].tolist() == pytest.approx([1.0, 0.53, 1.0, 2.0])
     assert table.z[[1, 2, 3, 4]].tolist() == pytest.approx([2.0, -1.0, -1.0, 1.0])
     assert table.interpretation[3] == "R7, R10: joints of the first stage"
+    # Below all 21 single data sets but none; among the studies of `studies_of`, which have half of 1.1 %.
+    assert table.studies_mean[[1, 3, 4]].tolist() == pytest.approx([1.0, 0.55, 1.1])
+    assert table.p_value[1] == pytest.approx(2 / 22) and table.p_value[4] > table.p_value[3]
+    assert (table.p_holm >= table.p_value)[[1, 3, 4]].all() and table.p_value[[0, 2, 5, 6]].isna().all()
     assert table.ours[[5, 6]].isna().all() and table.z[[0, 5, 6]].isna().all()
 
 
@@ -128,7 +136,7 @@ def test_the_smallest_ratio_is_of_the_robot_that_gains_least_from_its_best_strat
         [replicates_of(strategy, bias, robot, spreads[robot, strategy]) for (robot, strategy), bias in biases.items()]
     )
     table = table4(metrics, replicates, ["arm", "other"], ["6DoF", "A", "B"], 200.0, 20, 1.0, 2.0)
-    results = OurResults(results.tables | {"table4": table}, metrics, replicates, 200.0, 20)
+    results = replace(results, tables=results.tables | {"table4": table}, metrics=metrics, replicates=replicates)
     row = compared(results, "text", "", "", "best_over_6DoF_dev_ratio_min", "", 1.5)
     # 40 / 20 for the arm by A, 40 / 25 for the other one by B.
     assert row.ours == pytest.approx(1.6)

@@ -52,6 +52,19 @@ FAULTS = {
     "noise that is not simulated": (("tables", "noise_um"), 300, "tables.noise_um", ["300", "one of noise_um", "200"]),
     "length beyond the data": (("evaluation", "lengths", 3), 101, "evaluation.lengths[3]", ["101", "configurations = 100"]),
     "length that is not evaluated": (("tables", "length"), 21, "tables.length", ["21", "one of evaluation.lengths", "20"]),
+    "interpretation that is switched to nothing known": (
+        ("switched", "R7_median_compliance", "average"),
+        "mean",
+        "switched.R7_median_compliance.average",
+        ["'mean'", "stiffness | compliance | median"],
+    ),
+    "one study has no distribution": (("evaluation", "studies"), 1, "evaluation.studies", ["found 1", "2 or more"]),
+    "point that no robot has": (
+        ("questions", "point_sets", "6DoF"),
+        ["9DoF"],
+        "questions.point_sets.6DoF",
+        ["'9DoF'", "2DoF, 3DoF, 4DoF"],
+    ),
     "section that is no mapping": (("tables",), 3, "tables", ["found 3", "object"]),
 }
 
@@ -91,6 +104,7 @@ def other_config(config):
     other = deepcopy(config) | {"robots": ["arm"], "strategies": ["plain"]}
     if "classical_strategy" in other["tables"]:
         other["tables"]["classical_strategy"] = "plain"
+    other["questions"]["point_sets"] = {"B": ["B"]}
     return other
 
 

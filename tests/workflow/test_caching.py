@@ -24,6 +24,12 @@ LOOP = {
 }
 REPORT = {("state_answers",), ("compile_report",), ("all",)}
 PER_DATA_SET = {("tabulate_accuracy",), ("draw_bias_and_accuracy",), ("draw_accuracy",)}
+# Of the robot without links, at the noise of the tables.
+REPEATED = {("repeat_studies", "as_configured", "kuka"), ("tabulate_expectations",)}
+ASKED = (
+    *("repeat_studies", "compare_point_sets", "climb_ladder", "choose_designs", "index_observability"),
+    *("tabulate_budget", "tabulate_ladder", "tabulate_designs", "tabulate_observability"),
+)
 COMPARED_STRATEGIES = {
     ("compare_solvers", "kuka"),
     ("tabulate_solvers",),
@@ -95,6 +101,7 @@ def test_a_strategy_with_other_stages_reruns_that_strategy(finished):
     )
     strategy = ["4-6DoF-after-3DoF"]
     expected = designed(strategies=strategy) | identified_and_evaluated(strategies=strategy)
+    expected |= REPEATED | jobs("expect", ["kuka"], ["200"], strategy)
     assert finished.planned() == expected | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
 
 
@@ -102,6 +109,7 @@ def test_a_strategy_with_other_points_reruns_that_strategy_and_the_bounds(finish
     finished.replace("config/strategies/3+6DoF-comb.yaml", "[3DoF, 6DoF]", "[2DoF, 6DoF]")
     strategy = ["3+6DoF-comb"]
     expected = designed(strategies=strategy) | identified_and_evaluated(strategies=strategy) | jobs("bound", ROBOTS)
+    expected |= REPEATED | jobs("expect", ["kuka"], ["200"], strategy)
     assert finished.planned() == expected | COMPARED_STRATEGIES | PER_DATA_SET | REPORT
 
 
@@ -109,6 +117,8 @@ def test_another_noise_level_runs_that_level(finished):
     """Neither replaced levels nor their order touch the level that stays."""
     finished.configure({"noise_um": [200, 50]})
     expected = jobs("measure", ROBOTS, ["50"]) | identified_and_evaluated(noise=["50"])
+    # Without a level without noise the expectations leave the linearisation out.
+    expected |= jobs("expect", ["kuka"], ["200"], STRATEGIES) | {("tabulate_expectations",)}
     assert finished.planned() == expected | {("draw_noise_impact",)} | PER_DATA_SET | REPORT
 
 
@@ -124,6 +134,8 @@ def test_the_compliance_of_a_robot_reruns_that_robot(finished):
         | jobs("draw_scheme", ["fig2", "fig3"])
         | {("tabulate_initial",), ("typeset_table", "table2"), ("draw_table2_samples",)}
         | {("tabulate_extended",), ("compare_with_paper",), ("draw_scores",)}
+        | jobs("climb_ladder", robot)
+        | {("tabulate_ladder",)}
     )
     assert finished.planned() == expected | PER_DATA_SET | REPORT
 
@@ -143,7 +155,9 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, ev
 
 def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
     finished.append("src/elastocal/study/bounds.py", "# an edit\n")
-    assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | REPORT
+    asked = jobs("compare_point_sets", ["kuka"]) | {("tabulate_budget",)}
+    asked |= jobs("index_observability", ["kuka"]) | {("tabulate_observability",)}
+    assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | asked | REPORT
 
 
 def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
@@ -173,6 +187,9 @@ def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, 
         "tabulate_initial",
         "draw_table2_samples",
         "draw_scheme",
+        "expect",
+        "tabulate_expectations",
+        *ASKED,
     ) | jobs("typeset_table", ["table1", "table2"])
     untouched |= of_the_loop(every_job)
     assert finished.planned() == every_job - untouched

@@ -23,8 +23,8 @@ FAULTS = {
         ["config.yaml: data_set: ", "allowed: 'data_sets'?"],
     ),
     "typo in a key of a section": (
-        lambda study: study.replace("config.yaml", "wrench_at:", "wrench:"),
-        ["config.yaml: interpretations.wrench: ", "allowed: 'wrench_at'?"],
+        lambda study: study.replace("config.yaml", "average: stiffness", "averages: stiffness"),
+        ["config.yaml: interpretations.averages: ", "allowed: 'average'?"],
     ),
     "value outside its range": (
         lambda study: study.configure({"interpretations": {"joint_range": "half_turn"}}),

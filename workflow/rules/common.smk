@@ -31,6 +31,14 @@ NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"
 CLASSICAL = config["tables"]["classical_strategy"]
 INTERPRETATIONS = config["interpretations"]
+# The interpretation of config.yaml among those of `switched`.
+USUAL = "as_configured"
+STUDY_SIZE = {
+    "data_sets": config["data_sets"],
+    "configurations": config["configurations"],
+    "tests": config["test_configurations"],
+    "noise": 1e-6 * config["tables"]["noise_um"],
+}
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -58,6 +66,19 @@ def robot_document(wildcards):
 
 def strategy_document(wildcards):
     return STUDY.strategies[wildcards.strategy]
+
+
+def interpretation(wildcards):
+    return INTERPRETATIONS | config["switched"].get(wildcards.interpretation, {})
+
+
+def loading_of(interpretations):
+    return config["loading"] | {key: interpretations[key] for key in ("offset_frame", "joint_range")}
+
+
+def conventions_of(interpretations):
+    kept = {key: interpretations[key] for key in ("wrench_at", "average", "deviation_of")}
+    return kept | {"rows": rows_read(interpretations["measured"])}
 
 
 def cells(kind, robots, noise, strategies=config["strategies"]):

@@ -20,6 +20,9 @@ FIGURES = [
     "accuracy_of_one_data_set",
     "scores_against_paper",
     "table2_samples",
+    "ladder",
+    "budget",
+    "designs",
 ]
 
 
@@ -147,6 +150,7 @@ rule draw_accuracy:
 rule draw_scores:
     input:
         comparison=rules.compare_with_paper.output.table,
+        expectations=rules.tabulate_expectations.output.table,
         sources=sources("draw_scores.py"),
     output:
         pdf="reports/figures/scores_against_paper.pdf",
@@ -155,6 +159,8 @@ rule draw_scores:
         "results/logs/draw_scores.log",
     benchmark:
         "results/timings/draw_scores.tsv"
+    params:
+        titles=REDUCED_TITLES,
     script:
         "../scripts/draw_scores.py"
 
@@ -175,3 +181,54 @@ rule draw_table2_samples:
         titles=TITLES,
     script:
         "../scripts/draw_table2_samples.py"
+
+
+rule draw_ladder:
+    input:
+        table=rules.tabulate_ladder.output.table,
+        sources=sources("draw_ladder.py"),
+    output:
+        pdf="reports/figures/ladder.pdf",
+        png="reports/figures/ladder.png",
+    log:
+        "results/logs/draw_ladder.log",
+    benchmark:
+        "results/timings/draw_ladder.tsv"
+    script:
+        "../scripts/draw_ladder.py"
+
+
+rule draw_budget:
+    input:
+        table=rules.tabulate_budget.output.budget,
+        sources=sources("draw_budget.py"),
+    output:
+        pdf="reports/figures/budget.pdf",
+        png="reports/figures/budget.png",
+    log:
+        "results/logs/draw_budget.log",
+    benchmark:
+        "results/timings/draw_budget.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        length=config["tables"]["length"],
+    script:
+        "../scripts/draw_budget.py"
+
+
+rule draw_designs:
+    input:
+        table=rules.tabulate_designs.output.table,
+        sources=sources("draw_designs.py"),
+    output:
+        pdf="reports/figures/designs.pdf",
+        png="reports/figures/designs.png",
+    log:
+        "results/logs/draw_designs.log",
+    benchmark:
+        "results/timings/draw_designs.tsv"
+    params:
+        titles=REDUCED_TITLES,
+        accuracy_um=QUESTIONS["accuracies_um"][0],
+    script:
+        "../scripts/draw_designs.py"

@@ -7,6 +7,13 @@ Needs reports/tables/ and reports/figures/. Writes reports/answers.json and repo
 rule state_answers:
     input:
         comparison=rules.compare_with_paper.output.table,
+        expectations=rules.tabulate_expectations.output.table,
+        ladder=rules.tabulate_ladder.output.table,
+        budget=rules.tabulate_budget.output.budget,
+        pairs=rules.tabulate_budget.output.pairs,
+        needed=rules.tabulate_budget.output.lengths,
+        designs=rules.tabulate_designs.output.table,
+        observability=rules.tabulate_observability.output.table,
         table2=rules.tabulate_initial.output.table,
         per_dataset=rules.tabulate_accuracy.output.table,
         extended=rules.tabulate_extended.output.table,
@@ -24,6 +31,9 @@ rule state_answers:
     params:
         titles=REDUCED_TITLES,
         cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
+        strategies=list(STUDY.strategies.values()),
+        accuracy_um=QUESTIONS["accuracies_um"][0],
+        size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
     script:
         "../scripts/state_answers.py"
 

@@ -182,6 +182,8 @@ rule compare_with_paper:
         extended=rules.tabulate_extended.output.table,
         metrics=cells("metrics", config["robots"], TABLE_NOISE),
         replicates=cells("replicates", config["robots"], TABLE_NOISE),
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+        initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
         sources=sources("compare_with_paper.py"),
     output:
         table="reports/tables/comparison.csv",
@@ -190,6 +192,7 @@ rule compare_with_paper:
     benchmark:
         "results/timings/compare_with_paper.tsv"
     params:
+        robots=config["robots"],
         noise_um=config["tables"]["noise_um"],
         length=config["tables"]["length"],
     script:

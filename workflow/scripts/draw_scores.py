@@ -1,4 +1,4 @@
-"""Distance of each printed figure from ours."""
+"""The paper's Table 4 among studies of the same size."""
 
 import pandas as pd
 
@@ -9,7 +9,8 @@ from job import Job, run
 
 
 def draw_scores(job: Job) -> None:
-    save(scores(pd.read_csv(job.input.comparison, dtype={"table": str})), job.output.pdf, job.output.png)
+    comparison = pd.read_csv(job.input.comparison, dtype={"table": str})
+    save(scores(comparison, pd.read_csv(job.input.expectations), job.params.titles), job.output.pdf, job.output.png)
 
 
 run(draw_scores, snakemake)

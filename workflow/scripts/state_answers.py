@@ -7,6 +7,16 @@ import pandas as pd
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_long
 from elastocal.report.answers import answers
+from elastocal.report.question_answers import (
+    budget_rows,
+    design_facts,
+    ladder_rows,
+    needed_rows,
+    observability_rows,
+    strategy_rows,
+    summaries,
+)
+from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import REPLICATES, metrics
 
 from job import Job, run
@@ -16,6 +26,7 @@ def state_answers(job: Job) -> None:
     settings = job.params
     facts = answers(
         comparison=pd.read_csv(job.input.comparison, dtype={"table": str}),
+        expectations=pd.read_csv(job.input.expectations),
         table2=pd.read_csv(job.input.table2),
         per_dataset=pd.read_csv(job.input.per_dataset),
         extended=pd.read_csv(job.input.extended),
@@ -26,6 +37,20 @@ def state_answers(job: Job) -> None:
         titles=settings.titles,
         cells=settings.cells,
     )
+    titles, length, accuracy = settings.titles, settings.cells["length"], settings.accuracy_um
+    ladder, pairs = pd.read_csv(job.input.ladder, dtype={"link_springs": str}), pd.read_csv(job.input.pairs)
+    observability = pd.read_csv(job.input.observability)
+    facts |= {
+        "strategies": strategy_rows([strategy_from_document(document) for document in settings.strategies]),
+        "ladder": ladder_rows(ladder),
+        "budget": budget_rows(pd.read_csv(job.input.budget), pairs, length, [*titles]),
+        "needed": needed_rows(pd.read_csv(job.input.needed), accuracy, [*titles]),
+        "designs": design_facts(pd.read_csv(job.input.designs), length, accuracy, titles),
+        "observability": observability_rows(observability, [*titles]),
+        "summaries": summaries(ladder, pairs, observability),
+        "titles": titles,
+        "size": {name: f"{value:g}" for name, value in settings.size.items()},
+    }
     write_text(job.output.answers, json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False))
 
 

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.figures.style import PALETTE, panels, styled
-from elastocal.study.comparison import ACCEPTED_Z
+from elastocal.figures.style import PALETTE, note, panels, styled
+from elastocal.study.printed import LEVEL
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,43 +16,74 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MILLI = 1e3
-# Beyond this, a z score is drawn at the margin with an arrow.
-_MARGIN = 8.0
+_HEADS = {
+    "k_sigma_20": "$k_\\Sigma$ at 20 (%)",
+    "n_k_sigma_1_percent": "length until 1 %",
+    "dev_20": "dev at 20 (µm)",
+    "n_dev_2_um": "length until 2 µm",
+}
 
 
 @styled
-def scores(comparison: pd.DataFrame) -> Figure:
-    """Distance of each printed figure from ours, in Monte Carlo standard deviations.
+def scores(comparison: pd.DataFrame, expectations: pd.DataFrame, titles: Mapping[str, str]) -> Figure:
+    """Table 4 among studies of the same size: the paper's figures, how studies scatter, and what is expected of them.
 
     Parameters
     ----------
-    comparison : DataFrame
-        The table of the same name.
+    comparison, expectations : DataFrame
+        The tables of these names.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    shown = comparison[comparison.table.isin(["2", "3", "4"]) & comparison.z.notna()].reset_index(drop=True)
-    groups = shown.groupby([shown.table, shown.quantity], sort=False).ngroup().to_numpy()
-    labels = [f"Table {table}: {quantity}" for table, quantity in dict.fromkeys(zip(shown.table, shown.quantity, strict=True))]
-    figure, axes = panels(1, 1, 8 + 6.5 * len(labels))
-    axis = axes[0, 0]
-    axis.axvspan(-ACCEPTED_Z, ACCEPTED_Z, color="#eeeeee", zorder=0)
-    axis.axvline(0, color="black", linewidth=0.7)
-    for index, robot in enumerate(dict.fromkeys(shown.robot)):
-        chosen = (shown.robot == robot).to_numpy()
-        z, row = shown.z.to_numpy()[chosen], groups[chosen] + 0.22 * (index - 1)
-        outside = np.abs(z) > _MARGIN
-        axis.plot(z[~outside], row[~outside], "o", color=PALETTE[index], markersize=4, alpha=0.8, label=robot)
-        for side, marker in ((-1, "<"), (1, ">")):
-            far = outside & (np.sign(z) == side)
-            axis.plot(np.full(far.sum(), side * _MARGIN), row[far], marker, color=PALETTE[index], markersize=5)
-    axis.set(yticks=range(len(labels)), xlabel="(ours - paper) / Monte Carlo standard deviation; arrows lie beyond the margin")
-    axis.set(xlim=(-_MARGIN - 0.5, _MARGIN + 0.5), ylim=(len(labels) - 0.5, -0.5))
-    axis.set_yticklabels(labels)
-    figure.legend(*axis.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    shown = comparison[(comparison.table == "4") & comparison.studies_mean.notna()]
+    quantities, strategies = list(dict.fromkeys(shown.quantity)), list(dict.fromkeys(shown.strategy))
+    if shown.empty:
+        return note("the paper prints nothing of the robots of this study")
+    figure, axes = panels(len(titles), len(quantities), 24 + 38 * len(titles), sharey=True)
+    for line, (robot, title) in zip(axes, titles.items(), strict=True):
+        for axis, quantity in zip(line, quantities, strict=True):
+            cells = shown[(shown.robot == robot) & (shown.quantity == quantity)]
+            rows = [strategies.index(strategy) for strategy in cells.strategy]
+            axis.errorbar(
+                cells.studies_mean,
+                rows,
+                xerr=2 * cells.studies_std,
+                fmt="o",
+                color=PALETTE[0],
+                markersize=3,
+                elinewidth=3,
+                alpha=0.6,
+                label="further studies, mean ± 2 standard deviations",
+            )
+            expected = _expected(expectations, robot, quantity)
+            axis.plot(expected, [strategies.index(name) for name in expected.index], "|", color="black", markersize=8)
+            for differs, colour, name in ((False, "white", "paper"), (True, PALETTE[1], "paper, differs (Holm)")):
+                some = ((cells.p_holm < LEVEL) == differs).to_numpy()
+                at = np.array(rows)[some]
+                axis.plot(cells.paper[some], at, "D", color=colour, markeredgecolor="black", markersize=4, label=name)
+            axis.set(title=_HEADS.get(quantity, quantity.replace("_", " ")), xlim=(0, None), ylim=(len(strategies) - 0.5, -0.5))
+            axis.grid(visible=False, axis="y")
+        line[0].set(yticks=range(len(strategies)), ylabel=title)
+        line[0].set_yticklabels(strategies)
+    handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
+    figure.legend(
+        [*handles.values(), *axes[0, 0].lines[-3:-2]],
+        [*handles.keys(), "expectation in closed form"],
+        loc="outside lower center",
+        ncols=2,
+    )
     return figure
+
+
+def _expected(expectations: pd.DataFrame, robot: str, quantity: str) -> pd.Series:
+    """Expectations of one quantity by strategy; none of lengths."""
+    names = {f"{quantity}_percent_first_stage", f"{quantity}_um"}
+    mine = expectations[(expectations.robot == robot) & expectations.quantity.isin(names) & expectations.paper.notna()]
+    return mine.set_index("strategy").expected
 
 
 @styled
@@ -93,6 +124,6 @@ def table2_samples(initial: Mapping[str, pd.DataFrame], reference: pd.DataFrame,
         axis.set_yticklabels([titles[robot] for robot in initial] if axis is axes[0, 0] else [])
         axis.grid(visible=False, axis="y")
     handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
-    note = "single data sets: 1 to 99 %, quartiles and median"
-    figure.legend(handles.values(), handles.keys(), title=note, loc="outside lower center", title_fontsize=7.5)
+    title = "single data sets: 1 to 99 %, quartiles and median"
+    figure.legend(handles.values(), handles.keys(), title=title, loc="outside lower center", title_fontsize=7.5)
     return figure

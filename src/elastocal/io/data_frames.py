@@ -59,6 +59,28 @@ def read_long(paths: Iterable[str | Path], schema: Callable[[int], TableSchema])
     return pd.concat(frames[1:] or frames, ignore_index=True)
 
 
+def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchema]) -> pd.DataFrame:
+    """Tables of further studies of several robots in one frame, headed by the robot that their provenance says.
+
+    Parameters
+    ----------
+    paths : iterable of str
+        One at least.
+    schema : callable
+        Number of joints to TableSchema.
+
+    Returns
+    -------
+    pandas.DataFrame
+    """
+    frames = []
+    for path in paths:
+        origin = read_provenance(path)
+        joints = len(origin["configuration"]["robot"]["compliance_urad_per_Nm"])
+        frames.append(pd.DataFrame({"robot": origin["robot"]} | read_table(path, schema(joints))))
+    return pd.concat(frames, ignore_index=True)
+
+
 def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
     """Write a data frame; the file appears whole or not at all.
 

@@ -61,12 +61,27 @@ def link_compliance(link: Link) -> np.ndarray:
     -------
     ndarray (6, 6)
     """
+    turn = beam_axes(link)
+    return turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
+
+
+def beam_axes(link: Link) -> np.ndarray:
+    """Axes of a link as a beam, x along it, twice: of displacements and of rotations.
+
+    Parameters
+    ----------
+    link : Link
+
+    Returns
+    -------
+    ndarray (6, 6)
+        Columns in the frame of the chain.
+    """
     along = np.array(link.vector_m) / np.linalg.norm(link.vector_m)
     # A round tube has no preferred lateral axes: any right-handed triad with x along the link will do.
     helper = np.eye(3)[np.argmin(np.abs(along))]
     across = np.cross(along, helper) / np.linalg.norm(np.cross(along, helper))
-    turn = np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
-    return turn @ tube_compliance(link.tube, float(np.linalg.norm(link.vector_m))) @ turn.T
+    return np.kron(np.eye(2), np.column_stack([along, across, np.cross(along, across)]))
 
 
 def extended_chain(robot: Robot) -> Chain:

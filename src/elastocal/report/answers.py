@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.comparison import ACCEPTED_Z
-from elastocal.study.tables import deviation_ratio, with_errors_merged, worded
+from elastocal.study.printed import LEVEL
+from elastocal.study.tables import column_head, deviation_ratio, with_errors_merged, worded
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,26 +17,11 @@ if TYPE_CHECKING:
 
 # The repeatability that the paper names for both robots, in µm.
 REPEATABILITY_UM = 60.0
-# What could explain a cell that lies outside, by the letter under which the report lists it.
-EXPLANATIONS = {
-    "a": (
-        "One data set of 100 configurations gives the printed figure, all data sets together do not (see the samples above): "
-        "the paper seems to print one data set's. Its maxima cannot come from all of them."
-    ),
-    "b": (
-        "The bias of 1/ĉ can only lower these values, so a printed one above the true value is noise of the paper's own run. "
-        "Beside that remain the rounding to three digits and other link lengths than those of R2."
-    ),
-    "c": (
-        "One run moves all k_Σ cells of a robot together, since their data sets are the same: these are few independent "
-        "findings. Which joints (R10) and which load of partial points (R6) the authors summed over is not printed."
-    ),
-    "d": "One run moves all dev cells of a robot together. A length that is not reached within the data sets has no z.",
-}
 
 
 def answers(
     comparison: pd.DataFrame,
+    expectations: pd.DataFrame,
     table2: pd.DataFrame,
     per_dataset: pd.DataFrame,
     extended: pd.DataFrame,
@@ -51,7 +36,7 @@ def answers(
 
     Parameters
     ----------
-    comparison, table2, per_dataset, extended, solvers : DataFrame
+    comparison, expectations, table2, per_dataset, extended, solvers : DataFrame
         Tables of the study.
     metrics, replicates : DataFrame
         Long, at the noise level of the tables.
@@ -68,8 +53,7 @@ def answers(
         JSON-serialisable; strings ready to print, lists for tables.
     """
     noise_um, length, classical = cells["noise_um"], cells["length"], cells["classical_strategy"]
-    judged = comparison[comparison.table.isin(["2", "3", "4"])]
-    outside = judged[(judged.z.abs() > ACCEPTED_Z) | judged.z.isna()]
+    judged = comparison[comparison.p_value.notna()]
     at = metrics[metrics.length == length]
     single = per_dataset[(per_dataset.noise_um == noise_um)]
     return {
@@ -77,15 +61,15 @@ def answers(
         "length": str(length),
         "classical": classical,
         "repeatability_um": f"{REPEATABILITY_UM:g}",
-        "accepted_z": f"{ACCEPTED_Z:g}",
+        "level": f"{100 * LEVEL:g}",
+        "studies": str(int(expectations.studies.max())) if len(expectations) else "0",
         "cells": str(len(judged)),
-        "within": str(len(judged) - len(outside)),
-        "within_percent": f"{100 * (1 - len(outside) / len(judged)):.0f}",
+        "differ": str(int((judged.p_holm < LEVEL).sum())),
+        "below": str(int((judged.p_value < LEVEL).sum())),
+        "below_expected": f"{LEVEL * len(judged):.1f}",
         "by_table": [_count(judged, table) for table in ("2", "3", "4")],
-        "outside": [_outside_row(row) for row in outside.itertuples()],
-        "explanations": {
-            letter: EXPLANATIONS[letter] for letter in sorted({_explanation(row) for row in outside.itertuples()})
-        },
+        "outside": [_outside_row(row) for row in judged[judged.p_value < LEVEL].itertuples()],
+        "expectations": _expectation_rows(expectations),
         "text_figures": [_text_row(row) for row in comparison[comparison.table == "text"].itertuples()],
         "one_set": _one_set_rows(comparison, table2),
         "robots": [
@@ -107,32 +91,44 @@ def answers(
 
 
 def _count(judged: pd.DataFrame, table: str) -> dict[str, str]:
-    z = judged[judged.table == table].z
-    return {"table": table, "cells": str(len(z)), "within": str(int((z.abs() <= ACCEPTED_Z).sum()))}
+    mine = judged[judged.table == table]
+    return {"table": table, "cells": str(len(mine)), "differ": str(int((mine.p_holm < LEVEL).sum()))}
 
 
 def _outside_row(row: Any) -> dict[str, str]:
     return {
-        "figure": f"Table {row.table}: {row.quantity}",
+        "figure": f"Table {row.table}: {column_head(row.quantity)}",
         "robot": row.robot,
         "strategy": row.strategy if isinstance(row.strategy, str) else "",
         "paper": f"{row.paper:g}",
-        "ours": "not reached" if np.isinf(row.ours) else worded(row.ours, row.mc_std),
-        "z": "" if np.isnan(row.z) else f"{row.z:+.1f}",
-        "why": _explanation(row),
+        "studies": worded(row.studies_mean, row.studies_std),
+        "p": f"{row.p_value:.2g}",
+        "holm": f"{row.p_holm:.2g}",
     }
 
 
-def _explanation(row: Any) -> str:
-    """Letter of what could explain a cell outside."""
-    return {"2": "a", "3": "b"}.get(row.table, "c" if "k_sigma" in row.quantity else "d")
+def _expectation_rows(expectations: pd.DataFrame) -> list[dict[str, str]]:
+    """Expectation, studies and the paper, where the paper prints a figure."""
+    return [_expectation_row(row) for row in expectations[expectations.paper.notna()].itertuples()]
+
+
+def _expectation_row(row: Any) -> dict[str, str]:
+    return {
+        "robot": row.robot,
+        "strategy": row.strategy,
+        "quantity": column_head(row.quantity),
+        "expected": f"{row.expected:.2f}",
+        "studies": f"{row.studies_mean:.2f} ± {row.studies_std:.2f}",
+        "paper": f"{row.paper:.3f}",
+        "p": f"{row.p_value:.2g}",
+    }
 
 
 def _text_row(row: Any) -> dict[str, str]:
     shown = "not studied" if np.isnan(row.ours) else worded(row.ours, row.mc_std)
     interpretation = row.interpretation if isinstance(row.interpretation, str) else ""
     return {
-        "figure": row.quantity.replace("_", " "),
+        "figure": column_head(row.quantity),
         "paper": f"{row.paper:g}",
         "ours": shown,
         "interpretation": interpretation,
@@ -149,7 +145,6 @@ def _one_set_rows(comparison: pd.DataFrame, table2: pd.DataFrame) -> list[dict[s
         if len(found):
             column = columns[figure.quantity]
             one, spread = float(found[f"{column}_one_set"].iloc[0]), float(found[f"{column}_one_set_std"].iloc[0])
-            z = (one - figure.paper) / spread
             everything = f"{float(found[column].iloc[0]):.3f}"
             rows.append(
                 {
@@ -158,7 +153,7 @@ def _one_set_rows(comparison: pd.DataFrame, table2: pd.DataFrame) -> list[dict[s
                     "paper": f"{figure.paper:.3f}",
                     "all": everything,
                     "one": f"{one:.2f} ± {spread:.2f}",
-                    "z": f"{z:+.1f}",
+                    "p": "fitted" if np.isnan(figure.p_value) else f"{figure.p_value:.2f}",
                 }
             )
     return rows

@@ -6,10 +6,15 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from elastocal.study.tables import deviation_ratio, share_compensated
+from elastocal.study.printed import holm, predicted
+from elastocal.study.tables import MILLI, deviation_ratio, share_compensated
 
-ACCEPTED_Z = 2.5
 _TABLE2 = {"deviation_mean": "mean_mm", "deviation_std": "std_mm", "deviation_max": "max_mm"}
+_OF_ONE_SET = {
+    "deviation_mean": lambda frame: frame["mean"],
+    "deviation_std": lambda frame: (frame.mean_square - frame["mean"] ** 2) ** 0.5,
+    "deviation_max": lambda frame: frame.maximum,
+}
 _TABLE4 = {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}
 
 
@@ -26,6 +31,10 @@ class OurResults:
     noise_um : float
     length : int
         Noise level and data set length of the tables.
+    studies : DataFrame
+        robot and the columns of `table_schemas.repeated`: further studies of the same size.
+    initial : dict of str to DataFrame
+        The initial table of each robot.
     """
 
     tables: dict[str, pd.DataFrame]
@@ -33,6 +42,8 @@ class OurResults:
     replicates: pd.DataFrame
     noise_um: float
     length: int
+    studies: pd.DataFrame
+    initial: dict[str, pd.DataFrame]
 
 
 class _PrintedFigure(NamedTuple):
@@ -58,19 +69,40 @@ def comparison_table(reference: pd.DataFrame, ours: OurResults) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation. `mc_std` is the standard deviation
+        table, robot, strategy, quantity, unit, paper, ours, mc_std, z, interpretation: `mc_std` is the standard deviation
         between studies of this size, by bootstrap over data sets and test configurations; z = (ours - paper) / mc_std, empty
-        where one is missing. The paper is a study of the same size with the same spread, so a faithful z has standard deviation
-        1.4 and about one in thirteen lies beyond 2.5. What the study does not cover is empty.
+        where one is missing. studies_mean, studies_std, p_value, p_holm: of further studies for Tables 3 and 4, of single data
+        sets for Table 2, see `printed`; without a p value where the study was fitted to the figure. What the study does not
+        cover is empty.
     """
     rows = []
     printed = reference[[*_PrintedFigure._fields]].itertuples(index=False, name=None)
     for figure in map(_PrintedFigure._make, printed):
         value, spread, interpretation = _RULES[figure.table](figure, ours)
         z = (value - figure.value) / spread if spread > 0 and np.isfinite(value) else np.nan
-        rows.append((*figure, value, spread, z, interpretation))
+        rows.append((*figure, value, spread, z, interpretation, *_scatter(figure, ours)))
     names = ["table", "robot", "strategy", "quantity", "unit", "paper", "ours", "mc_std", "z", "interpretation"]
-    return pd.DataFrame(rows, columns=names)
+    table = pd.DataFrame(rows, columns=[*names, "studies_mean", "studies_std", "p_value"])
+    return table.assign(p_holm=holm(table.p_value.to_numpy(float)))
+
+
+def _scatter(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, float]:
+    """Mean, standard deviation and p value of a printed figure where one study, or one data set, stands beside many."""
+    if figure.table == "2" and figure.robot in ours.initial:
+        frame = ours.initial[figure.robot]
+        values = MILLI * _OF_ONE_SET[figure.quantity](frame).to_numpy()
+        below, above = (values <= figure.value).sum(), (values >= figure.value).sum()
+        p_value = min(2 * (min(below, above) + 1) / (len(values) + 1), 1.0)
+        return values.mean(), values.std(ddof=1), np.nan if _fitted(figure) else p_value
+    found = None
+    if figure.table in ("3", "4"):
+        found = predicted(ours.studies, figure.robot, figure.strategy, figure.quantity, ours.length)
+    return (found.mean, found.std, found.p_value(figure.value)) if found else (np.nan, np.nan, np.nan)
+
+
+def _fitted(figure: _PrintedFigure) -> bool:
+    """Whether the study has a parameter that was chosen for this figure."""
+    return (figure.robot, figure.quantity) == ("kuka_extended", "deviation_mean")
 
 
 def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
@@ -79,8 +111,8 @@ def _table1_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, flo
 
 def _table2_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:
     column = _TABLE2[figure.quantity]
-    chosen = (figure.robot, column) == ("kuka_extended", "mean_mm")
-    return *_pair(ours.tables["table2"], column, robot=figure.robot), "R11: the tube was chosen for it" if chosen else "R3"
+    remark = "R11: the tube was chosen for it" if _fitted(figure) else "R3"
+    return *_pair(ours.tables["table2"], column, robot=figure.robot), remark
 
 
 def _table3_figure(figure: _PrintedFigure, ours: OurResults) -> tuple[float, float, str]:

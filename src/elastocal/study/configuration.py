@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
@@ -13,8 +15,9 @@ from elastocal.study.strategies import check_strategy, strategy_from_document
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
 
+# A measuring point in chain notation.
+_POINT = re.compile(r"\[(\w*[A-Za-z]\w*)\]")
 # What a robot file may leave out and a simulation of the robot needs.
 _SIMULATED = ("joint_limits_deg", "compliance_urad_per_Nm")
 
@@ -85,6 +88,13 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
         raise InputError(
             source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4"
         )
+    # A set may be there for robots that this study leaves out.
+    known = sorted(
+        {point for file in Path(folder, "robots").glob("*.yaml") for point in _POINT.findall(file.read_text("utf-8"))}
+    )
+    for label, names in config["questions"]["point_sets"].items():
+        for name in (name for name in names if name not in known):
+            raise InputError(source, f"questions.point_sets.{label}", repr(name), ", ".join(known))
     _check_cells(config, source)
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 

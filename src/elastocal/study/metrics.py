@@ -86,11 +86,25 @@ def error_moment(judge: Judge) -> np.ndarray:
     ndarray (n, n)
         m^2 per (rad/(N m))^2.
     """
+    return error_forms(judge).mean(axis=0)[:-1, :-1]
+
+
+def error_forms(judge: Judge) -> np.ndarray:
+    """Matrices of the quadratic forms of the squared position error in (c - reference, 1).
+
+    Parameters
+    ----------
+    judge : Judge
+
+    Returns
+    -------
+    ndarray (tests, n + 1, n + 1)
+    """
     size = len(judge.reference) + 1
     first, second = np.triu_indices(size)
-    moment = np.zeros((size, size))
-    moment[first, second] = judge.quadratic_forms.mean(axis=0) / 2
-    return (moment + moment.T)[:-1, :-1]
+    forms = np.zeros((len(judge.quadratic_forms), size, size))
+    forms[:, first, second] = judge.quadratic_forms / 2
+    return forms + forms.swapaxes(1, 2)
 
 
 def scored_parts(groups: int, models: int) -> list[slice]:

@@ -77,6 +77,79 @@ def metrics(joints: int) -> TableSchema:
     return TableSchema("metrics", tuple(columns))
 
 
+def _scores(joints: int) -> list[Column]:
+    """Scores of the averaged model, without errors."""
+    compliances = [
+        Column(f"compliance_{j}", "float64", "rad/(N m)", f"as in the metrics, of joint {j}", missing=True)
+        for j in range(1, joints + 1)
+    ]
+    return [
+        *compliances,
+        Column("k_sigma", "float64", "percent", "as in the metrics", missing=True),
+        Column("k_sigma_first_stage", "float64", "percent", "as in the metrics", missing=True),
+        Column("deviation", "float64", "m", "as in the metrics", missing=True),
+    ]
+
+
+def repeated(joints: int) -> TableSchema:
+    """Scores of further studies of the same size; one row for each study, strategy and length."""
+    study = Column("study", "int32", "", "number of the study, from 1; that of the tables is number 0", minimum=1)
+    strategy = Column("strategy", "string", "", "name of the strategy")
+    return TableSchema("repeated", (study, strategy, _LENGTH, *_scores(joints)))
+
+
+def expected(joints: int) -> TableSchema:
+    """Expectations of the scores in closed form; one row for each length."""
+    return TableSchema("expected", (_LENGTH, *_scores(joints)))
+
+
+BUDGET = TableSchema(
+    "budget",
+    (
+        Column("points", "string", "", "set of measuring points; a row group holds one"),
+        _SET,
+        _LENGTH,
+        Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations", missing=True),
+        Column("bound", "float64", "m^2", "Cramér-Rao bound of the same", missing=True),
+    ),
+)
+
+
+LADDER = TableSchema(
+    "ladder",
+    (
+        Column("noise", "float64", "m, rad", "standard deviation of the measurements"),
+        _LENGTH,
+        _SET,
+        Column("link_springs", "int32", "", "number of link springs in the model", minimum=0),
+        Column("added_link", "int32", "", "link whose spring came last, from 1; 0 where there is none", minimum=0),
+        Column("chosen", "bool", "", "whether cross-validation stops here"),
+        Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations"),
+    ),
+)
+
+DESIGNS = TableSchema(
+    "designs",
+    (
+        Column("design", "text", "", "criterion by which the configurations are chosen, random, or the bound of all designs"),
+        Column("configurations", "int32", "", "configurations of the design", minimum=1),
+        Column("rms", "float64", "m", "Cramér-Rao bound of the RMS end-effector error"),
+        Column("low", "float64", "m", "5 % of random designs"),
+        Column("high", "float64", "m", "95 % of random designs"),
+    ),
+)
+
+OBSERVABILITY = TableSchema(
+    "observability",
+    (
+        _SET,
+        *(Column(f"O{number}", "float64", "", f"observability index O{number}") for number in range(1, 6)),
+        Column("bound", "float64", "m^2", "Cramér-Rao bound of the mean square end-effector error"),
+        Column("mean_square", "float64", "m^2", "mean square end-effector error on test configurations"),
+    ),
+)
+
+
 def accuracy(joints: int) -> TableSchema:
     """What one data set gives, as the mean over data sets; one row for each evaluated length."""
     columns = [_LENGTH]

@@ -6,6 +6,7 @@ measured by simulation has a column of its Monte Carlo standard error, ``<quanti
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -358,7 +359,36 @@ def headed_rows(frame: pd.DataFrame) -> list[list[str]]:
     list of list of str
     """
     shown = with_errors_merged(frame.loc[:, ~frame.columns.str.contains("_one_set")])
-    return [[name.replace("_", " ") for name in shown.columns], *shown.to_numpy().tolist()]
+    return [[column_head(name) for name in shown.columns], *shown.to_numpy().tolist()]
+
+
+def column_head(name: str) -> str:
+    """Name of a column or a quantity for people, with its unit.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+        Names that are not of the paper's quantities with blanks.
+    """
+    stage = ", first stage" if name.endswith("_first_stage") else ""
+    for pattern, words in _HEADS:
+        if found := re.fullmatch(pattern, name.removesuffix("_first_stage")):
+            return words.format(*found.groups()) + stage
+    return name.replace("_", " ")
+
+
+_HEADS = (
+    (r"k_sigma_(\d+)(?:_percent)?", "k_Σ at {} (%)"),
+    (r"n_k_sigma_([\d.]+)_percent", "n, k_Σ ≤ {} %"),
+    (r"dev_(\d+)(?:_um)?", "dev at {} (µm)"),
+    (r"n_dev_([\d.]+)_um", "n, dev ≤ {} µm"),
+    (r"(mean|std|max)_mm", "{} (mm)"),
+    (r"deviation_(mean|std|max)", "{} (mm)"),
+)
 
 
 def worded(value: float | str, error: float, digits: int = 3) -> str:

@@ -1,0 +1,133 @@
+"""Figures of the research questions: springs that pay, points at an equal budget, configurations that are chosen."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from elastocal.figures.style import PALETTE, line_style, note, panels, styled
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import pandas as pd
+    from matplotlib.axis import Axis
+    from matplotlib.figure import Figure
+
+_DESIGNS = {"random": "random", "A": "A-optimal", "D": "D-optimal", "I": "I-optimal", "bound": "bound of all designs"}
+
+
+@styled
+def ladder(table: pd.DataFrame) -> Figure:
+    """Error of one data set by number of link springs, for each noise and length, of the first robot with links.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `question_tables.ladder_table`.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    if table.empty:
+        return note("no robot of this study has elastic links")
+    table = table[table.robot == table.robot.iloc[0]]
+    steps = table[table.chosen_percent.notna()]
+    noises = list(dict.fromkeys(table.noise_um))
+    figure, axes = panels(1, len(noises), 72, sharey=True)
+    for axis, noise in zip(axes[0], noises, strict=True):
+        for index, (length, cell) in enumerate(steps[steps.noise_um == noise].groupby("length")):
+            springs = cell.link_springs.astype(int)
+            axis.plot(springs, cell.rms_um, color=PALETTE[index], label=f"{length}", marker="o", markersize=2.5)
+            # Where cross-validation stops: the larger the more often.
+            axis.scatter(springs, cell.rms_um, s=0.9 * cell.chosen_percent, color=PALETTE[index], alpha=0.35, linewidths=0)
+        axis.set(title=f"noise {noise:g} µm and µrad", xlabel="link springs in the model", yscale="log")
+        axis.set_xticks(range(int(steps.link_springs.astype(int).max()) + 1))
+        _plain(axis.yaxis)
+    axes[0, 0].set_ylabel("RMS error of one data set (µm)")
+    title = "configurations in the data set; discs: share of data sets in which cross-validation stops there"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=6, title_fontsize=7.5)
+    return figure
+
+
+@styled
+def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figure:
+    """Error of one data set by set of measuring points, with as many configurations and with as many measurements.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `budget_tables.budget_table`.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+    length : int
+        Configurations; the budget is twice as many measurements.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    labels = list(dict.fromkeys(table.points))
+    figure, axes = panels(1, len(titles), 16 + 7 * len(labels), sharex=True, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        mine = table[table.robot == robot]
+        same = mine[mine.configurations == length]
+        equal = mine[mine.configurations == 2 * length // mine.measurements_per_configuration]
+        for cells, colour, shift, name in (
+            (same, PALETTE[0], -0.16, f"{length} configurations each"),
+            (equal, PALETTE[1], 0.16, f"{2 * length} measurements each"),
+        ):
+            rows = [labels.index(points) + shift for points in cells.points]
+            axis.errorbar(cells.rms_um, rows, xerr=1.96 * cells.std_error_um, fmt="o", color=colour, markersize=4, label=name)
+            axis.plot(cells.crlb_rms_um, rows, "|", color="black", markersize=7, label="Cramér-Rao bound")
+        axis.set(title=title, xlabel="RMS error of one data set (µm), 95 % intervals", yticks=range(len(labels)))
+        axis.set(ylim=(len(labels) - 0.5, -0.5), xlim=(0, None))
+        axis.grid(visible=False, axis="y")
+    axes[0, 0].set_yticklabels(labels)
+    handles = dict(zip(*reversed(axes[0, 0].get_legend_handles_labels()), strict=True))
+    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3)
+    return figure
+
+
+@styled
+def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+    """Error that random and optimal configurations leave, by their number.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `question_tables.designs_table`.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+    accuracy_um : float
+        Marked by a line.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    figure, axes = panels(1, len(titles), 80, sharey=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        for index, (kind, name) in enumerate(_DESIGNS.items()):
+            cell = table[(table.robot == robot) & (table.design == kind)]
+            axis.plot(cell.configurations, cell.rms_um, **line_style(index), label=name)
+            if kind == "random":
+                axis.fill_between(cell.configurations, cell.low_um, cell.high_um, color=PALETTE[index], alpha=0.15, linewidth=0)
+        axis.axhline(accuracy_um, color="black", linewidth=0.7)
+        axis.set(title=title, xlabel="configurations", xscale="log", yscale="log")
+        axis.set_xticks(sorted(set(table.configurations)), labels=[f"{size}" for size in sorted(set(table.configurations))])
+        axis.xaxis.set_minor_locator(NullLocator())
+        _plain(axis.yaxis)
+    axes[0, 0].set_ylabel("bound of the RMS error (µm)")
+    title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    return figure
+
+
+def _plain(axis: Axis) -> None:
+    """Numbers as they are on a logarithmic axis, at 2 and 5 between its decades, too."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_locator(LogLocator(subs=[2.0, 5.0]))
+    axis.set_minor_formatter(FuncFormatter(lambda value, _: f"{value:g}"))

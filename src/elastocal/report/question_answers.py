@@ -1,0 +1,256 @@
+"""Numbers that the text states about the research questions beyond the paper's strategies, already worded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.study.question_tables import CHOSEN
+from elastocal.study.tables import worded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    import pandas as pd
+
+    from elastocal.study.strategies import Strategy
+
+_INDEX_NAMES = {
+    "O1": "O1, geometric mean of singular values",
+    "O2": "O2, inverse condition number",
+    "O3": "O3, smallest singular value",
+    "O4": "O4, noise amplification",
+    "O5": "O5, harmonic mean",
+    "bound": "the bound itself",
+}
+
+
+def strategy_rows(strategies: Sequence[Strategy]) -> list[dict[str, str]]:
+    """What each strategy does, stage by stage.
+
+    Parameters
+    ----------
+    strategies : sequence of Strategy
+
+    Returns
+    -------
+    list of dict
+        name, stages.
+    """
+    rows = []
+    for strategy in strategies:
+        stages = []
+        for stage in strategy.stages:
+            held = f", {_joints(stage.held)} held" if stage.held else ""
+            stages.append(f"{' and '.join(stage.points)} → {_joints(stage.identified)}{held}")
+        rows.append({"name": strategy.name, "stages": "; then ".join(stages)})
+    return rows
+
+
+def ladder_rows(ladder: pd.DataFrame) -> list[dict[str, str]]:
+    """What joints alone leave, what the best number of link springs would, and what cross-validation chooses.
+
+    Parameters
+    ----------
+    ladder : DataFrame
+        From `question_tables.ladder_table`, of one robot.
+
+    Returns
+    -------
+    list of dict
+        noise, length, joints, best, springs, chosen.
+    """
+    rows = []
+    for (noise, length), cell in ladder.groupby(["noise_um", "length"]):
+        by = cell.set_index("link_springs")
+        steps = by.drop(index=CHOSEN)
+        best = str(steps.rms_um.idxmin())
+        rows.append(
+            {
+                "noise": f"{noise:g}",
+                "length": f"{length}",
+                "joints": worded(by.rms_um["0"], by.rms_um_std_error["0"]),
+                "best": worded(by.rms_um[best], by.rms_um_std_error[best]),
+                "springs": best,
+                "chosen": worded(by.rms_um[CHOSEN], by.rms_um_std_error[CHOSEN]),
+            }
+        )
+    return rows
+
+
+def budget_rows(budget: pd.DataFrame, pairs: pd.DataFrame, length: int, robots: Iterable[str]) -> list[dict[str, str]]:
+    """Sets of points with as many configurations and with as many measurements, the latter against the end-effector alone.
+
+    Parameters
+    ----------
+    budget, pairs : DataFrame
+        From `budget_tables`.
+    length : int
+        Configurations; the budget is twice as many measurements.
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        robot, points, same, configurations, equal, ratio.
+    """
+    rows = []
+    for robot in robots:
+        mine = budget[budget.robot == robot]
+        for points in dict.fromkeys(mine.points):
+            cell = mine[mine.points == points].set_index("configurations")
+            many = 2 * length // int(cell.measurements_per_configuration.iloc[0])
+            against = pairs[(pairs.robot == robot) & (pairs.points == points)]
+            row = {"robot": robot, "points": points, "same": _at(cell, length), "configurations": f"{many}"}
+            row |= {"equal": _at(cell, many), "ratio": ""}
+            if len(against):
+                found = against.iloc[0]
+                row["ratio"] = f"{found.ratio:.3f} ({found.ratio_low:.3f} to {found.ratio_high:.3f})"
+            rows.append(row)
+    return rows
+
+
+def needed_rows(needed: pd.DataFrame, accuracy_um: float, robots: Iterable[str]) -> list[dict[str, str]]:
+    """How many random configurations reach an accuracy.
+
+    Parameters
+    ----------
+    needed : DataFrame
+        From `budget_tables.lengths_table`.
+    accuracy_um : float
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        robot, points, configurations, bound, measurements.
+    """
+    rows = []
+    for row in needed[(needed.accuracy_um == accuracy_um) & needed.robot.isin([*robots])].itertuples():
+        interval = f"{_length(row.configurations_low)} to {_length(row.configurations_high)}"
+        rows.append(
+            {
+                "robot": str(row.robot),
+                "points": str(row.points),
+                "configurations": f"{_length(row.configurations)} ({interval})",
+                "bound": _length(row.configurations_by_bound),
+                "measurements": _length(row.measurements),
+            }
+        )
+    return rows
+
+
+def design_facts(designs: pd.DataFrame, length: int, accuracy_um: float, titles: Mapping[str, str]) -> list[dict[str, str]]:
+    """What chosen configurations are worth, a dictionary for each robot.
+
+    Parameters
+    ----------
+    designs : DataFrame
+        From `question_tables.designs_table`.
+    length : int
+        Configurations at which designs are compared, where there is one of this size.
+    accuracy_um : float
+    titles : dict of str to str
+
+    Returns
+    -------
+    list of dict
+        title, random, chosen and bound (µm) at the length, gain (a factor), efficiency (percent of the bound's variance), and
+        chosen_needed: the smallest size of an I-optimal design within the accuracy.
+    """
+    found = []
+    for robot, title in titles.items():
+        mine = designs[designs.robot == robot]
+        sizes = np.unique(mine.configurations)
+        at = int(sizes[np.argmin(np.abs(sizes - length))])
+        rms = mine[mine.configurations == at].set_index("design").rms_um
+        chosen = mine[(mine.design == "I") & (mine.rms_um <= accuracy_um)].configurations
+        found.append(
+            {
+                "title": title,
+                "length": f"{at}",
+                "random": f"{rms['random']:.1f}",
+                "chosen": f"{rms['I']:.1f}",
+                "gain": f"{rms['random'] / rms['I']:.2f}",
+                "efficiency": f"{100 * (rms['bound'] / rms['I']) ** 2:.0f}",
+                "chosen_needed": f"{chosen.min()}" if len(chosen) else "more than all",
+            }
+        )
+    return found
+
+
+def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
+    """Rank correlations of the indices, a row for each index.
+
+    Parameters
+    ----------
+    observability : DataFrame
+        From `question_tables.observability_table`.
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        index and, for each robot, its correlation with the bound and with the error.
+    """
+    rows = []
+    for index, name in _INDEX_NAMES.items():
+        row = {"index": name}
+        for robot in robots:
+            cell = observability[(observability.robot == robot) & (observability["index"] == index)].iloc[0]
+            for against in ("bound", "error"):
+                column = f"rank_correlation_with_{against}"
+                row[f"{robot} {against}"] = f"{cell[column]:+.2f} ± {cell[f'{column}_std_error']:.2f}"
+        rows.append(row)
+    return rows
+
+
+def summaries(ladder: pd.DataFrame, pairs: pd.DataFrame, observability: pd.DataFrame) -> dict[str, str]:
+    """What the tables say in a sentence each.
+
+    Parameters
+    ----------
+    ladder, pairs, observability : DataFrame
+        Tables of these names.
+
+    Returns
+    -------
+    dict
+        excess_median and excess_largest: percent by which cross-validation's choice leaves more than the best number of link
+        springs; sets, worse, least and largest: of the ratios to the first set of points at equal measurements, worse those
+        whose interval lies above one; best_index: the index whose correlation with the bound is most negative over the
+        robots; condition: that of O2.
+    """
+    excess = []
+    for _, cell in ladder.groupby(["robot", "noise_um", "length"]):
+        chosen = cell.link_springs == CHOSEN
+        excess.append(100 * (cell.rms_um[chosen].iloc[0] / cell.rms_um[~chosen].min() - 1))
+    correlation = observability[observability["index"] != "bound"].groupby("index").rank_correlation_with_bound.mean()
+    return {
+        "excess_median": f"{np.median(excess):.0f}" if excess else "",
+        "excess_largest": f"{max(excess):.0f}" if excess else "",
+        "sets": str(len(pairs)),
+        "worse": str(int((pairs.ratio_low > 1).sum())),
+        "least": f"{pairs.ratio.min():.2f}" if len(pairs) else "",
+        "largest": f"{pairs.ratio.max():.2f}" if len(pairs) else "",
+        "best_index": str(correlation.idxmin()),
+        "condition": f"{correlation['O2']:+.2f}",
+    }
+
+
+def _at(cell: pd.DataFrame, configurations: int) -> str:
+    if configurations not in cell.index:
+        return ""
+    found: Any = cell.loc[configurations]
+    return worded(found.rms_um, found.std_error_um)
+
+
+def _length(value: Any) -> str:
+    return "more than all" if np.isinf(value) else f"{value:.0f}"
+
+
+def _joints(joints: Sequence[int]) -> str:
+    numbers = [joint + 1 for joint in joints]
+    whole = numbers == list(range(numbers[0], numbers[-1] + 1)) and len(numbers) > 1
+    return f"c{numbers[0]}–c{numbers[-1]}" if whole else ", ".join(f"c{number}" for number in numbers)

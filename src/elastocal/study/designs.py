@@ -1,0 +1,83 @@
+"""How much chosen configurations are worth over random ones (RQ3).
+
+Candidates are random configurations with their loads; a design is some of them. Its worth is the Cramér-Rao bound of the RMS
+end-effector error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.planning.bound import best_value
+from elastocal.application.planning.criteria import CRITERIA, Criterion, criterion, mean_squares
+from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+RANDOM, CONTINUOUS = "random", "bound"
+# Random designs of each size.
+_RANDOM_DESIGNS = 400
+
+
+@dataclass(frozen=True)
+class Worth:
+    """RMS error that designs of one kind and size leave, m.
+
+    Attributes
+    ----------
+    kind : str
+        One of `CRITERIA`, `RANDOM` or `CONTINUOUS`.
+    configurations : int
+    rms : float
+        Of random designs, the root of the mean square.
+    low, high : float
+        5 and 95 % of random designs; else as `rms`.
+    """
+
+    kind: str
+    configurations: int
+    rms: float
+    low: float
+    high: float
+
+
+def worths(rows: np.ndarray, accuracy_rows: np.ndarray, sizes: Sequence[int], draws: np.random.Generator) -> list[Worth]:
+    """Random, chosen and best possible designs.
+
+    Parameters
+    ----------
+    rows : ndarray (N, rows, n)
+        Regressors of the candidates over the noise, in plausible sizes of the compliances.
+    accuracy_rows : ndarray (tests, 3, n)
+        Of the end-effector position where the robot shall be accurate, m per plausible size.
+    sizes : sequence of int
+        Configurations of a design.
+    draws : numpy.random.Generator
+
+    Returns
+    -------
+    list of Worth
+    """
+    weight = mean_squares(accuracy_rows)
+    exact = Criterion(weight)
+    found = []
+    for size in sizes:
+        random = np.array([_error(rows, draws.choice(len(rows), size, replace=False), exact) for _ in range(_RANDOM_DESIGNS)])
+        low, high = np.quantile(random, [0.05, 0.95])
+        found.append(Worth(RANDOM, size, float(np.sqrt((random**2).mean())), float(low), float(high)))
+        for kind in CRITERIA:
+            rule = criterion(kind, accuracy_rows)
+            chosen = exchanged(rows, greedy(rows, size, rule), rule)
+            error = _error(rows, chosen, exact)
+            found.append(Worth(kind, size, error, error, error))
+        least = float(np.sqrt(-best_value(rows, size, exact, chosen)))
+        found.append(Worth(CONTINUOUS, size, least, least, least))
+    return found
+
+
+def _error(rows: np.ndarray, chosen: np.ndarray | list[int], exact: Criterion) -> float:
+    return float(np.sqrt(-exact.value(matrix_of(rows, chosen))))

@@ -1,0 +1,184 @@
+"""How many springs pay: from elastic joints alone, link spring by link spring, up to the extended model (RQ1).
+
+A link spring is the compliance of a beam about its own axes: six diagonal elements and the two by which bending and lateral
+deflection go together. All of them enter linearly. Which link comes next, and where to stop, is chosen by cross-validation [1]_
+within each data set, by forward selection [2]_; configurations that neither has seen judge the result.
+
+References
+----------
+.. [1] Stone, M., Cross-validatory choice and assessment of statistical predictions, Journal of the Royal Statistical Society B
+   36, 1974.
+.. [2] Hastie, T., Tibshirani, R. and Friedman, J., The Elements of Statistical Learning, 2nd edition, sections 3.3 and 7.10,
+   Springer, 2009.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.mechanics.elastostatics import generalized_forces
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.links import beam_axes, extended_chain
+
+if TYPE_CHECKING:
+    from elastocal.mechanics.robot import Robot
+    from elastocal.study.experiments import Experiments
+
+# Elements of the compliance of a beam along x: (row, column) of those that are not zero, each with its mirror image.
+_ELEMENTS = ((0, 0), (1, 1), (2, 2), (3, 3), (4, 4), (5, 5), (1, 5), (2, 4))
+# Share of a column's squares that keeps normal equations well posed where springs do the same, as the torsion of the first link
+# and the first joint: what such springs predict together does not depend on it.
+_RIDGE = 1e-10
+
+
+@dataclass(frozen=True)
+class Products:
+    """Normal equations of some measurements, K columns.
+
+    Attributes
+    ----------
+    gram : ndarray (..., K, K)
+    along : ndarray (..., K)
+    squares : ndarray (...)
+    """
+
+    gram: np.ndarray
+    along: np.ndarray
+    squares: np.ndarray
+
+    def squared_error(self, coefficients: np.ndarray) -> np.ndarray:
+        """Sum of squares that coefficients (..., K) leave."""
+        quadratic = (coefficients * (self.gram @ coefficients[..., None])[..., 0]).sum(axis=-1)
+        return self.squares - 2.0 * (coefficients * self.along).sum(axis=-1) + quadratic
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """Models of each data set, from no link spring to all.
+
+    Attributes
+    ----------
+    order : ndarray of int (sets, L)
+        Links in the order in which they were added.
+    cross_validated : ndarray (sets, L + 1)
+        Sum of squares left in the folds that were left out.
+    coefficients : ndarray (sets, L + 1, K)
+        Of the model with so many links, fitted to the whole data set.
+    """
+
+    order: np.ndarray
+    cross_validated: np.ndarray
+    coefficients: np.ndarray
+
+    @property
+    def chosen(self) -> np.ndarray:
+        """Number of links by cross-validation, ndarray of int (sets,)."""
+        return np.argmin(self.cross_validated, axis=1)
+
+
+def spring_columns(robot: Robot, experiments: Experiments) -> np.ndarray:
+    """Deflection of the end-effector per unit of each spring element: joints first, then eight for each link.
+
+    Parameters
+    ----------
+    robot : Robot
+        With links.
+    experiments : Experiments
+
+    Returns
+    -------
+    ndarray (sets, configurations, 6, n + 8 L)
+    """
+    chain, n = extended_chain(robot), robot.joints
+    coordinates = np.zeros((*experiments.joint_angles.shape[:-1], chain.coordinates))
+    coordinates[..., :n] = experiments.joint_angles
+    jacobian = jacobians(chain, coordinates, chain.end_effector)
+    torques = generalized_forces(jacobian, experiments.wrench)
+    columns = [jacobian[..., :n] * torques[..., None, :n]]
+    for number, link in enumerate(robot.links):
+        axes, mine = beam_axes(link), slice(n + 6 * number, n + 6 * number + 6)
+        moved, forced = jacobian[..., mine] @ axes, torques[..., mine] @ axes
+        for i, j in _ELEMENTS:
+            column = moved[..., i] * forced[..., None, j]
+            columns.append((column if i == j else column + moved[..., j] * forced[..., None, i])[..., None])
+    return np.concatenate(columns, axis=-1)
+
+
+def products_of(columns: np.ndarray, deflection: np.ndarray) -> Products:
+    """Normal equations of each data set.
+
+    Parameters
+    ----------
+    columns : ndarray (sets, configurations, rows, K)
+    deflection : ndarray (sets, configurations, rows)
+
+    Returns
+    -------
+    Products
+        Of shape (sets,).
+    """
+    left = columns.reshape(len(columns), -1, columns.shape[-1])
+    right = deflection.reshape(len(deflection), -1)
+    across = left.swapaxes(1, 2)
+    return Products(across @ left, (across @ right[..., None])[..., 0], (right**2).sum(axis=1))
+
+
+def ladder(parts: list[Products], joints: int, links: int) -> Ladder:
+    """Add link springs one by one, in each data set that which cross-validation likes best.
+
+    Parameters
+    ----------
+    parts : list of Products
+        Of each fold, of shape (sets,).
+    joints, links : int
+
+    Returns
+    -------
+    Ladder
+    """
+    whole = Products(*(sum(getattr(part, name) for part in parts) for name in ("gram", "along", "squares")))
+    sets, size = whole.along.shape
+    each, elements = np.arange(sets), (size - joints) // links
+    columns = np.broadcast_to(np.arange(joints), (sets, joints))
+    left = np.broadcast_to(np.arange(links), (sets, links))
+    order = np.zeros((sets, 0), int)
+    scores, fits = [_left_out(parts, whole, columns)], [_fitted(whole, columns)]
+    for _ in range(links):
+        tried = [
+            np.concatenate([columns, _of_link(left[:, place], joints, elements)], axis=1) for place in range(left.shape[1])
+        ]
+        found = np.stack([_left_out(parts, whole, some) for some in tried], axis=1)
+        best = np.argmin(found, axis=1)
+        order = np.concatenate([order, left[each, best][:, None]], axis=1)
+        columns = np.stack(tried)[best, each]
+        left = left[np.arange(left.shape[1]) != best[:, None]].reshape(sets, -1)
+        scores.append(found[each, best])
+        fits.append(_fitted(whole, columns))
+    return Ladder(order, np.stack(scores, axis=1), np.stack(fits, axis=1))
+
+
+def _of_link(link: np.ndarray, joints: int, elements: int) -> np.ndarray:
+    return joints + elements * link[:, None] + np.arange(elements)
+
+
+def _left_out(parts: list[Products], whole: Products, columns: np.ndarray) -> np.ndarray:
+    """Sum of squares left in each fold by the fit to the others, (sets,)."""
+    total = np.zeros(len(columns))
+    for part in parts:
+        rest = Products(whole.gram - part.gram, whole.along - part.along, whole.squares - part.squares)
+        total += part.squared_error(_fitted(rest, columns))
+    return total
+
+
+def _fitted(products: Products, columns: np.ndarray) -> np.ndarray:
+    """Least squares with some columns of each data set, zero for the others, (sets, K)."""
+    each = np.arange(len(columns))[:, None]
+    gram = products.gram[each[..., None], columns[:, :, None], columns[:, None, :]]
+    scale = np.sqrt(np.diagonal(gram, axis1=1, axis2=2))
+    scaled = gram / (scale[:, :, None] * scale[:, None, :]) + _RIDGE * np.eye(columns.shape[1])
+    found = np.zeros_like(products.along)
+    found[each, columns] = np.linalg.solve(scaled, (products.along[each, columns] / scale)[..., None])[..., 0] / scale
+    return found

@@ -1,0 +1,127 @@
+"""The paper's printed figures against how studies of the same size scatter.
+
+The paper is one study. Where k studies of one size have a mean m and a standard deviation s, a further one lies at
+m + s sqrt(1 + 1/k) t, with t of Student's distribution with k - 1 degrees of freedom [1]_: its density at a printed figure is
+how well an interpretation predicts it, and its tails are the p value of the difference. Many figures are judged at once by
+Holm's procedure [2]_.
+
+References
+----------
+.. [1] Geisser, S., Predictive Inference: An Introduction, Chapman and Hall, 1993.
+.. [2] Holm, S., A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6, 1979.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import t as student
+from statsmodels.stats.multitest import multipletests
+
+from elastocal.study.metrics import length_to_reach
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+MICRO = 1e6
+# A figure differs from the study where its p value, corrected for all figures, is below this.
+LEVEL = 0.05
+# Last printed digit, by the first letters of a quantity.
+_DIGIT = {"c": 1e-3, "k_sigma": 1e-3, "dev_": 1e-3, "n_": 1.0}
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """How studies of one size scatter in one figure.
+
+    Attributes
+    ----------
+    values : ndarray (k,)
+        Of each study; lengths as logarithms.
+    logarithmic : bool
+    digit : float
+        Last printed one: a printed figure is rounded.
+    """
+
+    values: np.ndarray
+    logarithmic: bool
+    digit: float
+
+    @property
+    def mean(self) -> float:
+        """Mean, of lengths the geometric one."""
+        middle = float(self.values.mean())
+        return float(np.exp(middle)) if self.logarithmic else middle
+
+    @property
+    def std(self) -> float:
+        """Standard deviation between studies; of lengths in configurations."""
+        spread = float(self.values.std(ddof=1))
+        return spread * self.mean if self.logarithmic else spread
+
+    def p_value(self, printed: float) -> float:
+        """Two-sided, of a further study that lies so far out."""
+        standard, _ = self._standardized(printed)
+        return float(2 * student.sf(abs(standard), len(self.values) - 1))
+
+    def log_density(self, printed: float) -> float:
+        """Log predictive density of the printed figure; of lengths, of their logarithm."""
+        standard, scale = self._standardized(printed)
+        return float(student.logpdf(standard, len(self.values) - 1) - np.log(scale))
+
+    def _standardized(self, printed: float) -> tuple[float, float]:
+        digit, value = (self.digit / printed, np.log(printed)) if self.logarithmic else (self.digit, printed)
+        count = len(self.values)
+        variance = self.values.var(ddof=1) * (1 + 1 / count) + digit**2 / 12
+        return float((value - self.values.mean()) / np.sqrt(variance)), float(np.sqrt(variance))
+
+
+def predicted(
+    studies: pd.DataFrame, robot: str, strategy: str, quantity: str, length: int, first_stage: bool = True
+) -> Predicted | None:
+    """How one figure of Table 3 or 4 scatters between studies.
+
+    Parameters
+    ----------
+    studies : DataFrame
+        robot and the columns of `table_schemas.repeated`.
+    robot, strategy : str
+    quantity : str
+        c1.., k_sigma_20, dev_20, n_k_sigma_1_percent, n_dev_2_um: with its length or its limit.
+    length : int
+        Data set length of figures that name none.
+    first_stage : bool
+        Whether k_sigma counts the joints of the first stage alone (interpretation R10).
+
+    Returns
+    -------
+    Predicted or None
+        None where the studies do not have it.
+    """
+    rows = studies[(studies.robot == robot) & (studies.strategy == strategy)]
+    if rows.empty or not (quantity[1:].isdigit() or quantity.startswith(("k_sigma_", "dev_", "n_"))):
+        return None
+    digit = next(digit for start, digit in _DIGIT.items() if quantity.startswith(start))
+    column = "deviation" if "dev" in quantity else "k_sigma_first_stage" if first_stage else "k_sigma"
+    if not quantity.startswith("n_"):
+        place = int(quantity.rpartition("_")[2]) if "_" in quantity else length
+        column, scale = (f"compliance_{quantity[1:]}", MICRO) if quantity[1:].isdigit() else (column, _scale(column))
+        values = scale * rows.loc[rows.length == place, column].to_numpy()
+        return Predicted(values, False, digit) if len(values) > 1 else None
+    limit = float(quantity.split("_")[-2]) / _scale(column)
+    curves = rows.pivot(index="study", columns="length", values=column).to_numpy()
+    return Predicted(np.log(length_to_reach(curves, limit)), True, digit) if len(curves) > 1 else None
+
+
+def holm(p_values: np.ndarray) -> np.ndarray:
+    """p values corrected for their number, ndarray (N,); not a number where there is none."""
+    found, there = np.full(len(p_values), np.nan), ~np.isnan(p_values)
+    if there.any():
+        found[there] = multipletests(p_values[there], method="holm")[1]
+    return found
+
+
+def _scale(column: str) -> float:
+    return MICRO if column == "deviation" else 1.0

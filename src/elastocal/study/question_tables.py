@@ -1,0 +1,93 @@
+"""Tables of the research questions beyond the paper's strategies: springs that pay, designs, observability indices."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy.stats import spearmanr
+
+from elastocal.study.budget_tables import MICRO, root_mean
+from elastocal.study.observability import INDICES
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+CHOSEN = "by cross-validation"
+
+
+def ladder_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Error of one data set on configurations that it has not seen, by number of link springs.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The ladder table of each robot with links.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, noise_um, length, link_springs (a number, or `CHOSEN`), rms_um with its standard error, chosen_percent: share of
+        data sets in which cross-validation stops there, and usual_link: the link added most often at this step, from 1.
+    """
+    rows: list[dict[str, Any]] = []
+    for robot, frame in frames.items():
+        for noise, length in sorted(set(zip(frame.noise, frame.length, strict=True))):
+            cell = frame[(frame.noise == noise) & (frame.length == length)]
+            head = {"robot": robot, "noise_um": round(MICRO * noise, 6), "length": length}
+            steps = [(str(number), some) for number, some in cell.groupby("link_springs")]
+            for name, some in [*steps, (CHOSEN, cell[cell.chosen])]:
+                rms, error = root_mean(some.mean_square.to_numpy())
+                row: dict[str, Any] = {"link_springs": name, "rms_um": MICRO * rms, "rms_um_std_error": MICRO * error}
+                row["chosen_percent"] = 100 * some.chosen.mean() if name != CHOSEN else np.nan
+                row["usual_link"] = int(some.added_link.mode().iloc[0]) if name not in ("0", CHOSEN) else pd.NA
+                rows.append(head | row)
+    names = ("robot", "noise_um", "length", "link_springs", "rms_um", "rms_um_std_error", "chosen_percent", "usual_link")
+    return pd.DataFrame(rows, columns=[*names])
+
+
+def designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Random against optimal configurations.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The designs table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, design, configurations, rms_um, low_um and high_um: 5 and 95 % of random designs.
+    """
+    parts = []
+    for robot, frame in frames.items():
+        part = pd.DataFrame({"robot": robot, "design": frame.design, "configurations": frame.configurations})
+        parts.append(part.assign(**{f"{name}_um": MICRO * frame[name] for name in ("rms", "low", "high")}))
+    return pd.concat(parts, ignore_index=True)
+
+
+def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """How well an observability index of random configurations tells their worth, by rank correlation.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The observability table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, index (the bound among them), rank_correlation_with_bound and rank_correlation_with_error, each with its standard
+        error by a normal approximation; -1 where a larger index always means a smaller error.
+    """
+    rows = []
+    for robot, frame in frames.items():
+        for index in (*INDICES, "bound"):
+            row: dict[str, Any] = {"robot": robot, "index": index}
+            for name, against in (("bound", "bound"), ("error", "mean_square")):
+                found = float(spearmanr(frame[index], frame[against]).statistic)
+                row[f"rank_correlation_with_{name}"] = found
+                row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(len(frame) - 1)
+            rows.append(row)
+    return pd.DataFrame(rows)

@@ -1,0 +1,104 @@
+"""A study over again: the scores of all strategies from data sets that no other study has; nothing of these is kept.
+
+How far the scores of studies of one size lie apart tells how far a printed figure may lie from another one.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.study.evaluation import average
+from elastocal.study.identification import estimate_compliance, first_solvable_length
+from elastocal.study.metrics import k_sigma
+from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.in_memory import judge_of_study, measured
+from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from elastocal.mechanics.robot import Robot
+    from elastocal.study.interpretation import Interpretation, Size
+
+
+def repeated_blocks(
+    robot: Robot,
+    limits: np.ndarray,
+    key: str,
+    seed: int,
+    studies: Iterable[int],
+    strategies: Sequence[Strategy],
+    interpretation: Interpretation,
+    size: Size,
+) -> Iterator[dict[str, np.ndarray | str]]:
+    """Scores of studies.
+
+    Parameters
+    ----------
+    robot : Robot
+        With the offset of its targets.
+    limits : ndarray (n, 2)
+        Joint limits, rad.
+    key : str
+        Name of the robot's file.
+    seed : int
+    studies : iterable of int
+        Their numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
+        configurations of its own.
+    strategies : sequence of Strategy
+    interpretation : Interpretation
+    size : Size
+
+    Yields
+    ------
+    dict
+        Columns of one block of the repeated table: one strategy in one study.
+    """
+    for number in studies:
+        judge = judge_of_study(robot, limits, key, seed, number, interpretation, size)
+        # Strategies that are one estimator under equation 11 are worked out once.
+        stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
+        found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
+        for first in range(0, size.data_sets, SETS_PER_BLOCK):
+            sets = np.arange(first, min(first + SETS_PER_BLOCK, size.data_sets)) + number * size.data_sets
+            points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+            measurements = measured(robot, limits, key, seed, sets, points, interpretation, size)
+            for estimator in dict.fromkeys(stages.values()):
+                strategy = Strategy("", estimator)
+                compliance = estimate_compliance(strategy, measurements, robot.joints)[0]
+                compliance[: first_solvable_length(strategy, interpretation.rows) - 1] = np.nan
+                found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
+        for strategy in strategies:
+            blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[stages[strategy.name]])
+            averages = average(blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, size.tests)))
+            scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.first_stage_joints)
+            yield {**scores, "study": np.full(len(scores["length"]), number), "strategy": strategy.name}
+
+
+def score_columns(
+    compliance: np.ndarray, deviation: np.ndarray, robot: Robot, first_stage_joints: Sequence[int]
+) -> dict[str, np.ndarray]:
+    """Columns of the scores of an averaged model, one row for each length.
+
+    Parameters
+    ----------
+    compliance : ndarray (lengths, n)
+        rad/(N m).
+    deviation : ndarray (lengths,)
+        m.
+    robot : Robot
+    first_stage_joints : sequence of int
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
+    return {
+        "length": np.arange(1, len(compliance) + 1),
+        **{f"compliance_{j + 1}": compliance[:, j] for j in range(compliance.shape[1])},
+        "k_sigma": k_sigma(compliance, robot.compliance),
+        "k_sigma_first_stage": k_sigma(compliance, robot.compliance, list(first_stage_joints)),
+        "deviation": deviation,
+    }

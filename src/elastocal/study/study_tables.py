@@ -1,0 +1,138 @@
+"""Tables about many studies: expectations beside them, and what each interpretation of the paper's open points moves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+
+from elastocal.study.printed import LEVEL, MICRO, holm, predicted
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+# Quantities of the expectations table by the columns of scores, with the factor to their units.
+_QUANTITIES = {
+    "k_sigma_{}_percent": ("k_sigma", 1.0),
+    "k_sigma_{}_percent_first_stage": ("k_sigma_first_stage", 1.0),
+    "dev_{}_um": ("deviation", MICRO),
+}
+# Groups of printed figures by the start of their quantity.
+_GROUPS = {"c": "table_3", "k_sigma": "k_sigma", "dev_": "dev", "n_": "lengths"}
+
+
+def expectations_table(
+    studies: pd.DataFrame, expected: pd.DataFrame, reference: pd.DataFrame, length: int, strategies: Sequence[str]
+) -> pd.DataFrame:
+    """Expectation, further studies and the paper, side by side.
+
+    Parameters
+    ----------
+    studies : DataFrame
+        robot and the columns of `table_schemas.repeated`.
+    expected : DataFrame
+        Long, of `table_schemas.expected`, at the noise of the tables.
+    reference : DataFrame
+        The printed figures.
+    length : int
+        Data set length of the scores.
+    strategies : sequence of str
+        In the order of rows.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, strategy, quantity, expected, studies, studies_mean, studies_std, paper, p_value. Of the two counts of joints in
+        k_sigma, the paper's figure is taken for that of the first stage (interpretation R10).
+    """
+    printed = reference[reference.table == "4"].set_index(["robot", "strategy", "quantity"]).value
+    rows = []
+    for robot in dict.fromkeys(studies.robot):
+        for strategy in strategies:
+            mine = studies[(studies.robot == robot) & (studies.strategy == strategy) & (studies.length == length)]
+            there = (expected.robot == robot) & (expected.strategy == strategy) & (expected.length == length)
+            if mine.empty or not there.any():
+                continue
+            for name, (column, factor) in _QUANTITIES.items():
+                values = factor * mine[column]
+                row: dict[str, Any] = {"robot": robot, "strategy": strategy, "quantity": name.format(length)}
+                row["expected"] = factor * float(expected[there][column].iloc[0])
+                row |= {"studies": len(values), "studies_mean": values.mean(), "studies_std": values.std(ddof=1)}
+                cell = {"k_sigma_first_stage": f"k_sigma_{length}", "deviation": f"dev_{length}"}.get(column, "")
+                row["paper"] = float(printed.get((robot, strategy, cell), np.nan))
+                scatter = predicted(studies, robot, strategy, cell, length) if np.isfinite(row["paper"]) else None
+                row["p_value"] = scatter.p_value(row["paper"]) if scatter else np.nan
+                rows.append(row)
+    names = ["robot", "strategy", "quantity", "expected", "studies", "studies_mean", "studies_std", "paper", "p_value"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def interpretations_table(
+    studies: Mapping[str, pd.DataFrame], reference: pd.DataFrame, length: int, usual: str, classical: str
+) -> pd.DataFrame:
+    """What each interpretation moves, and how well it predicts the printed figures of Tables 3 and 4.
+
+    Parameters
+    ----------
+    studies : dict of str to DataFrame
+        By interpretation; robot and the columns of `table_schemas.repeated`.
+    reference : DataFrame
+        The printed figures.
+    length : int
+        Data set length of the tables.
+    usual : str
+        The interpretation as it is configured, among `studies`.
+    classical : str
+        Strategy whose scores are shown.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row for each interpretation, and one for the other count of joints in k_sigma (R10): the scores of the classical
+        strategy on each robot, mean over studies; the sum of log predictive densities of the printed figures over that of the
+        usual interpretation, in all (with its standard error) and by group; cells and how many of them differ after Holm's
+        correction. Figures of one robot move together, so that the sums order interpretations and are no probabilities.
+    """
+    printed = reference[reference.table.isin(["3", "4"])]
+    found = [(name, frame, True) for name, frame in studies.items()]
+    found.append(("R10_all_joints", studies[usual], False))
+    made = [_of_interpretation(name, frame, printed, length, first, classical) for name, frame, first in found]
+    base, base_deleted = made[[*studies].index(usual)]
+    rows = []
+    for row, deleted in made:
+        # Jackknife over studies, of which the interpretations have the same configurations and noise.
+        difference = deleted - base_deleted
+        error = np.sqrt((len(difference) - 1) * difference.var())
+        relative = {key: value - base[key] if key.startswith("log_") else value for key, value in row.items()}
+        rows.append(relative | {"log_likelihood_std_error": error})
+    return pd.DataFrame(rows)
+
+
+def _of_interpretation(
+    name: str, studies: pd.DataFrame, printed: pd.DataFrame, length: int, first_stage: bool, classical: str
+) -> tuple[dict[str, Any], np.ndarray]:
+    """The row of an interpretation, and its log likelihood without each of the studies."""
+    row: dict[str, Any] = {"interpretation": name}
+    for robot in dict.fromkeys(studies.robot):
+        at = studies[(studies.robot == robot) & (studies.strategy == classical) & (studies.length == length)]
+        row[f"k_sigma_{length}_percent_{robot}"] = at.k_sigma.mean()
+        row[f"dev_{length}_um_{robot}"] = MICRO * at.deviation.mean()
+    totals: dict[str, float] = dict.fromkeys(_GROUPS.values(), 0.0)
+    p_values, deleted = [], np.zeros(studies.study.nunique())
+    cells = printed[["robot", "strategy", "quantity"]].itertuples(index=False, name=None)
+    for (robot, strategy, quantity), value in zip(cells, printed.value, strict=True):
+        scatter = predicted(studies, robot, strategy, quantity, length, first_stage)
+        if scatter is not None:
+            group = next(group for start, group in _GROUPS.items() if quantity.startswith(start))
+            totals[group] += scatter.log_density(value)
+            p_values.append(scatter.p_value(value))
+            deleted += [replace(scatter, values=some).log_density(value) for some in _without_each(scatter.values)]
+    row |= {f"log_likelihood_{group}": value for group, value in totals.items()}
+    row["log_likelihood"] = sum(totals.values())
+    return row | {"cells": len(p_values), "differ": int((holm(np.array(p_values)) < LEVEL).sum())}, deleted
+
+
+def _without_each(values: np.ndarray) -> list[np.ndarray]:
+    return [np.delete(values, place) for place in range(len(values))]

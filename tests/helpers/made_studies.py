@@ -1,0 +1,31 @@
+"""Scores of further studies, made up, and a few from the study's own steps."""
+
+import pandas as pd
+from made_metrics import LENGTHS
+from made_study_blocks import PAPER
+
+from elastocal.study.interpretation import Interpretation, Size
+from elastocal.study.steps.repeat import repeated_blocks
+
+USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness", "averaged_model")
+SIZE = Size(data_sets=4, configurations=5, tests=30, noise=1e-5)
+
+
+def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
+    """Studies whose k_sigma and deviation fall as bias / length: percent and µm."""
+    parts = []
+    for number, bias in enumerate(biases, 1):
+        frame = pd.DataFrame({"robot": robot, "study": number, "strategy": strategy, "length": LENGTHS})
+        frame["k_sigma"], frame["k_sigma_first_stage"] = bias / LENGTHS, 0.5 * bias / LENGTHS
+        frame["deviation"], frame["compliance_1"] = 1e-6 * bias / LENGTHS, 1e-6 * bias
+        parts.append(frame)
+    return pd.concat(parts, ignore_index=True)
+
+
+def blocks_of(robot, strategies, interpretation=USUAL, size=SIZE, studies=(1, 2)):
+    return list(repeated_blocks(robot, robot.joint_limits, "kuka", 1, studies, strategies, interpretation, size))
+
+
+def few_of(robot, key="kuka"):
+    """Arguments of a step that draws its data sets itself: six of 20 configurations."""
+    return robot, robot.joint_limits, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5)

@@ -1,0 +1,58 @@
+"""Facts about the research questions follow from their tables, with their intervals."""
+
+import json
+
+from made_study_tables import designs, ladder, observability, pairs, question_facts
+
+from elastocal.report.question_answers import design_facts, ladder_rows, strategy_rows, summaries
+from elastocal.study.strategies import Stage, Strategy
+
+
+def test_facts_can_be_written_as_json():
+    assert json.loads(json.dumps(question_facts(), allow_nan=False)) == question_facts()
+
+
+def test_a_strategy_is_told_stage_by_stage_with_the_numbers_of_its_joints():
+    stages = (Stage(("3DoF", "6DoF"), (0, 1, 2)), Stage(("6DoF",), (3, 5), held=(0,)))
+    assert strategy_rows([Strategy("x", stages)]) == [
+        {"name": "x", "stages": "3DoF and 6DoF → c1–c3; then 6DoF → c4, c6, c1 held"}
+    ]
+
+
+def test_the_ladder_names_the_best_number_of_springs_beside_what_was_chosen():
+    (row,) = ladder_rows(ladder())
+    assert [*row.values()] == ["200", "20", "40.00 ± 0.50", "20.00 ± 0.40", "1", "22.00 ± 0.50"]
+
+
+def test_sets_of_points_have_both_budgets_and_a_ratio_where_they_are_compared():
+    first, second = question_facts()["budget"][:2]
+    assert [*first.values()] == ["kuka", "6DoF", "79.00 ± 0.50", "40", "52.00 ± 0.50", ""]
+    assert [*second.values()] == ["kuka", "3+6DoF", "57.00 ± 0.50", "20", "57.00 ± 0.50", "1.100 (1.050 to 1.150)"]
+
+
+def test_lengths_have_their_interval_and_say_where_they_are_not_reached():
+    kuka, fanuc = question_facts()["needed"]
+    assert [*kuka.values()] == ["kuka", "6DoF", "32 (30 to 34)", "32", "32"]
+    assert fanuc["configurations"] == "more than all (90 to more than all)"
+
+
+def test_designs_are_compared_at_the_size_nearest_to_the_length():
+    kuka = design_facts(designs(), 19, 60.0, {"kuka": "Kuka"})[0]
+    assert kuka == {
+        "title": "Kuka",
+        "length": "20",
+        "random": "80.0",
+        "chosen": "40.0",
+        "gain": "2.00",
+        "efficiency": "81",
+        "chosen_needed": "20",
+    }
+    assert design_facts(designs(), 20, 1.0, {"kuka": "Kuka"})[0]["chosen_needed"] == "more than all"
+
+
+def test_summaries_count_what_is_certain():
+    found = summaries(ladder(), pairs(), observability())
+    assert (found["excess_median"], found["excess_largest"]) == ("10", "10")
+    # The interval of the second ratio holds one.
+    assert (found["sets"], found["worse"], found["least"], found["largest"]) == ("2", "1", "1.03", "1.10")
+    assert (found["best_index"], found["condition"]) == ("O1", "+0.30")

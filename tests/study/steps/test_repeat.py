@@ -1,0 +1,52 @@
+"""Further studies in memory: the same scores as the pipeline's steps give from the same data sets."""
+
+import numpy as np
+import pytest
+from made_studies import blocks_of
+from made_study_blocks import OFFSET, PAPER, deflections_of, evaluated_in_one_block, experiments_of, identified, judge
+
+from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.interpretation import Interpretation
+
+
+@pytest.fixture(scope="module")
+def some(strategies):
+    return [strategies[name] for name in ("6DoF", "6DoF-after-3DoF", "4-6DoF-after-3DoF")]
+
+
+def test_each_study_has_a_block_for_each_strategy(kuka, some):
+    blocks = blocks_of(kuka, some)
+    names = [strategy.name for strategy in some]
+    assert [(block["study"][0], block["strategy"]) for block in blocks] == [(n, name) for n in (1, 2) for name in names]
+    assert (blocks[0]["length"] == np.arange(1, 6)).all()
+
+
+def test_studies_differ_and_a_study_does_not_depend_on_how_many_there_are(kuka, some):
+    few, many = blocks_of(kuka, some, studies=[1]), blocks_of(kuka, some, studies=[1, 2])
+    for one, same, other in zip(few, many[:3], many[3:], strict=True):
+        np.testing.assert_array_equal(one["deviation"], same["deviation"])
+        assert (same["deviation"] != other["deviation"]).all()
+
+
+@pytest.mark.parametrize("average", ["stiffness", "compliance", "median"])
+def test_scores_are_those_of_the_pipeline_for_the_same_data_sets(kuka, some, average):
+    """Study number 0, which is that of the pipeline."""
+    found = blocks_of(kuka, some, Interpretation(PAPER, 6, "end_effector", average, "averaged_model"), studies=[0])
+    experiments = experiments_of(kuka, sets=4, configurations=5)
+    deflections, scores = deflections_of(kuka, experiments, 1e-5), judge(kuka)
+    for strategy, block in zip(some, found, strict=True):
+        table = identified(kuka, strategy, experiments, deflections)
+        metrics = evaluated_in_one_block(table, scores, strategy.first_stage_joints, average, 10, [5])[0]
+        for name in ("compliance_1", "compliance_6", "k_sigma", "k_sigma_first_stage", "deviation"):
+            np.testing.assert_allclose(block[name][1:], metrics[name][1:], rtol=1e-6, err_msg=name)
+
+
+def test_lengths_that_do_not_determine_the_compliances_have_no_scores(kuka, some):
+    # Positions of a target off the last axis, so that joint 6 moves it.
+    block = blocks_of(
+        with_target_offset(kuka, OFFSET),
+        some[:1],
+        Interpretation(PAPER, 3, "end_effector", "stiffness", "averaged_model"),
+        studies=[1],
+    )[0]
+    assert np.isnan(block["deviation"][0]) and np.isfinite(block["deviation"][-1])

@@ -1,0 +1,44 @@
+"""Tables of the research questions, by hand."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from elastocal.study.question_tables import CHOSEN, designs_table, ladder_table, observability_table
+
+
+def ladder_frame():
+    """Two data sets: errors of 4 and 2 µm without springs, 1 and 3 with one; the first stops at one, the second at none."""
+    rows = [(200e-6, 10, 0, 0, 0, False, 16e-12), (200e-6, 10, 0, 1, 3, True, 1e-12)]
+    rows += [(200e-6, 10, 1, 0, 0, True, 4e-12), (200e-6, 10, 1, 1, 3, False, 9e-12)]
+    return pd.DataFrame(rows, columns=["noise", "length", "data_set", "link_springs", "added_link", "chosen", "mean_square"])
+
+
+def test_the_ladder_has_a_row_for_each_number_of_springs_and_one_for_what_was_chosen():
+    table = ladder_table({"arm": ladder_frame()})
+    assert table.link_springs.tolist() == ["0", "1", CHOSEN]
+    assert table.rms_um.tolist() == pytest.approx([np.sqrt(10), np.sqrt(5), np.sqrt(2.5)])
+    assert table.chosen_percent.tolist()[:2] == [50, 50] and np.isnan(table.chosen_percent[2])
+    assert table.usual_link[1] == 3 and table.usual_link.isna().tolist() == [True, False, True]
+    assert table.noise_um.tolist() == [200.0] * 3
+
+
+def test_without_a_robot_with_links_the_ladder_is_empty():
+    assert ladder_table({}).empty and "rms_um" in ladder_table({})
+
+
+def test_designs_are_in_micrometres():
+    frame = pd.DataFrame({"design": ["D"], "configurations": [4], "rms": [8e-5], "low": [7e-5], "high": [9e-5]})
+    assert designs_table({"arm": frame}).iloc[0].tolist() == pytest.approx(["arm", "D", 4, 80.0, 70.0, 90.0])
+
+
+def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_one():
+    rng = np.random.default_rng(1)
+    bound = rng.uniform(1, 2, 400)
+    frame = pd.DataFrame({f"O{number}": rng.uniform(size=400) for number in range(1, 6)})
+    frame = frame.assign(O1=1 / bound, bound=bound, mean_square=bound * rng.chisquare(3, 400))
+    table = observability_table({"arm": frame}).set_index("index")
+    assert table.rank_correlation_with_bound["O1"] == pytest.approx(-1.0)
+    # Unrelated: within four standard errors of nothing.
+    assert abs(table.rank_correlation_with_bound["O2"]) < 4 * table.rank_correlation_with_bound_std_error["O2"]
+    assert table.rank_correlation_with_error["bound"] == pytest.approx(-table.rank_correlation_with_error["O1"])

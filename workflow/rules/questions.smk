@@ -1,0 +1,162 @@
+"""Research questions beyond the paper's strategies: which points (RQ2), how many springs (RQ1), which configurations (RQ3).
+
+Needs nothing but the configuration: the data sets are those of the study, drawn again in memory. Writes
+results/budget/{robot}.parquet, results/ladder/, results/designs/ and results/observability/ alike, and reports/tables/budget.csv,
+budget_pairs.csv, configurations_needed.csv, ladder.csv, designs.csv and observability.csv.
+"""
+
+QUESTIONS = config["questions"]
+
+
+rule compare_point_sets:
+    input:
+        sources=sources("compare_point_sets.py"),
+    output:
+        budget="results/budget/{robot}.parquet",
+    log:
+        "results/logs/compare_point_sets/{robot}.log",
+    benchmark:
+        "results/timings/compare_point_sets/{robot}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        loading=loading_of(INTERPRETATIONS),
+        interpretation=conventions_of(INTERPRETATIONS),
+        point_sets=QUESTIONS["point_sets"],
+        size=STUDY_SIZE,
+    script:
+        "../scripts/compare_point_sets.py"
+
+
+rule climb_ladder:
+    input:
+        sources=sources("climb_ladder.py"),
+    output:
+        ladder="results/ladder/{robot}.parquet",
+    log:
+        "results/logs/climb_ladder/{robot}.log",
+    benchmark:
+        "results/timings/climb_ladder/{robot}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        loading=loading_of(INTERPRETATIONS),
+        interpretation=conventions_of(INTERPRETATIONS),
+        lengths=QUESTIONS["ladder_lengths"],
+        noises=[1e-6 * noise for noise in QUESTIONS["ladder_noise_um"]],
+        size=STUDY_SIZE,
+    script:
+        "../scripts/climb_ladder.py"
+
+
+rule choose_designs:
+    input:
+        sources=sources("choose_designs.py"),
+    output:
+        designs="results/designs/{robot}.parquet",
+    log:
+        "results/logs/choose_designs/{robot}.log",
+    benchmark:
+        "results/timings/choose_designs/{robot}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        loading=loading_of(INTERPRETATIONS),
+        interpretation=conventions_of(INTERPRETATIONS),
+        candidates=QUESTIONS["candidates"],
+        sizes=QUESTIONS["design_sizes"],
+        size=STUDY_SIZE,
+    script:
+        "../scripts/choose_designs.py"
+
+
+rule index_observability:
+    input:
+        sources=sources("index_observability.py"),
+    output:
+        observability="results/observability/{robot}.parquet",
+    log:
+        "results/logs/index_observability/{robot}.log",
+    benchmark:
+        "results/timings/index_observability/{robot}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        loading=loading_of(INTERPRETATIONS),
+        interpretation=conventions_of(INTERPRETATIONS),
+        size=STUDY_SIZE | {"configurations": config["tables"]["length"]},
+    script:
+        "../scripts/index_observability.py"
+
+
+rule tabulate_budget:
+    input:
+        budgets=expand(rules.compare_point_sets.output.budget, robot=REDUCED),
+        sources=sources("tabulate_budget.py"),
+    output:
+        budget="reports/tables/budget.csv",
+        pairs="reports/tables/budget_pairs.csv",
+        lengths="reports/tables/configurations_needed.csv",
+    log:
+        "results/logs/tabulate_budget.log",
+    benchmark:
+        "results/timings/tabulate_budget.tsv"
+    params:
+        robots=REDUCED,
+        point_sets=QUESTIONS["point_sets"],
+        accuracies_um=QUESTIONS["accuracies_um"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/tabulate_budget.py"
+
+
+rule tabulate_ladder:
+    input:
+        ladders=expand(rules.climb_ladder.output.ladder, robot=EXTENDED),
+        sources=sources("tabulate_ladder.py"),
+    output:
+        table="reports/tables/ladder.csv",
+    log:
+        "results/logs/tabulate_ladder.log",
+    benchmark:
+        "results/timings/tabulate_ladder.tsv"
+    params:
+        robots=EXTENDED,
+    script:
+        "../scripts/tabulate_ladder.py"
+
+
+rule tabulate_designs:
+    input:
+        designs=expand(rules.choose_designs.output.designs, robot=REDUCED),
+        sources=sources("tabulate_designs.py"),
+    output:
+        table="reports/tables/designs.csv",
+    log:
+        "results/logs/tabulate_designs.log",
+    benchmark:
+        "results/timings/tabulate_designs.tsv"
+    params:
+        robots=REDUCED,
+    script:
+        "../scripts/tabulate_designs.py"
+
+
+rule tabulate_observability:
+    input:
+        observabilities=expand(rules.index_observability.output.observability, robot=REDUCED),
+        sources=sources("tabulate_observability.py"),
+    output:
+        table="reports/tables/observability.csv",
+    log:
+        "results/logs/tabulate_observability.log",
+    benchmark:
+        "results/timings/tabulate_observability.tsv"
+    params:
+        robots=REDUCED,
+    script:
+        "../scripts/tabulate_observability.py"

@@ -1,0 +1,97 @@
+"""Studies over again: how far apart two studies of one size lie, what is expected of them, and other interpretations.
+
+Needs results/design/, results/metrics/ and the test configurations. Writes results/studies/{interpretation}/{robot}.parquet,
+results/expected/{robot}/{noise}um/{strategy}.parquet, reports/tables/expectations.csv and, for the target extended_study,
+reports/tables/interpretations.csv.
+"""
+
+
+rule repeat_studies:
+    input:
+        sources=sources("repeat_studies.py"),
+    output:
+        repeated="results/studies/{interpretation}/{robot}.parquet",
+    log:
+        "results/logs/repeat_studies/{interpretation}/{robot}.log",
+    benchmark:
+        "results/timings/repeat_studies/{interpretation}/{robot}.tsv"
+    wildcard_constraints:
+        interpretation="|".join([USUAL, *config["switched"]]),
+    params:
+        robot=robot_document,
+        strategies=list(STUDY.strategies.values()),
+        seed=config["seed"],
+        studies=config["evaluation"]["studies"],
+        tool_offset_m=lambda wildcards: interpretation(wildcards)["tool_offset_m"],
+        loading=lambda wildcards: loading_of(interpretation(wildcards)),
+        interpretation=lambda wildcards: conventions_of(interpretation(wildcards)),
+        size=STUDY_SIZE,
+    script:
+        "../scripts/repeat_studies.py"
+
+
+rule expect:
+    input:
+        unpack(
+            lambda wildcards: (
+                {"noise_free": f"results/metrics/{wildcards.robot}/0um/{wildcards.strategy}.parquet"} if "0" in NOISE else {}
+            )
+        ),
+        design="results/design/{robot}/{strategy}.parquet",
+        test_experiments="data/simulated/{robot}/test/experiments.parquet",
+        test_ideal="data/simulated/{robot}/test/ideal.parquet",
+        sources=sources("expect.py"),
+    output:
+        expected="results/expected/{robot}/{noise}um/{strategy}.parquet",
+    log:
+        "results/logs/expect/{robot}/{noise}um/{strategy}.log",
+    benchmark:
+        "results/timings/expect/{robot}/{noise}um/{strategy}.tsv"
+    params:
+        robot=robot_document,
+        strategy=strategy_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        wrench_at=INTERPRETATIONS["wrench_at"],
+        average=INTERPRETATIONS["average"],
+        deviation_of=INTERPRETATIONS["deviation_of"],
+    script:
+        "../scripts/expect.py"
+
+
+rule tabulate_expectations:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
+        expected=cells("expected", REDUCED, TABLE_NOISE),
+        reference="config/paper/reference.csv",
+        sources=sources("tabulate_expectations.py"),
+    output:
+        table="reports/tables/expectations.csv",
+    log:
+        "results/logs/tabulate_expectations.log",
+    benchmark:
+        "results/timings/tabulate_expectations.tsv"
+    params:
+        length=config["tables"]["length"],
+        strategies=list(NAMES.values()),
+    script:
+        "../scripts/tabulate_expectations.py"
+
+
+rule tabulate_interpretations:
+    input:
+        studies=expand(rules.repeat_studies.output.repeated, interpretation=[USUAL, *config["switched"]], robot=REDUCED),
+        reference="config/paper/reference.csv",
+        sources=sources("tabulate_interpretations.py"),
+    output:
+        table="reports/tables/interpretations.csv",
+    log:
+        "results/logs/tabulate_interpretations.log",
+    benchmark:
+        "results/timings/tabulate_interpretations.tsv"
+    params:
+        length=config["tables"]["length"],
+        usual=USUAL,
+        classical=NAMES[CLASSICAL],
+    script:
+        "../scripts/tabulate_interpretations.py"

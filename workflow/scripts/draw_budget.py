@@ -1,0 +1,15 @@
+"""Sets of measuring points at an equal budget."""
+
+import pandas as pd
+
+from elastocal.figures.questions import budget
+from elastocal.figures.style import save
+
+from job import Job, run
+
+
+def draw_budget(job: Job) -> None:
+    save(budget(pd.read_csv(job.input.table), job.params.titles, job.params.length), job.output.pdf, job.output.png)
+
+
+run(draw_budget, snakemake)

@@ -1,0 +1,15 @@
+"""Error of one data set by number of link springs."""
+
+import pandas as pd
+
+from elastocal.figures.questions import ladder
+from elastocal.figures.style import save
+
+from job import Job, run
+
+
+def draw_ladder(job: Job) -> None:
+    save(ladder(pd.read_csv(job.input.table)), job.output.pdf, job.output.png)
+
+
+run(draw_ladder, snakemake)
