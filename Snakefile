@@ -33,6 +33,7 @@ rule study:
         expand("reports/tables/table{number}.{format}", number=[1, 2, 3, 4], format=["csv", "md", "tex"]),
         expand("reports/tables/{table}.csv", table=["comparison", "expectations", "extended", "per_dataset", "solvers"]),
         rules.tabulate_budget.output,
+        rules.tabulate_assumptions.output,
         expand("reports/tables/{table}.csv", table=["ladder", "designs", "observability"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
 

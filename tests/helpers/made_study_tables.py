@@ -7,11 +7,13 @@ from elastocal.report.answers import answers
 from elastocal.report.question_answers import (
     budget_rows,
     design_facts,
+    geometry_rows,
     ladder_rows,
     needed_rows,
     observability_rows,
     strategy_rows,
     summaries,
+    weighting_rows,
 )
 from elastocal.study.strategies import Stage, Strategy
 
@@ -129,6 +131,19 @@ def observability():
     return frame
 
 
+def geometry():
+    row = {"robot": "kuka", "estimator": "at once", "rms_um": 500.0, "noise_um": 300.0, "leak_um": 400.0}
+    row |= {"compliance_noise_percent": 8.2, "compliance_leak_percent": 70.3, "zero_noise_urad": 31.6, "zero_leak_urad": 0.0}
+    return pd.DataFrame([row])
+
+
+def weighting():
+    return pd.DataFrame(
+        [("kuka", 3.0, 50.0, 150.0, 100.0, 1.5)],
+        columns=["robot", "orientation_ratio", "per_metre_um", "equal_um", "weighted_um", "ratio"],
+    )
+
+
 def question_facts():
     """Facts of the research questions from these tables."""
     robots = [*TITLES]
@@ -141,6 +156,8 @@ def question_facts():
         "designs": design_facts(designs(), 20, 60.0, TITLES),
         "observability": observability_rows(observability(), robots),
         "summaries": summaries(ladder(), pairs(), observability()),
+        "geometry": geometry_rows(geometry(), robots),
+        "weighting": weighting_rows(weighting(), robots),
         "titles": TITLES,
         "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
     }

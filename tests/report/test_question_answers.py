@@ -56,3 +56,9 @@ def test_summaries_count_what_is_certain():
     # The interval of the second ratio holds one.
     assert (found["sets"], found["worse"], found["least"], found["largest"]) == ("2", "1", "1.03", "1.10")
     assert (found["best_index"], found["condition"]) == ("O1", "+0.30")
+
+
+def test_assumptions_are_worded_with_noise_and_leak():
+    found = question_facts()
+    assert [*found["geometry"][0].values()] == ["kuka", "at once", "500", "300", "400", "8.2; 70", "32; 0"]
+    assert [*found["weighting"][0].values()] == ["kuka", "3", "50", "150.0", "100.0", "1.50"]

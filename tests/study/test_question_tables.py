@@ -4,7 +4,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from elastocal.study.question_tables import CHOSEN, designs_table, ladder_table, observability_table
+from elastocal.study.question_tables import (
+    CHOSEN,
+    designs_table,
+    geometry_table,
+    ladder_table,
+    observability_table,
+    weighting_table,
+)
 
 
 def ladder_frame():
@@ -42,3 +49,16 @@ def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_o
     # Unrelated: within four standard errors of nothing.
     assert abs(table.rank_correlation_with_bound["O2"]) < 4 * table.rank_correlation_with_bound_std_error["O2"]
     assert table.rank_correlation_with_error["bound"] == pytest.approx(-table.rank_correlation_with_error["O1"])
+
+
+def test_noise_and_leak_add_as_squares_and_have_units_for_people():
+    names = ["noise", "leak", "compliance_noise", "compliance_leak", "zero_noise", "zero_leak"]
+    frame = pd.DataFrame([("at once", 3e-4, 4e-4, 8.0, 1.0, 3e-5, 1e-3)], columns=["estimator", *names])
+    found = geometry_table({"arm": frame}).iloc[0].tolist()
+    assert found[:2] == ["arm", "at once"] and found[2:] == pytest.approx([500, 300, 400, 8, 1, 30, 1000])
+
+
+def test_weights_are_compared_by_a_ratio():
+    frame = pd.DataFrame({"orientation_ratio": [3.0], "per_metre": [5e-5], "equal": [1.5e-4], "weighted": [1e-4]})
+    found = weighting_table({"arm": frame}).iloc[0].tolist()
+    assert found[0] == "arm" and found[1:] == pytest.approx([3, 50, 150, 100, 1.5])

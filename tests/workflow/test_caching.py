@@ -28,7 +28,14 @@ PER_DATA_SET = {("tabulate_accuracy",), ("draw_bias_and_accuracy",), ("draw_accu
 REPEATED = {("repeat_studies", "as_configured", "kuka"), ("tabulate_expectations",)}
 ASKED = (
     *("repeat_studies", "compare_point_sets", "climb_ladder", "choose_designs", "index_observability"),
-    *("tabulate_budget", "tabulate_ladder", "tabulate_designs", "tabulate_observability"),
+    *(
+        "vary_assumptions",
+        "tabulate_assumptions",
+        "tabulate_budget",
+        "tabulate_ladder",
+        "tabulate_designs",
+        "tabulate_observability",
+    ),
 )
 COMPARED_STRATEGIES = {
     ("compare_solvers", "kuka"),
@@ -118,7 +125,7 @@ def test_another_noise_level_runs_that_level(finished):
     finished.configure({"noise_um": [200, 50]})
     expected = jobs("measure", ROBOTS, ["50"]) | identified_and_evaluated(noise=["50"])
     # Without a level without noise the expectations leave the linearisation out.
-    expected |= jobs("expect", ["kuka"], ["200"], STRATEGIES) | {("tabulate_expectations",)}
+    expected |= jobs("expect", ["kuka"], ["200"], STRATEGIES) | {("tabulate_expectations",), ("draw_scores",)}
     assert finished.planned() == expected | {("draw_noise_impact",)} | PER_DATA_SET | REPORT
 
 
@@ -135,7 +142,7 @@ def test_the_compliance_of_a_robot_reruns_that_robot(finished):
         | {("tabulate_initial",), ("typeset_table", "table2"), ("draw_table2_samples",)}
         | {("tabulate_extended",), ("compare_with_paper",), ("draw_scores",)}
         | jobs("climb_ladder", robot)
-        | {("tabulate_ladder",)}
+        | {("tabulate_ladder",), ("draw_ladder",)}
     )
     assert finished.planned() == expected | PER_DATA_SET | REPORT
 
@@ -155,7 +162,7 @@ def test_more_data_sets_rerun_their_draws_but_not_those_of_the_test(finished, ev
 
 def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
     finished.append("src/elastocal/study/bounds.py", "# an edit\n")
-    asked = jobs("compare_point_sets", ["kuka"]) | {("tabulate_budget",)}
+    asked = jobs("compare_point_sets", ["kuka"]) | {("tabulate_budget",), ("draw_budget",)}
     asked |= jobs("index_observability", ["kuka"]) | {("tabulate_observability",)}
     assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | asked | REPORT
 
@@ -187,8 +194,6 @@ def test_an_edit_of_gauss_newton_reruns_both_solvers_and_what_follows(finished, 
         "tabulate_initial",
         "draw_table2_samples",
         "draw_scheme",
-        "expect",
-        "tabulate_expectations",
         *ASKED,
     ) | jobs("typeset_table", ["table1", "table2"])
     untouched |= of_the_loop(every_job)
@@ -208,13 +213,16 @@ def test_an_edit_of_the_metrics_leaves_data_and_estimates(finished, every_job):
         "identify",
         "compare_solvers",
         "draw_scheme",
+        # Of closed forms, and of least squares of their own.
+        *("climb_ladder", "tabulate_ladder", "draw_ladder", "choose_designs", "tabulate_designs", "draw_designs"),
+        *("vary_assumptions", "tabulate_assumptions"),
     )
     untouched |= of_the_loop(every_job)
     assert finished.planned() == every_job - untouched
 
 
 def test_an_edit_of_a_script_reruns_its_jobs(finished):
-    finished.replace("workflow/scripts/draw_scores.py", '"""Distance', '"""The distance')
+    finished.replace("workflow/scripts/draw_scores.py", '"""The paper', '"""Of the paper')
     assert finished.planned() == {("draw_scores",), ("compile_report",), ("all",)}
 
 

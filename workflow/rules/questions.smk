@@ -2,7 +2,7 @@
 
 Needs nothing but the configuration: the data sets are those of the study, drawn again in memory. Writes
 results/budget/{robot}.parquet, results/ladder/, results/designs/ and results/observability/ alike, and reports/tables/budget.csv,
-budget_pairs.csv, configurations_needed.csv, ladder.csv, designs.csv and observability.csv.
+budget_pairs.csv, configurations_needed.csv, ladder.csv, designs.csv, observability.csv, geometry.csv and weighting.csv.
 """
 
 QUESTIONS = config["questions"]
@@ -160,3 +160,44 @@ rule tabulate_observability:
         robots=REDUCED,
     script:
         "../scripts/tabulate_observability.py"
+
+
+rule vary_assumptions:
+    input:
+        sources=sources("vary_assumptions.py"),
+    output:
+        geometry="results/geometry/{robot}.parquet",
+        weighting="results/weighting/{robot}.parquet",
+    log:
+        "results/logs/vary_assumptions/{robot}.log",
+    benchmark:
+        "results/timings/vary_assumptions/{robot}.tsv"
+    params:
+        robot=robot_document,
+        seed=config["seed"],
+        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
+        loading=loading_of(INTERPRETATIONS),
+        interpretation=conventions_of(INTERPRETATIONS),
+        geometry=QUESTIONS["geometry_errors"],
+        weighting=QUESTIONS["unequal_noise"],
+        size=STUDY_SIZE | {"configurations": config["tables"]["length"]},
+    script:
+        "../scripts/vary_assumptions.py"
+
+
+rule tabulate_assumptions:
+    input:
+        geometries=expand(rules.vary_assumptions.output.geometry, robot=REDUCED),
+        weightings=expand(rules.vary_assumptions.output.weighting, robot=REDUCED),
+        sources=sources("tabulate_assumptions.py"),
+    output:
+        geometry="reports/tables/geometry.csv",
+        weighting="reports/tables/weighting.csv",
+    log:
+        "results/logs/tabulate_assumptions.log",
+    benchmark:
+        "results/timings/tabulate_assumptions.tsv"
+    params:
+        robots=REDUCED,
+    script:
+        "../scripts/tabulate_assumptions.py"

@@ -14,6 +14,8 @@ rule state_answers:
         needed=rules.tabulate_budget.output.lengths,
         designs=rules.tabulate_designs.output.table,
         observability=rules.tabulate_observability.output.table,
+        geometry=rules.tabulate_assumptions.output.geometry,
+        weighting=rules.tabulate_assumptions.output.weighting,
         table2=rules.tabulate_initial.output.table,
         per_dataset=rules.tabulate_accuracy.output.table,
         extended=rules.tabulate_extended.output.table,

@@ -10,11 +10,13 @@ from elastocal.report.answers import answers
 from elastocal.report.question_answers import (
     budget_rows,
     design_facts,
+    geometry_rows,
     ladder_rows,
     needed_rows,
     observability_rows,
     strategy_rows,
     summaries,
+    weighting_rows,
 )
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import REPLICATES, metrics
@@ -48,6 +50,8 @@ def state_answers(job: Job) -> None:
         "designs": design_facts(pd.read_csv(job.input.designs), length, accuracy, titles),
         "observability": observability_rows(observability, [*titles]),
         "summaries": summaries(ladder, pairs, observability),
+        "geometry": geometry_rows(pd.read_csv(job.input.geometry), [*titles]),
+        "weighting": weighting_rows(pd.read_csv(job.input.weighting), [*titles]),
         "titles": titles,
         "size": {name: f"{value:g}" for name, value in settings.size.items()},
     }

@@ -206,6 +206,65 @@ def observability_rows(observability: pd.DataFrame, robots: Iterable[str]) -> li
     return rows
 
 
+def geometry_rows(geometry: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
+    """Estimators of geometry and compliances.
+
+    Parameters
+    ----------
+    geometry : DataFrame
+        From `question_tables.geometry_table`.
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        robot, estimator, rms, noise, leak, compliance and zero: noise and leak.
+    """
+    rows = []
+    for row in geometry[geometry.robot.isin([*robots])].itertuples():
+        rows.append(
+            {
+                "robot": str(row.robot),
+                "estimator": str(row.estimator),
+                "rms": f"{row.rms_um:.0f}",
+                "noise": f"{row.noise_um:.0f}",
+                "leak": f"{row.leak_um:.0f}",
+                "compliance": f"{row.compliance_noise_percent:.1f}; {row.compliance_leak_percent:.0f}",
+                "zero": f"{row.zero_noise_urad:.0f}; {row.zero_leak_urad:.0f}",
+            }
+        )
+    return rows
+
+
+def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
+    """What equal weights cost.
+
+    Parameters
+    ----------
+    weighting : DataFrame
+        From `question_tables.weighting_table`.
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        robot, orientation, range, equal, weighted, ratio.
+    """
+    rows = []
+    for row in weighting[weighting.robot.isin([*robots])].itertuples():
+        rows.append(
+            {
+                "robot": str(row.robot),
+                "orientation": f"{row.orientation_ratio:g}",
+                "range": f"{row.per_metre_um:g}",
+                "equal": f"{row.equal_um:.1f}",
+                "weighted": f"{row.weighted_um:.1f}",
+                "ratio": f"{row.ratio:.2f}",
+            }
+        )
+    return rows
+
+
 def summaries(ladder: pd.DataFrame, pairs: pd.DataFrame, observability: pd.DataFrame) -> dict[str, str]:
     """What the tables say in a sentence each.
 

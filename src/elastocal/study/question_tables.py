@@ -91,3 +91,52 @@ def observability_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
                 row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(len(frame) - 1)
             rows.append(row)
     return pd.DataFrame(rows)
+
+
+def geometry_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Geometry and compliances together, one after the other, or alone.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The geometry table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, estimator, rms_um and its parts noise_um and leak_um, compliance_noise_percent, compliance_leak_percent,
+        zero_noise_urad, zero_leak_urad.
+    """
+    parts = []
+    for robot, frame in frames.items():
+        part = pd.DataFrame({"robot": robot, "estimator": frame.estimator})
+        part["rms_um"] = MICRO * np.hypot(frame.noise, frame.leak)
+        part["noise_um"], part["leak_um"] = MICRO * frame.noise, MICRO * frame.leak
+        for name in ("compliance_noise", "compliance_leak"):
+            part[f"{name}_percent"] = frame[name]
+        for name in ("zero_noise", "zero_leak"):
+            part[f"{name}_urad"] = MICRO * frame[name]
+        parts.append(part)
+    return pd.concat(parts, ignore_index=True)
+
+
+def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """What equal weights cost.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The weighting table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, orientation_ratio, per_metre_um, equal_um, weighted_um, ratio.
+    """
+    parts = []
+    for robot, frame in frames.items():
+        part = pd.DataFrame({"robot": robot, "orientation_ratio": frame.orientation_ratio})
+        for name in ("per_metre", "equal", "weighted"):
+            part[f"{name}_um"] = MICRO * frame[name]
+        parts.append(part.assign(ratio=frame.equal / frame.weighted))
+    return pd.concat(parts, ignore_index=True)

@@ -150,6 +150,30 @@ OBSERVABILITY = TableSchema(
 )
 
 
+GEOMETRY = TableSchema(
+    "geometry",
+    (
+        Column("estimator", "text", "", "what is identified from which poses"),
+        Column("noise", "float64", "m", "RMS error of the loaded position by noise"),
+        Column("leak", "float64", "m", "RMS error of the loaded position by what the estimator leaves out"),
+        Column("compliance_noise", "float64", "percent", "relative standard deviation of the compliances, RMS over joints"),
+        Column("compliance_leak", "float64", "percent", "relative leak of geometry into the compliances, RMS over joints"),
+        Column("zero_noise", "float64", "rad", "standard deviation of the joint zeros, RMS over joints"),
+        Column("zero_leak", "float64", "rad", "error of the joint zeros by what is left out, RMS over joints"),
+    ),
+)
+
+WEIGHTING = TableSchema(
+    "weighting",
+    (
+        Column("orientation_ratio", "float64", "rad/m", "noise of orientations over that of positions"),
+        Column("per_metre", "float64", "m/m", "growth of the noise of positions with the tracker's range"),
+        Column("equal", "float64", "m", "RMS error by equal weights"),
+        Column("weighted", "float64", "m", "RMS error by the weights of the noise"),
+    ),
+)
+
+
 def accuracy(joints: int) -> TableSchema:
     """What one data set gives, as the mean over data sets; one row for each evaluated length."""
     columns = [_LENGTH]
