@@ -28,14 +28,8 @@ PER_DATA_SET = {("tabulate_accuracy",), ("draw_bias_and_accuracy",), ("draw_accu
 REPEATED = {("repeat_studies", "as_configured", "kuka"), ("tabulate_expectations",)}
 ASKED = (
     *("repeat_studies", "compare_point_sets", "climb_ladder", "choose_designs", "index_observability"),
-    *(
-        "vary_assumptions",
-        "tabulate_assumptions",
-        "tabulate_budget",
-        "tabulate_ladder",
-        "tabulate_designs",
-        "tabulate_observability",
-    ),
+    *("tabulate_budget", "tabulate_ladder", "tabulate_designs", "tabulate_observability"),
+    *("vary_assumptions", "tabulate_assumptions", "draw_budget", "draw_ladder", "draw_designs"),
 )
 COMPARED_STRATEGIES = {
     ("compare_solvers", "kuka"),
