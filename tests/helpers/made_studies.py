@@ -5,6 +5,7 @@ from made_metrics import LENGTHS
 from made_study_blocks import PAPER
 
 from elastocal.study.interpretation import Interpretation, Size
+from elastocal.study.steps.in_memory import StudyInMemory
 from elastocal.study.steps.repeat import repeated_blocks
 
 USUAL = Interpretation(PAPER, 6, "end_effector", "stiffness", "averaged_model")
@@ -23,9 +24,9 @@ def studies_of(robot="arm", strategy="A", biases=(20.0, 22.0, 24.0)):
 
 
 def blocks_of(robot, strategies, interpretation=USUAL, size=SIZE, studies=(1, 2)):
-    return list(repeated_blocks(robot, robot.joint_limits, "kuka", 1, studies, strategies, interpretation, size))
+    return list(repeated_blocks(StudyInMemory(robot, "kuka", 1, interpretation, size), studies, strategies))
 
 
 def few_of(robot, key="kuka"):
-    """Arguments of a step that draws its data sets itself: six of 20 configurations."""
-    return robot, robot.joint_limits, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5)
+    """A study of six data sets of 20 configurations."""
+    return StudyInMemory(robot, key, 1, USUAL, Size(data_sets=6, configurations=20, tests=30, noise=1e-5))

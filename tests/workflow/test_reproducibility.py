@@ -49,7 +49,7 @@ def test_existing_rows_stay_with(change, unstarted, small_study):
     elif change == "another order":
         unstarted.configure({key: SMALL[key][::-1] for key in ("robots", "strategies", "noise_um")})
     else:
-        unstarted.replace("src/elastocal/study/steps/__init__.py", "SETS_PER_BLOCK = 500", "SETS_PER_BLOCK = 5")
+        unstarted.replace("src/elastocal/study/steps/blocks.py", "SETS_PER_BLOCK = 500", "SETS_PER_BLOCK = 5")
     unstarted.run(*MEASURED)
     experiments = "data/simulated/kuka/experiments.parquet"
     assert pq.ParquetFile(unstarted.path(experiments)).num_row_groups == (3 if change == "other blocks" else 1)

@@ -68,10 +68,6 @@ def strategy_document(wildcards):
     return STUDY.strategies[wildcards.strategy]
 
 
-def interpretation(wildcards):
-    return INTERPRETATIONS | config["switched"].get(wildcards.interpretation, {})
-
-
 def loading_of(interpretations):
     return config["loading"] | {key: interpretations[key] for key in ("offset_frame", "joint_range")}
 
@@ -79,6 +75,23 @@ def loading_of(interpretations):
 def conventions_of(interpretations):
     kept = {key: interpretations[key] for key in ("wrench_at", "average", "deviation_of")}
     return kept | {"rows": rows_read(interpretations["measured"])}
+
+
+def study_in_memory(**size):
+    """What a script draws the study of a robot from: the robot, the seed, how the paper is read, the study's size."""
+
+    def parameters(wildcards):
+        read = INTERPRETATIONS | config["switched"].get(wildcards.get("interpretation", USUAL), {})
+        return {
+            "robot": robot_document(wildcards),
+            "seed": config["seed"],
+            "tool_offset_m": read["tool_offset_m"],
+            "loading": loading_of(read),
+            "interpretation": conventions_of(read),
+            "size": STUDY_SIZE | size,
+        }
+
+    return parameters
 
 
 def cells(kind, robots, noise, strategies=config["strategies"]):

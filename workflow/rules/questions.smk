@@ -18,13 +18,8 @@ rule compare_point_sets:
     benchmark:
         "results/timings/compare_point_sets/{robot}.tsv"
     params:
-        robot=robot_document,
-        seed=config["seed"],
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        loading=loading_of(INTERPRETATIONS),
-        interpretation=conventions_of(INTERPRETATIONS),
+        study=study_in_memory(),
         point_sets=QUESTIONS["point_sets"],
-        size=STUDY_SIZE,
     script:
         "../scripts/compare_point_sets.py"
 
@@ -39,14 +34,9 @@ rule climb_ladder:
     benchmark:
         "results/timings/climb_ladder/{robot}.tsv"
     params:
-        robot=robot_document,
-        seed=config["seed"],
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        loading=loading_of(INTERPRETATIONS),
-        interpretation=conventions_of(INTERPRETATIONS),
+        study=study_in_memory(),
         lengths=QUESTIONS["ladder_lengths"],
         noises=[1e-6 * noise for noise in QUESTIONS["ladder_noise_um"]],
-        size=STUDY_SIZE,
     script:
         "../scripts/climb_ladder.py"
 
@@ -61,14 +51,9 @@ rule choose_designs:
     benchmark:
         "results/timings/choose_designs/{robot}.tsv"
     params:
-        robot=robot_document,
-        seed=config["seed"],
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        loading=loading_of(INTERPRETATIONS),
-        interpretation=conventions_of(INTERPRETATIONS),
+        study=study_in_memory(),
         candidates=QUESTIONS["candidates"],
         sizes=QUESTIONS["design_sizes"],
-        size=STUDY_SIZE,
     script:
         "../scripts/choose_designs.py"
 
@@ -83,12 +68,7 @@ rule index_observability:
     benchmark:
         "results/timings/index_observability/{robot}.tsv"
     params:
-        robot=robot_document,
-        seed=config["seed"],
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        loading=loading_of(INTERPRETATIONS),
-        interpretation=conventions_of(INTERPRETATIONS),
-        size=STUDY_SIZE | {"configurations": config["tables"]["length"]},
+        study=study_in_memory(configurations=config["tables"]["length"]),
     script:
         "../scripts/index_observability.py"
 
@@ -173,14 +153,9 @@ rule vary_assumptions:
     benchmark:
         "results/timings/vary_assumptions/{robot}.tsv"
     params:
-        robot=robot_document,
-        seed=config["seed"],
-        tool_offset_m=INTERPRETATIONS["tool_offset_m"],
-        loading=loading_of(INTERPRETATIONS),
-        interpretation=conventions_of(INTERPRETATIONS),
+        study=study_in_memory(configurations=config["tables"]["length"]),
         geometry=QUESTIONS["geometry_errors"],
         weighting=QUESTIONS["unequal_noise"],
-        size=STUDY_SIZE | {"configurations": config["tables"]["length"]},
     script:
         "../scripts/vary_assumptions.py"
 

@@ -18,14 +18,9 @@ rule repeat_studies:
     wildcard_constraints:
         interpretation="|".join([USUAL, *config["switched"]]),
     params:
-        robot=robot_document,
+        study=study_in_memory(),
         strategies=list(STUDY.strategies.values()),
-        seed=config["seed"],
         studies=config["evaluation"]["studies"],
-        tool_offset_m=lambda wildcards: interpretation(wildcards)["tool_offset_m"],
-        loading=lambda wildcards: loading_of(interpretation(wildcards)),
-        interpretation=lambda wildcards: conventions_of(interpretation(wildcards)),
-        size=STUDY_SIZE,
     script:
         "../scripts/repeat_studies.py"
 

@@ -2,10 +2,7 @@
 
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-from elastocal.mechanics.robot import with_target_offset
-from elastocal.mechanics.robot_file import joint_limits, robot_from_document
-from elastocal.study.interpretation import Interpretation, Size
-from elastocal.study.simulation import Loading
+from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.ladder import ladder_blocks
 from elastocal.study.table_schemas import LADDER
 
@@ -13,14 +10,9 @@ from job import Job, run
 
 
 def climb_ladder(job: Job) -> None:
-    settings, key = job.params, job.wildcards.robot
-    robot = with_target_offset(robot_from_document(settings.robot), settings.tool_offset_m)
-    limits = joint_limits(settings.robot["joint_limits_deg"], robot.chain, key)
-    interpretation = Interpretation(Loading(**settings.loading), **settings.interpretation)
-    blocks = ladder_blocks(
-        robot, limits, key, settings.seed, interpretation, Size(**settings.size), settings.lengths, settings.noises
-    )
-    write_table(job.output[0], LADDER, blocks, provenance(settings, **dict(job.wildcards)))
+    settings, origin = job.params, provenance(job.params, **dict(job.wildcards))
+    study = study_in_memory(job.wildcards.robot, **settings.study)
+    write_table(job.output.ladder, LADDER, ladder_blocks(study, settings.lengths, settings.noises), origin)
 
 
 run(climb_ladder, snakemake)

@@ -86,7 +86,31 @@ def error_moment(judge: Judge) -> np.ndarray:
     ndarray (n, n)
         m^2 per (rad/(N m))^2.
     """
-    return error_forms(judge).mean(axis=0)[:-1, :-1]
+    return mean_form(judge)[:-1, :-1]
+
+
+def mean_form(judge: Judge) -> np.ndarray:
+    """Quadratic form (n + 1, n + 1) in (c - reference, 1) of the squared position error, mean over the test configurations."""
+    return error_forms(judge).mean(axis=0)
+
+
+def mean_square_errors(form: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Mean squared position error of models over the test configurations.
+
+    Parameters
+    ----------
+    form : ndarray (n + 1, n + 1)
+        From `mean_form`.
+    error : ndarray (..., n, models)
+        Compliances less the reference, rad/(N m).
+
+    Returns
+    -------
+    ndarray (..., models)
+        m^2.
+    """
+    whole = np.concatenate([error, np.ones_like(error[..., :1, :])], axis=-2)
+    return (whole * (form @ whole)).sum(axis=-2)
 
 
 def error_forms(judge: Judge) -> np.ndarray:

@@ -16,7 +16,7 @@ from elastocal.mechanics.elastostatics import joint_torques
 from elastocal.mechanics.kinematics import poses_and_jacobians
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.metrics import error_moment
-from elastocal.study.steps import simulate
+from elastocal.study.steps import blocks
 from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.columns import to_experiments
 
@@ -51,7 +51,7 @@ def test_bounds_of_a_target_off_the_flange_are_those_of_a_load_at_the_flange(kuk
 
 
 def test_the_bound_is_the_root_mean_square_over_the_data_sets_of_all_blocks(kuka, monkeypatch):
-    monkeypatch.setattr(simulate, "SETS_PER_BLOCK", 2)
+    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", 2)
     experiments, scores = experiments_of(kuka, sets=3), judge(kuka)
     (found,) = bound_blocks(experiments, kuka.chain, [("3DoF", "6DoF")], 6, "end_effector", scores)
     assert len(experiments) == 2 and found["length"].tolist() == [1, 2, 3, 4]

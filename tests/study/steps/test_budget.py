@@ -9,6 +9,7 @@ from elastocal.study.interpretation import Size
 from elastocal.study.metrics import position_errors
 from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.budget import budget_blocks
+from elastocal.study.steps.in_memory import StudyInMemory
 
 POINT_SETS = {"6DoF": ["6DoF"], "6DoF twice": ["6DoF", "6DoF"], "3+6DoF": ["3DoF", "6DoF"]}
 SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
@@ -16,7 +17,7 @@ SIZE = Size(data_sets=40, configurations=6, tests=30, noise=1e-5)
 
 @pytest.fixture(scope="module")
 def found(kuka):
-    blocks = list(budget_blocks(kuka, kuka.joint_limits, "kuka", 1, POINT_SETS, USUAL, SIZE))
+    blocks = list(budget_blocks(StudyInMemory(kuka, "kuka", 1, USUAL, SIZE), POINT_SETS))
     return {block["points"]: {name: block[name].reshape(40, 6) for name in ("mean_square", "bound")} for block in blocks}
 
 

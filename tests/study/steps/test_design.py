@@ -6,6 +6,7 @@ from made_study_blocks import AT, OFFSET, experiments_of, joined, pinocchio_regr
 from support import OTHER_CHAINS, robot_of
 
 from elastocal.mechanics.robot import with_target_offset
+from elastocal.study.steps.columns import to_experiments
 from elastocal.study.steps.design import Design, configuration_first, design_blocks
 from elastocal.study.strategies import Stage, Strategy
 
@@ -27,7 +28,7 @@ def test_design_table_names_the_right_set_length_and_joint_pair(kuka, strategies
 def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
     robot = robot_of(OTHER_CHAINS["seven joints"])
     (block,) = experiments_of(robot, sets=2, configurations=3)
-    design = Design(block, robot.chain, ("elbow", "flange"), rows, at)
+    design = Design(to_experiments(block), robot.chain, ("elbow", "flange"), rows, at)
     assert set(design.regressors) == set(design.torques) == {"elbow", "flange"}
     for name, found in design.regressors.items():
         assert found.shape == (rows, 7, 3, 2)
@@ -38,7 +39,10 @@ def test_regressors_are_those_of_equation_10_by_pinocchio(at, rows):
 def test_a_load_at_the_measuring_point_leaves_the_joints_behind_it_without_torque():
     robot = robot_of(OTHER_CHAINS["three joints"])
     (block,) = experiments_of(robot, sets=2, configurations=3)
-    here, there = (Design(block, robot.chain, ("elbow",), 6, at).torques["elbow"] for at in ("measuring_point", "end_effector"))
+    here, there = (
+        Design(to_experiments(block), robot.chain, ("elbow",), 6, at).torques["elbow"]
+        for at in ("measuring_point", "end_effector")
+    )
     assert here.shape == (3, 2, 3)
     assert not here[..., 2].any() and (np.abs(there[..., 2]) > 1).all()
 

@@ -7,6 +7,6 @@ from elastocal.study.steps.designs import design_worths
 
 
 def test_designs_are_worth_more_than_random_ones(kuka):
-    table = pd.DataFrame(design_worths(*few_of(kuka), candidates=200, sizes=[5]))
+    table = pd.DataFrame(design_worths(few_of(kuka), candidates=200, sizes=[5]))
     rms = table.set_index("design").rms
     assert rms["bound"] <= rms["I"] < rms["random"] and set(rms.index) == {"random", "D", "A", "I", "bound"}

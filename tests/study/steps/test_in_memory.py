@@ -6,31 +6,35 @@ from made_study_blocks import deflections_of, experiments_of, judge
 
 from elastocal.study.metrics import position_errors
 from elastocal.study.steps.columns import to_deflections
-from elastocal.study.steps.in_memory import judge_of_study, measured
+from elastocal.study.steps.in_memory import StudyInMemory
+
+
+def study_of(robot):
+    return StudyInMemory(robot, "kuka", 1, USUAL, SIZE)
 
 
 def test_data_sets_of_studies_follow_on_each_other_without_overlap(kuka):
     """The first study after that of the tables begins where its data sets end."""
-    later = measured(kuka, kuka.joint_limits, "kuka", 1, np.arange(4, 8), ("6DoF",), USUAL, SIZE)["6DoF"]
-    whole = measured(kuka, kuka.joint_limits, "kuka", 1, np.arange(8), ("6DoF",), USUAL, SIZE)["6DoF"]
+    later = study_of(kuka).measured(np.arange(4, 8), ("6DoF",))["6DoF"]
+    whole = study_of(kuka).measured(np.arange(8), ("6DoF",))["6DoF"]
     np.testing.assert_array_equal(later.deflection, whole.deflection[..., 4:])
     assert len(np.unique(whole.deflection[0, 0])) == 8
 
 
 def test_measurements_are_those_of_the_pipelines_steps(kuka):
     (block,) = deflections_of(kuka, experiments_of(kuka, 4, 5), SIZE.noise)["3DoF"]
-    found = measured(kuka, kuka.joint_limits, "kuka", 1, np.arange(4), ("3DoF",), USUAL, SIZE)["3DoF"]
+    found = study_of(kuka).measured(np.arange(4), ("3DoF",))["3DoF"]
     np.testing.assert_allclose(np.moveaxis(found.deflection, (0, 1), (2, 1)), to_deflections(block), rtol=1e-12)
 
 
 def test_another_measurement_of_the_same_configurations_has_noise_of_its_own(kuka):
-    given = (kuka, kuka.joint_limits, "kuka", 1, np.arange(4), ("6DoF",), USUAL, SIZE)
-    once, again = measured(*given)["6DoF"], measured(*given, "/again")["6DoF"]
+    study, given = study_of(kuka), (np.arange(4), ("6DoF",))
+    once, again = study.measured(*given)["6DoF"], study.measured(*given, "/again")["6DoF"]
     np.testing.assert_array_equal(once.regressor, again.regressor)
     # Of two independent ones: 120 numbers, whose standard deviation has an error of 7 %.
     assert 1.6e-5 > (once.deflection - again.deflection).std() > 1.2e-5
 
 
 def test_the_score_sheet_of_the_study_of_the_tables_is_the_pipelines(kuka):
-    found, models = judge_of_study(kuka, kuka.joint_limits, "kuka", 1, 0, USUAL, SIZE), 1.1 * kuka.compliance[None]
+    found, models = study_of(kuka).judge(), 1.1 * kuka.compliance[None]
     np.testing.assert_allclose(position_errors(found, models), position_errors(judge(kuka), models), rtol=1e-9)

@@ -6,7 +6,7 @@ from made_study_blocks import AT, WRENCH, experiments_of, joined
 from scipy.spatial.transform import Rotation
 from support import OTHER_CHAINS, PinocchioPoint, robot_of, without_tool
 
-from elastocal.study.steps import simulate
+from elastocal.study.steps import blocks
 from elastocal.study.steps.columns import to_deflections
 from elastocal.study.steps.simulate import ideal_blocks
 
@@ -25,10 +25,10 @@ def test_test_configurations_are_none_of_those_that_identify(kuka):
 
 @pytest.mark.parametrize(("size", "expected"), [(2, [[0, 1], [2, 3], [4]]), (5, [[0, 1, 2, 3, 4]]), (9, [[0, 1, 2, 3, 4]])])
 def test_blocks_are_full_but_for_the_last_and_hold_each_data_set_once(kuka, monkeypatch, size, expected):
-    monkeypatch.setattr(simulate, "SETS_PER_BLOCK", size)
-    blocks = experiments_of(kuka, sets=5, configurations=3)
-    assert [block["data_set"].tolist() for block in blocks] == [np.repeat(sets, 3).tolist() for sets in expected]
-    assert all(block["configuration"].tolist() == [0, 1, 2] * len(sets) for block, sets in zip(blocks, expected, strict=True))
+    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)
+    found = experiments_of(kuka, sets=5, configurations=3)
+    assert [block["data_set"].tolist() for block in found] == [np.repeat(sets, 3).tolist() for sets in expected]
+    assert all(block["configuration"].tolist() == [0, 1, 2] * len(sets) for block, sets in zip(found, expected, strict=True))
 
 
 @pytest.mark.parametrize("at", AT)
@@ -36,12 +36,12 @@ def test_blocks_are_full_but_for_the_last_and_hold_each_data_set_once(kuka, monk
 def test_ideal_deflections_are_the_poses_by_pinocchio_with_the_joints_yielded(name, at):
     robot = robot_of(OTHER_CHAINS[name])
     experiments = experiments_of(robot, sets=2, configurations=2)
-    blocks = list(ideal_blocks(experiments, robot, at))
-    assert [block["point"] for block in blocks] == [point.name for point in robot.chain.points]
+    found = list(ideal_blocks(experiments, robot, at))
+    assert [block["point"] for block in found] == [point.name for point in robot.chain.points]
     loads = joined(experiments)
     angles = np.column_stack([loads[f"q{j + 1}"] for j in range(robot.joints)])
     wrench = np.column_stack([loads[component] for component in WRENCH])
-    for block, point in zip(blocks, robot.chain.points, strict=True):
+    for block, point in zip(found, robot.chain.points, strict=True):
         assert block["data_set"].tolist() == [0, 0, 1, 1] and block["configuration"].tolist() == [0, 1, 0, 1]
         seen = PinocchioPoint(robot.chain, point)
         loaded = PinocchioPoint(robot.chain, without_tool(robot.chain.end_effector) if at == "end_effector" else point)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_study_blocks import deflections_of, experiments_of, pinocchio_regressors
 
-from elastocal.study.steps import simulate
+from elastocal.study.steps import blocks
 from elastocal.study.steps.columns import to_deflections
 from elastocal.study.steps.identify import paired_blocks
 from elastocal.study.steps.solvers import solver_table
@@ -45,7 +45,7 @@ def test_configurations_beyond_the_length_change_nothing(kuka, strategies):
 
 
 def test_every_strategy_of_every_block_has_its_rows(kuka, strategies, monkeypatch):
-    monkeypatch.setattr(simulate, "SETS_PER_BLOCK", 2)
+    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", 2)
     chosen = [strategies[name] for name in ("6DoF", "3+6DoF-comb")]
     experiments = experiments_of(kuka, sets=3)
     deflections = deflections_of(kuka, experiments, noise=1e-4)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
-from elastocal.study.steps import weights
+from elastocal.study.steps import blocks
 from elastocal.study.steps.weights import DATA_SETS, TESTS, to_weights, weight_blocks
 
 
 def test_the_weights_table_gives_back_the_weights_whatever_its_blocks(monkeypatch):
     for size in (500, 5, 2):
-        monkeypatch.setattr(weights, "SETS_PER_BLOCK", size)
+        monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)
         *sets, tests = weight_blocks("kuka", 1, 5, 7, 4)
         assert [block["members"] for block in sets] == [DATA_SETS] * -(-5 // size) and tests["members"] == TESTS
         np.testing.assert_array_equal(np.hstack([to_weights(b) for b in sets]), bootstrap_weights(1, "kuka", range(5), 4))
@@ -35,9 +35,9 @@ def test_weights_of_a_table_written_by_hand():
 
 @pytest.mark.parametrize("size", [500, 3])
 def test_every_member_has_a_row_in_every_replicate(monkeypatch, size):
-    monkeypatch.setattr(weights, "SETS_PER_BLOCK", size)
-    blocks = list(weight_blocks("kuka", 1, 7, 4, 2))
-    sets, tests = ([block for block in blocks if block["members"] == members] for members in (DATA_SETS, TESTS))
+    monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)
+    found = list(weight_blocks("kuka", 1, 7, 4, 2))
+    sets, tests = ([block for block in found if block["members"] == members] for members in (DATA_SETS, TESTS))
     for found, count in ((sets, 7), (tests, 4)):
         assert np.concatenate([block["number"] for block in found]).tolist() == np.repeat(range(count), 2).tolist()
         assert np.concatenate([block["replicate"] for block in found]).tolist() == [1, 2] * count

@@ -2,5 +2,3 @@
 
 A module here knows the columns of tables and calls the science; it knows neither files nor the order of the steps.
 """
-
-SETS_PER_BLOCK = 500

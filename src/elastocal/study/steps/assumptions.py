@@ -9,36 +9,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.elastostatics import joint_torques, regressor
-from elastocal.mechanics.kinematics import jacobians, poses
+from elastocal.application.planning.criteria import mean_squares
+from elastocal.mechanics.kinematics import poses
 from elastocal.study.geometry import geometry_columns, qualities
-from elastocal.study.simulation import random_experiments
 from elastocal.study.weighting import expected_errors, pose_deviation, range_noise
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from elastocal.mechanics.robot import Robot
-    from elastocal.study.experiments import Experiments
-    from elastocal.study.interpretation import Interpretation, Size
+    from elastocal.study.steps.in_memory import StudyInMemory
 
 
-def geometry_rows(
-    robot: Robot,
-    limits: np.ndarray,
-    key: str,
-    seed: int,
-    interpretation: Interpretation,
-    size: Size,
-    zero_rad: float,
-    length_m: float,
-) -> dict[str, np.ndarray]:
+def geometry_rows(study: StudyInMemory, zero_rad: float, length_m: float) -> dict[str, np.ndarray]:
     """Geometry and compliances from as many unloaded as loaded poses of the end-effector, by each estimator.
 
     Parameters
     ----------
-    robot, limits, key, seed, interpretation, size
-        As in `repeat.repeated_blocks`.
+    study : StudyInMemory
     zero_rad, length_m : float
         Standard deviations of the errors of joint zeros and link lengths.
 
@@ -48,20 +35,18 @@ def geometry_rows(
         Columns estimator, noise, leak (m), compliance_noise and compliance_leak (percent) and zero_noise and zero_leak (rad):
         root mean squares over the joints.
     """
-    drawn, tests = _drawn(robot, limits, key, seed, interpretation, size)
+    robot, size, drawn, tests = study.robot, study.size, study.experiments(range(study.size.data_sets)), study.tests()
     geometry, there = geometry_columns(robot.chain, drawn.joint_angles), geometry_columns(robot.chain, tests.joint_angles)
-    sensitivities = np.concatenate([there, _regressor(robot, tests)], axis=-1)[..., :3, :].reshape(
-        -1, there.shape[-1] + robot.joints
-    )
+    sensitivities = np.concatenate([there, study.regressor(tests)], axis=-1)[0, :, :3]
     deviation = np.full(geometry.shape[-1], length_m)
     deviation[: robot.joints] = zero_rad
     found = qualities(
         geometry.reshape(size.data_sets, -1, geometry.shape[-1]),
-        _regressor(robot, drawn).reshape(size.data_sets, -1, robot.joints),
+        study.regressor(drawn).reshape(size.data_sets, -1, robot.joints),
         size.noise,
         robot.compliance,
         deviation,
-        sensitivities.T @ sensitivities / size.tests,
+        mean_squares(sensitivities),
     )
     columns: dict[str, list[object]] = {"estimator": [*found]}
     for name in ("noise", "leak"):
@@ -72,22 +57,14 @@ def geometry_rows(
 
 
 def weighting_rows(
-    robot: Robot,
-    limits: np.ndarray,
-    key: str,
-    seed: int,
-    interpretation: Interpretation,
-    size: Size,
-    orientation_ratios: Sequence[float],
-    tracker_m: Sequence[float],
-    per_metre: Sequence[float],
+    study: StudyInMemory, orientation_ratios: Sequence[float], tracker_m: Sequence[float], per_metre: Sequence[float]
 ) -> dict[str, np.ndarray]:
     """Equal weights against those of the noise, measured at the end-effector.
 
     Parameters
     ----------
-    robot, limits, key, seed, interpretation, size
-        As in `repeat.repeated_blocks`; the noise of the size is that of positions.
+    study : StudyInMemory
+        The noise of its size is that of positions.
     orientation_ratios : sequence of float
         Noise of orientations over that of positions, rad per m.
     tracker_m : sequence of float
@@ -100,10 +77,9 @@ def weighting_rows(
     dict of str to ndarray
         Columns orientation_ratio, per_metre, equal and weighted (m).
     """
-    drawn, tests = _drawn(robot, limits, key, seed, interpretation, size)
-    columns, shape = _regressor(robot, drawn).reshape(size.data_sets, -1, robot.joints), drawn.joint_angles.shape[:2]
-    sensitivities = _regressor(robot, tests)[..., :3, :].reshape(-1, robot.joints)
-    moment = sensitivities.T @ sensitivities / size.tests
+    robot, size, drawn = study.robot, study.size, study.experiments(range(study.size.data_sets))
+    columns, shape = study.regressor(drawn).reshape(size.data_sets, -1, robot.joints), drawn.joint_angles.shape[:2]
+    moment = mean_squares(study.regressor(study.tests())[0, :, :3])
     position, _ = poses(robot.chain, drawn.joint_angles, robot.chain.end_effector)
     cases = [(ratio, 0.0) for ratio in orientation_ratios] + [(1.0, grown) for grown in per_metre]
     errors = []
@@ -113,19 +89,3 @@ def weighting_rows(
     ratios, growths = np.array(cases).T
     equal, weighted = np.array(errors).T
     return {"orientation_ratio": ratios, "per_metre": growths, "equal": equal, "weighted": weighted}
-
-
-def _drawn(
-    robot: Robot, limits: np.ndarray, key: str, seed: int, interpretation: Interpretation, size: Size
-) -> tuple[Experiments, Experiments]:
-    given, sets = (robot.chain, limits, seed, key, interpretation.loading), range(size.data_sets)
-    return random_experiments(*given, "identification", sets, size.configurations), random_experiments(
-        *given, "test", [0], size.tests
-    )
-
-
-def _regressor(robot: Robot, experiments: Experiments) -> np.ndarray:
-    """Regressors (sets, configurations, 6, n) of the end-effector."""
-    point = robot.chain.end_effector
-    torques = joint_torques(robot.chain, experiments.joint_angles, experiments.wrench, point)
-    return regressor(jacobians(robot.chain, experiments.joint_angles, point), torques)

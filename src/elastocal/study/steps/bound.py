@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.study.bounds import squared_error_bounds
 from elastocal.study.identification import prefix_information
 from elastocal.study.metrics import Judge, error_moment
+from elastocal.study.steps.columns import to_experiments
 from elastocal.study.steps.design import Design
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ def bound_blocks(
     moment, sets = error_moment(judge), 0
     sums: dict[tuple[str, ...], np.ndarray] = dict.fromkeys(distinct, np.zeros(()))
     for block in experiment_blocks:
-        regressors = Design(block, chain, names, rows, wrench_at).regressors
+        regressors = Design(to_experiments(block), chain, names, rows, wrench_at).regressors
         information = {name: prefix_information(matrix) for name, matrix in regressors.items()}
         sets += regressors[names[0]].shape[-1]
         for points in distinct:

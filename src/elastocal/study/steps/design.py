@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
 
     from elastocal.mechanics.chain import Chain
+    from elastocal.study.experiments import Experiments
     from elastocal.study.strategies import Strategy
 
 
@@ -33,8 +34,7 @@ class Design:
 
     Parameters
     ----------
-    experiments : dict
-        Block of the experiments table.
+    experiments : Experiments
     chain : Chain
     points : collection of str
     rows : int
@@ -50,11 +50,8 @@ class Design:
     regressors : dict of str to ndarray (rows, n, configurations, sets)
     """
 
-    def __init__(
-        self, experiments: Mapping[str, np.ndarray], chain: Chain, points: Collection[str], rows: int, wrench_at: str
-    ) -> None:
-        loads = to_experiments(experiments)
-        self.joint_angles, wrench = configuration_first(loads.joint_angles), configuration_first(loads.wrench)
+    def __init__(self, experiments: Experiments, chain: Chain, points: Collection[str], rows: int, wrench_at: str) -> None:
+        self.joint_angles, wrench = configuration_first(experiments.joint_angles), configuration_first(experiments.wrench)
         loaded = {name: loaded_point(chain, chain.point(name), wrench_at) for name in points}
         measured = {name: chain.point(name) for name in points}
         movements = {point: jacobians(chain, self.joint_angles, point) for point in {*loaded.values(), *measured.values()}}
@@ -86,7 +83,7 @@ def design_blocks(
     """
     for block in experiment_blocks:
         sets = data_sets(block)
-        regressors = Design(block, chain, strategy.points, rows, wrench_at).regressors
+        regressors = Design(to_experiments(block), chain, strategy.points, rows, wrench_at).regressors
         silent = np.zeros((rows, *next(iter(regressors.values())).shape[2:]))
         measurements = {name: Measurements(matrix, silent) for name, matrix in regressors.items()}
         triangles = estimate_compliance(strategy, measurements, chain.coordinates)[1]

@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.study.gauss_newton import identify_exactly
 from elastocal.study.identification import Measurements, estimate_compliance
-from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections
+from elastocal.study.steps.columns import data_sets, prefix_index_columns, to_deflections, to_experiments
 from elastocal.study.steps.design import Design, configuration_first
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class Situation:
         wrench_at: str,
     ) -> None:
         self.chain, self.strategy = chain, strategy
-        self.design = Design(experiments, chain, strategy.points, rows, wrench_at)
+        self.design = Design(to_experiments(experiments), chain, strategy.points, rows, wrench_at)
         self.measured = {name: configuration_first(to_deflections(deflections[name]))[..., :rows] for name in strategy.points}
         self.measurements = {
             name: Measurements(self.design.regressors[name], np.moveaxis(self.measured[name], -1, 0))

@@ -5,67 +5,153 @@ They are the same as those of the pipeline's steps: random streams have names, s
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
+from elastocal.mechanics.kinematics import jacobians
+from elastocal.mechanics.robot import Robot, with_target_offset
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import Measurements
-from elastocal.study.metrics import make_judge
-from elastocal.study.simulation import measurement_noise, random_experiments, true_deflections
-from elastocal.study.steps.columns import experiment_columns
+from elastocal.study.interpretation import Interpretation, Size
+from elastocal.study.metrics import Judge, make_judge
+from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
+from elastocal.study.steps.blocks import blocks_of_sets
 from elastocal.study.steps.design import Design, configuration_first
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from elastocal.mechanics.robot import Robot
-    from elastocal.study.interpretation import Interpretation, Size
-    from elastocal.study.metrics import Judge
+    from elastocal.study.experiments import Experiments
 
 
-def judge_of_study(
-    robot: Robot, limits: np.ndarray, key: str, seed: int, number: int, interpretation: Interpretation, size: Size
-) -> Judge:
-    """Score sheet of the test configurations of a study, parameters as in `repeated_blocks`."""
-    at = interpretation.wrench_at
-    tests = random_experiments(robot.chain, limits, seed, key, interpretation.loading, "test", [number], size.tests)
-    return make_judge(robot, tests, true_deflections(robot, tests, robot.chain.end_effector, at), at)
+@dataclass(frozen=True)
+class StudyInMemory:
+    """The study of one robot, and further ones of the same size.
+
+    Studies have numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
+    configurations of its own.
+
+    Attributes
+    ----------
+    robot : Robot
+        With the offset of its targets.
+    key : str
+        Name of the robot's file; part of the name of the random streams.
+    seed : int
+    interpretation : Interpretation
+    size : Size
+    """
+
+    robot: Robot
+    key: str
+    seed: int
+    interpretation: Interpretation
+    size: Size
+
+    def blocks(self, number: int = 0) -> Iterator[np.ndarray]:
+        """Numbers of the data sets of a study, block by block, ndarray of int each."""
+        for sets in blocks_of_sets(self.size.data_sets):
+            yield np.array(sets) + number * self.size.data_sets
+
+    def experiments(
+        self, sets: Sequence[int] | np.ndarray, configurations: int | None = None, purpose: str = "identification"
+    ) -> Experiments:
+        """Configurations and loads of data sets, as many as in the study where nothing else is said."""
+        return random_experiments(
+            self.robot.chain,
+            self.robot.joint_limits,
+            self.seed,
+            self.key,
+            self.interpretation.loading,
+            purpose,
+            sets,
+            configurations or self.size.configurations,
+        )
+
+    def tests(self, number: int = 0) -> Experiments:
+        """Test configurations of a study, as one data set."""
+        return self.experiments([number], self.size.tests, "test")
+
+    def deflections(self, experiments: Experiments, point: str | None = None) -> np.ndarray:
+        """Deflections (sets, configurations, 6) of a measuring point, of the end-effector where none is named."""
+        return true_deflections(self.robot, experiments, self._point(point), self.interpretation.wrench_at)
+
+    def noise(
+        self, sets: Sequence[int] | np.ndarray, point: str | None = None, configurations: int | None = None
+    ) -> np.ndarray:
+        """Standard normal noise (sets, configurations, 6) of the measurements of a point."""
+        name = point or self.robot.chain.end_effector.name
+        return measurement_noise(self.seed, self.key, name, sets, configurations or self.size.configurations)
+
+    def regressor(self, experiments: Experiments) -> np.ndarray:
+        """Regressors (sets, configurations, 6, n) of poses of the end-effector."""
+        chain, angles = self.robot.chain, experiments.joint_angles
+        loaded = loaded_point(chain, chain.end_effector, self.interpretation.wrench_at)
+        torques = joint_torques(chain, angles, experiments.wrench, loaded)
+        return regressor(jacobians(chain, angles, chain.end_effector), torques)
+
+    def judge(self, number: int = 0) -> Judge:
+        """Score sheet of the test configurations of a study."""
+        tests = self.tests(number)
+        return make_judge(self.robot, tests, self.deflections(tests), self.interpretation.wrench_at)
+
+    def measured(self, sets: np.ndarray, points: Sequence[str], repeat: str = "") -> dict[str, Measurements]:
+        """What each measuring point contributes to some data sets.
+
+        Parameters
+        ----------
+        sets : ndarray of int
+            Numbers of the data sets.
+        points : sequence of str
+            Names of measuring points.
+        repeat : str
+            Tells measurements of the same configurations apart: part of the name of the noise's stream.
+
+        Returns
+        -------
+        dict of str to Measurements
+        """
+        drawn, rows = self.experiments(sets), self.interpretation.rows
+        regressors = Design(drawn, self.robot.chain, points, rows, self.interpretation.wrench_at).regressors
+        found = {}
+        for name in points:
+            deflection = self.deflections(drawn, name) + self.size.noise * self.noise(sets, name + repeat)
+            found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
+        return found
+
+    def _point(self, name: str | None) -> Any:
+        return self.robot.chain.point(name) if name else self.robot.chain.end_effector
 
 
-def measured(
-    robot: Robot,
-    limits: np.ndarray,
+def study_in_memory(
     key: str,
+    robot: Mapping[str, Any],
     seed: int,
-    sets: np.ndarray,
-    points: Sequence[str],
-    interpretation: Interpretation,
-    size: Size,
-    repeat: str = "",
-) -> dict[str, Measurements]:
-    """What each measuring point contributes to some data sets.
+    tool_offset_m: Sequence[float],
+    loading: Mapping[str, Any],
+    interpretation: Mapping[str, Any],
+    size: Mapping[str, Any],
+) -> StudyInMemory:
+    """Study from what configuration and robot file say.
 
     Parameters
     ----------
-    robot, limits, key, seed, interpretation, size
-        As in `repeated_blocks`.
-    sets : ndarray of int
-        Numbers of the data sets.
-    points : sequence of str
-        Names of measuring points.
-    repeat : str
-        Tells measurements of the same configurations apart: part of the name of the noise's stream.
+    key : str
+        Name of the robot's file.
+    robot : dict
+        The robot's file.
+    seed : int
+    tool_offset_m : sequence of float
+        Of the targets (interpretation R5).
+    loading, interpretation, size : dict
+        Attributes of `Loading`, of `Interpretation` beside its loading, and of `Size`.
 
     Returns
     -------
-    dict of str to Measurements
+    StudyInMemory
     """
-    chain, at, rows = robot.chain, interpretation.wrench_at, interpretation.rows
-    drawn = random_experiments(chain, limits, seed, key, interpretation.loading, "identification", sets, size.configurations)
-    regressors = Design(experiment_columns(sets, drawn), chain, points, rows, at).regressors
-    found = {}
-    for name in points:
-        normal = measurement_noise(seed, key, name + repeat, sets, size.configurations)
-        deflection = true_deflections(robot, drawn, chain.point(name), at) + size.noise * normal
-        found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
-    return found
+    conventions = Interpretation(Loading(**loading), **interpretation)
+    return StudyInMemory(with_target_offset(robot_from_document(robot), tool_offset_m), key, seed, conventions, Size(**size))

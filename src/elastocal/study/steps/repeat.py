@@ -12,59 +12,41 @@ import numpy as np
 from elastocal.study.evaluation import average
 from elastocal.study.identification import estimate_compliance, first_solvable_length
 from elastocal.study.metrics import k_sigma
-from elastocal.study.steps import SETS_PER_BLOCK
-from elastocal.study.steps.in_memory import judge_of_study, measured
 from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.mechanics.robot import Robot
-    from elastocal.study.interpretation import Interpretation, Size
+    from elastocal.study.steps.in_memory import StudyInMemory
 
 
 def repeated_blocks(
-    robot: Robot,
-    limits: np.ndarray,
-    key: str,
-    seed: int,
-    studies: Iterable[int],
-    strategies: Sequence[Strategy],
-    interpretation: Interpretation,
-    size: Size,
+    study: StudyInMemory, studies: Iterable[int], strategies: Sequence[Strategy]
 ) -> Iterator[dict[str, np.ndarray | str]]:
     """Scores of studies.
 
     Parameters
     ----------
-    robot : Robot
-        With the offset of its targets.
-    limits : ndarray (n, 2)
-        Joint limits, rad.
-    key : str
-        Name of the robot's file.
-    seed : int
+    study : StudyInMemory
     studies : iterable of int
-        Their numbers; that of the tables is 0. The data sets of one follow on those of the one before, and each has test
-        configurations of its own.
+        Their numbers.
     strategies : sequence of Strategy
-    interpretation : Interpretation
-    size : Size
 
     Yields
     ------
     dict
         Columns of one block of the repeated table: one strategy in one study.
     """
+    robot, interpretation = study.robot, study.interpretation
     for number in studies:
-        judge = judge_of_study(robot, limits, key, seed, number, interpretation, size)
+        judge = study.judge(number)
         # Strategies that are one estimator under equation 11 are worked out once.
         stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
         found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
-        for first in range(0, size.data_sets, SETS_PER_BLOCK):
-            sets = np.arange(first, min(first + SETS_PER_BLOCK, size.data_sets)) + number * size.data_sets
+        for sets in study.blocks(number):
             points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
-            measurements = measured(robot, limits, key, seed, sets, points, interpretation, size)
+            measurements = study.measured(sets, points)
             for estimator in dict.fromkeys(stages.values()):
                 strategy = Strategy("", estimator)
                 compliance = estimate_compliance(strategy, measurements, robot.joints)[0]
@@ -72,7 +54,9 @@ def repeated_blocks(
                 found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
         for strategy in strategies:
             blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[stages[strategy.name]])
-            averages = average(blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, size.tests)))
+            averages = average(
+                blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, study.size.tests))
+            )
             scores = score_columns(averages.compliance[0], averages.deviation[0], robot, strategy.first_stage_joints)
             yield {**scores, "study": np.full(len(scores["length"]), number), "strategy": strategy.name}
 

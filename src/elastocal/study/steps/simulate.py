@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from elastocal.study.simulation import Loading, random_experiments, true_deflections
-from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.blocks import blocks_of_sets
 from elastocal.study.steps.columns import data_sets, deflection_columns, experiment_columns, to_experiments
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ def experiment_blocks(
     dict
         Columns of one block of the experiments table.
     """
-    for first in range(0, data_sets, SETS_PER_BLOCK):
-        sets = range(first, min(first + SETS_PER_BLOCK, data_sets))
+    for sets in blocks_of_sets(data_sets):
         yield experiment_columns(sets, random_experiments(chain, limits, seed, key, loading, purpose, sets, configurations))
 
 

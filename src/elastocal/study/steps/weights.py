@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.bootstrap import bootstrap_test_weights, bootstrap_weights
-from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.blocks import blocks_of_sets
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -32,8 +32,7 @@ def weight_blocks(key: str, seed: int, data_sets: int, tests: int, replicates: i
     dict
         Columns of one block of the weights table: data sets in the blocks of the experiments, then all test configurations.
     """
-    for first in range(0, data_sets, SETS_PER_BLOCK):
-        sets = range(first, min(first + SETS_PER_BLOCK, data_sets))
+    for sets in blocks_of_sets(data_sets):
         yield _columns(DATA_SETS, sets, bootstrap_weights(seed, key, sets, replicates))
     yield _columns(TESTS, range(tests), bootstrap_test_weights(seed, key, tests, replicates))
 

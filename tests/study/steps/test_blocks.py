@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 from made_study_blocks import compliances, deflections_of, experiments_of, identified, joined
 
-from elastocal.study.steps import simulate
+from elastocal.study.steps import blocks
 
 
 def test_numbers_do_not_depend_on_blocks(kuka, strategies, monkeypatch):
     tables = []
     for size in (500, 5, 2, 1):
-        monkeypatch.setattr(simulate, "SETS_PER_BLOCK", size)
+        monkeypatch.setattr(blocks, "SETS_PER_BLOCK", size)
         experiments = experiments_of(kuka)
         assert len(experiments) == -(-5 // size)
         deflections = deflections_of(kuka, experiments, noise=2e-4)
