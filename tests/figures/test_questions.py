@@ -4,12 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from drawn_figures import assert_nothing_cut_off, legend_entries, row_labels
-from made_study_tables import TITLES
+from made_study_tables import TITLES, strategy_scores
 from made_study_tables import budget as budget_frame
 from made_study_tables import designs as designs_frame
 from made_study_tables import ladder as ladder_frame
 
-from elastocal.figures.questions import budget, designs, ladder
+from elastocal.figures.questions import budget, designs, ladder, metrics
 
 
 def test_the_ladder_has_a_line_for_each_length_in_the_panel_of_its_noise():
@@ -41,10 +41,20 @@ def test_points_stand_in_their_row_with_both_budgets():
 
 @pytest.mark.parametrize("robot", [0, 1])
 def test_designs_have_a_line_each_and_the_wanted_accuracy(robot):
-    figure = designs(designs_frame(), TITLES, 60.0)
+    figure = designs(designs_frame(), TITLES, 60.0, "limits")
     axis = figure.axes[robot]
     by = {line.get_label(): line.get_ydata() for line in axis.lines}
     assert list(by["random"]) == [200.0, 80.0] and list(by["I-optimal"]) == [88.0, 40.0]
     assert [line.get_ydata()[0] for line in axis.lines if line.get_label().startswith("_")] == [60.0]
     assert legend_entries(figure) == ["random", "A-optimal", "D-optimal", "I-optimal", "bound of all designs"]
+    assert_nothing_cut_off(figure)
+
+
+def test_metrics_have_a_row_each_and_strategies_stand_where_their_ratio_is():
+    figure = metrics(strategy_scores(), TITLES, {"rms_um": "RMS", "k_sigma_percent_first_stage": "first stage"})
+    kuka = figure.axes[0]
+    assert row_labels(kuka) == ["RMS", "first stage"]
+    one, other = [line for line in kuka.lines if line.get_marker() == "o"]
+    assert one.get_xdata().tolist() == [1.0, 1.0] and other.get_xdata().tolist() == [1.2, 0.5]
+    assert legend_entries(figure) == ["6DoF", "staged"]
     assert_nothing_cut_off(figure)

@@ -28,6 +28,17 @@ def metrics_of(robot, strategy, size, noise_um=200.0, untrusted=0):
 
 
 METRICS = pd.concat([metrics_of(robot, name, 10.0 * n) for robot in TITLES for n, name in enumerate(ORDER, 1)])
+PAPER = "paper: score, and length at the limit"
+PRINTED = pd.DataFrame(
+    [
+        ("4", "kuka", "2DoF+6DoF", "k_sigma_4", 2.2),
+        ("4", "kuka", "2DoF+6DoF", "n_k_sigma_3_percent", 5.0),
+        ("4", "kuka", "6DoF", "dev_4", 6.0),
+        ("4", "fanuc", "6DoF", "dev_4", 7.0),
+        ("3", "kuka", "6DoF", "c4", 8.0),
+    ],
+    columns=["table", "robot", "strategy", "quantity", "value"],
+)
 PER_DATASET = pd.DataFrame(
     [
         {"robot": robot, "strategy": name, "ds": ds, "rms_um": 100.0 * n / ds, "rms_um_std_error": 3.0 * n}
@@ -51,38 +62,56 @@ def test_noise_levels_are_lines_in_micrometres_that_are_thick_only_where_they_ar
     frame = pd.concat([metrics_of("kuka", "6DoF", size, noise, 2) for size, noise in ((100.0, 50.0), (200.0, 100.0))])
     frame = pd.concat([frame, metrics_of("kuka", "2DoF+6DoF", 7.0), metrics_of("fanuc", "6DoF", 7.0)])
     figure = noise_impact(frame, "6DoF", {"kuka": "Kuka KR 270"})
-    (axis,) = figure.axes
+    axis, linear = figure.axes
+    assert (axis.get_yscale(), linear.get_yscale()) == ("log", "linear") and len(linear.lines) == 4
     for index, size in enumerate((100.0, 200.0)):
         thin, thick = axis.lines[2 * index : 2 * index + 2]
         np.testing.assert_allclose(thin.get_xydata(), np.column_stack([LENGTHS, size / LENGTHS]))
         np.testing.assert_allclose(thick.get_xydata(), np.column_stack([LENGTHS[2:], size / LENGTHS[2:]]))
         assert thin.get_linewidth() < thick.get_linewidth() and thin.get_color() == thick.get_color() == PALETTE[index]
-        assert band(axis.collections[index])[4] == pytest.approx((0.9 * size / 4, 1.1 * size / 4))
+        # A tenth either way, as a factor.
+        assert band(axis.collections[index])[4] == pytest.approx((np.exp(-0.1) * size / 4, np.exp(0.1) * size / 4))
     assert len(axis.lines) == 4 and axis.get_title() == "Kuka KR 270"
-    assert (axis.get_xlabel(), axis.get_ylabel()) == ("configurations in the data set", "dev, equation 15 (µm)")
+    assert (linear.get_xlabel(), axis.get_ylabel()) == ("configurations in the data set", "dev, equation 15 (µm)")
     assert legend_entries(figure) == ["50", "100"]
     assert_nothing_cut_off(figure)
 
 
 def test_stiffness_errors_stand_under_both_counts_of_joints_with_their_limit():
-    whole, first = stiffness_errors(METRICS, "Kuka KR 270", "kuka", ORDER, 3.0).axes
+    whole, first = stiffness_errors(METRICS, PRINTED, "Kuka KR 270", "kuka", ORDER, 3.0).axes
     for axis, scale in ((whole, 1.0), (first, 0.5)):
-        one, other, limit = axis.lines
+        one, other, limit = axis.lines[:3]
         np.testing.assert_allclose(one.get_ydata(), 10 * scale / LENGTHS)
         np.testing.assert_allclose(other.get_ydata(), 20 * scale / LENGTHS)
         assert band(axis.collections[1])[2] == pytest.approx((9 * scale, 11 * scale))
         assert list(limit.get_ydata()) == [3.0, 3.0] and [text.get_text() for text in axis.texts] == ["3 %"]
     assert "all joints" in whole.get_title() and "first stage" in first.get_title()
     assert whole.get_ylabel() == r"$k_\Sigma$ (%)"
-    assert [text.get_text() for text in first.get_legend().get_texts()] == ORDER
+    assert [text.get_text() for text in first.get_legend().get_texts()] == [*ORDER, PAPER]
+    # Both counts are the first stage's in the paper: its score at 4 configurations, and where it reaches 3 %.
+    marks = [line for line in first.lines if line.get_marker() == "D"]
+    assert len(whole.lines) == 3 and [line.get_xydata().tolist() for line in marks] == [[[4, 2.2]], [[5, 3]]]
+    assert marks[0].get_color() == first.lines[1].get_color()
+
+
+def test_lines_begin_where_the_mean_of_the_inverse_exists():
+    frame = metrics_of("kuka", "6DoF", 10.0, untrusted=2)
+    (axis,) = deviations(frame, PRINTED, "Kuka", "kuka", ["6DoF"], 2.5).axes
+    assert axis.lines[0].get_xdata().tolist() == [3, 4, 5]
 
 
 def test_deviations_of_one_robot_are_in_micrometres_and_each_strategy_keeps_its_look():
     figure = deviations(
-        METRICS.assign(deviation=METRICS.deviation * np.where(METRICS.robot == "kuka", 1, 5)), "Kuka", "kuka", ORDER, 2.5
+        METRICS.assign(deviation=METRICS.deviation * np.where(METRICS.robot == "kuka", 1, 5)),
+        PRINTED,
+        "Kuka",
+        "kuka",
+        ORDER,
+        2.5,
     )
     (axis,) = figure.axes
-    one, other, limit = axis.lines
+    one, other, limit, printed = axis.lines
+    assert printed.get_xydata().tolist() == [[4, 6]]
     np.testing.assert_allclose(one.get_xydata(), np.column_stack([LENGTHS, 10 / LENGTHS]))
     np.testing.assert_allclose(other.get_ydata(), 20 / LENGTHS)
     assert band(axis.collections[0])[5] == pytest.approx((1.8, 2.2))
@@ -93,7 +122,7 @@ def test_deviations_of_one_robot_are_in_micrometres_and_each_strategy_keeps_its_
 
 
 def test_bias_and_accuracy_puts_the_averaged_model_below_the_error_of_one_data_set():
-    figure = bias_and_accuracy(METRICS, PER_DATASET, TITLES, ORDER)
+    figure = bias_and_accuracy(METRICS, PER_DATASET, TITLES, ORDER, 60.0)
     assert [axis.get_title() for axis in figure.axes] == [*TITLES.values()]
     for axis in figure.axes:
         for index in range(2):

@@ -4,6 +4,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.report.answers import answers
+from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
 from elastocal.report.question_answers import (
     budget_rows,
     design_facts,
@@ -11,8 +12,10 @@ from elastocal.report.question_answers import (
     ladder_rows,
     needed_rows,
     observability_rows,
+    place_facts,
     strategy_rows,
     summaries,
+    tube_rows,
     weighting_rows,
 )
 from elastocal.study.strategies import Stage, Strategy
@@ -118,7 +121,47 @@ def designs():
         for kind, each in values.items()
     ]
     frame = pd.concat(parts, ignore_index=True)
-    return frame.assign(low_um=frame.rms_um, high_um=frame.rms_um)
+    frame = frame.assign(low_um=frame.rms_um, high_um=frame.rms_um)
+    return pd.concat([frame.assign(joint_range=name) for name in ("full_turn", "limits")], ignore_index=True)
+
+
+def places():
+    """Two places of each arm: a link seen on one side, and the flange."""
+    rows = [(1, 1.5, "+y", 1.40, 50.0, 15.0), (1, 1.5, "-y", 1.42, 0.0, 0.0), (6, 3.0, "flange", 1.06, 30.0, 4.0)]
+    rows += [(6, 3.0, "bar +y", 1.05, 40.0, 5.0)]
+    frame = pd.DataFrame(rows, columns=["joints", "along_m", "side", "ratio", "seen_turned_percent", "seen_fixed_percent"])
+    frame = frame.assign(ratio_low=frame.ratio - 0.02, ratio_high=frame.ratio + 0.02)
+    return pd.concat([frame.assign(robot=robot) for robot in TITLES], ignore_index=True)
+
+
+def tubes():
+    row = {"robot": "bending", "diameter_mm": 248.4, "mean_mm": 1.75, "mean_mm_between": 0.12, "std_mm": 1.19}
+    row |= {"std_mm_between": 0.1, "max_mm": 5.73, "max_mm_between": 0.83, "left_um": 459.7, "left_um_std_error": 1.1}
+    return pd.DataFrame([row])
+
+
+def strategy_scores():
+    """A staged strategy that is worse by every metric but the sum over the joints of its first stage."""
+    rows = []
+    for robot in TITLES:
+        for metric in METRIC_NAMES:
+            staged = 0.5 if metric.endswith("first_stage") else 1.2
+            for strategy, ratio, half in (("6DoF", 1.0, 0.0), ("staged", staged, 0.05)):
+                rank = 1 + ((ratio > 1) if staged > 1 else (ratio == 1))
+                rows.append((robot, metric, strategy, 75.0 * ratio, 0.5, ratio, ratio - half, ratio + half, int(rank)))
+    names = ["robot", "metric", "strategy", "value", "value_std_error", "ratio", "ratio_low", "ratio_high", "rank"]
+    return pd.DataFrame(rows, columns=names)
+
+
+def score_pairs():
+    rows = []
+    for robot in TITLES:
+        for metric in METRIC_NAMES:
+            turned = metric.endswith("first_stage") and robot == "kuka"
+            ratio = (2.0, 1.5, 2.5) if turned else (0.83, 0.80, 0.86)
+            rows.append((robot, metric, "6DoF", "staged", *ratio, 0.83, 0.80, 0.86, turned))
+    names = ["robot", "metric", "strategy", "other", "ratio", "ratio_low", "ratio_high"]
+    return pd.DataFrame(rows, columns=[*names, "rms_ratio", "rms_ratio_low", "rms_ratio_high", "reversed"])
 
 
 def observability():
@@ -153,7 +196,14 @@ def question_facts():
         "ladder": ladder_rows(ladder()),
         "budget": budget_rows(budget(), pairs(), 20, robots),
         "needed": needed_rows(needed(), 60.0, robots),
-        "designs": design_facts(designs(), 20, 60.0, TITLES),
+        "designs": {kind: design_facts(some, 20, 60.0, TITLES) for kind, some in designs().groupby("joint_range")},
+        "joint_range": "full_turn",
+        "places": place_facts(places(), TITLES),
+        "scores": score_rows(strategy_scores(), robots),
+        "staged": staged_rows(strategy_scores(), robots),
+        "metrics": metric_summary(score_pairs()),
+        "metric_names": METRIC_NAMES,
+        "tubes": tube_rows(tubes()),
         "observability": observability_rows(observability(), robots),
         "summaries": summaries(ladder(), pairs(), observability()),
         "geometry": geometry_rows(geometry(), robots),

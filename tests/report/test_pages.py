@@ -8,7 +8,7 @@ from made_study_tables import facts, question_facts
 from elastocal.report.pages import write_report
 
 FIGURES = ["fig2", "fig3", "fig4", "fig5a", "fig5c", "table2_samples", "bias_and_accuracy", "accuracy_of_one_data_set"]
-FIGURES += ["scores_against_paper", "ladder", "budget", "designs"]
+FIGURES += ["scores_against_paper", "ladder", "budget", "designs", "arm_map", "metrics"]
 EVERY = facts() | question_facts()
 HEAD = {
     "table1": ["robot", "c1"],

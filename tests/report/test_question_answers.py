@@ -37,7 +37,8 @@ def test_lengths_have_their_interval_and_say_where_they_are_not_reached():
 
 
 def test_designs_are_compared_at_the_size_nearest_to_the_length():
-    kuka = design_facts(designs(), 19, 60.0, {"kuka": "Kuka"})[0]
+    some = designs()[designs().joint_range == "limits"]
+    kuka = design_facts(some, 19, 60.0, {"kuka": "Kuka"})[0]
     assert kuka == {
         "title": "Kuka",
         "length": "20",
@@ -47,7 +48,18 @@ def test_designs_are_compared_at_the_size_nearest_to_the_length():
         "efficiency": "81",
         "chosen_needed": "20",
     }
-    assert design_facts(designs(), 20, 1.0, {"kuka": "Kuka"})[0]["chosen_needed"] == "more than all"
+    assert design_facts(some, 20, 1.0, {"kuka": "Kuka"})[0]["chosen_needed"] == "more than all"
+
+
+def test_places_are_summed_up_by_their_extremes_and_by_what_is_certain():
+    kuka = question_facts()["places"][0]
+    assert kuka["least"] == "1.05 (1.03 to 1.07; on the bar +y)" and kuka["largest"] == "1.42 (1.40 to 1.44; behind joint 1)"
+    assert (kuka["better"], kuka["places"], kuka["turned"], kuka["fixed"]) == ("0", "4", "50", "15")
+
+
+def test_tubes_have_the_scatter_between_data_sets():
+    (row,) = question_facts()["tubes"]
+    assert [*row.values()] == ["248", "1.75 ± 0.12", "1.19 ± 0.10", "5.73 ± 0.83", "459.7 ± 1.1"]
 
 
 def test_summaries_count_what_is_certain():

@@ -10,6 +10,8 @@ from elastocal.study.question_tables import (
     geometry_table,
     ladder_table,
     observability_table,
+    places_table,
+    tubes_table,
     weighting_table,
 )
 
@@ -36,7 +38,8 @@ def test_without_a_robot_with_links_the_ladder_is_empty():
 
 def test_designs_are_in_micrometres():
     frame = pd.DataFrame({"design": ["D"], "configurations": [4], "rms": [8e-5], "low": [7e-5], "high": [9e-5]})
-    assert designs_table({"arm": frame}).iloc[0].tolist() == pytest.approx(["arm", "D", 4, 80.0, 70.0, 90.0])
+    found = designs_table({"arm": frame.assign(joint_range="limits")}).iloc[0].tolist()
+    assert found == pytest.approx(["arm", "limits", "D", 4, 80.0, 70.0, 90.0])
 
 
 def test_an_index_that_orders_data_sets_as_the_bound_does_has_rank_correlation_one():
@@ -62,3 +65,21 @@ def test_weights_are_compared_by_a_ratio():
     frame = pd.DataFrame({"orientation_ratio": [3.0], "per_metre": [5e-5], "equal": [1.5e-4], "weighted": [1e-4]})
     found = weighting_table({"arm": frame}).iloc[0].tolist()
     assert found[0] == "arm" and found[1:] == pytest.approx([3, 50, 150, 100, 1.5])
+
+
+def test_places_are_compared_by_the_ratio_of_root_mean_bounds_paired_by_data_set():
+    frame = pd.DataFrame({"joints": 2, "along": 1.2, "side": "+y", "data_set": range(4), "bound": [4.0, 8.0, 4.0, 8.0]})
+    frame = frame.assign(bound_end_effector=frame.bound / 4, turned=[0.5, 0.4, 0.5, 0.4], fixed=0.1)
+    (row,) = places_table({"arm": frame}).to_dict("records")
+    assert (row["ratio"], row["ratio_low"], row["ratio_high"]) == pytest.approx((2, 2, 2))
+    assert (row["robot"], row["joints"], row["side"]) == ("arm", 2, "+y")
+    assert (row["seen_turned_percent"], row["seen_fixed_percent"]) == pytest.approx((45, 10))
+
+
+def test_tubes_show_single_data_sets_and_what_joints_leave():
+    frame = pd.DataFrame({"diameter": 0.25, "data_set": [0, 1], "mean": [1e-3, 3e-3], "mean_square": [2e-6, 10e-6]})
+    frame = frame.assign(maximum=[4e-3, 6e-3], left=[1e-8, 3e-8])
+    (row,) = tubes_table({"arm": frame}).to_dict("records")
+    assert (row["diameter_mm"], row["mean_mm"], row["mean_mm_between"]) == pytest.approx((250, 2, np.sqrt(2)))
+    assert (row["std_mm"], row["max_mm"], row["left_um"]) == pytest.approx((1, 5, 1e6 * np.sqrt(2e-8)))
+    assert tubes_table({}).empty

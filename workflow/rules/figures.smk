@@ -5,15 +5,14 @@ Needs results/ and reports/tables/. Writes reports/figures/*.pdf and *.png.
 
 TITLES = {name: STUDY.robots[name]["name"] for name in config["robots"]}
 REDUCED_TITLES = {name: TITLES[name] for name in REDUCED}
-# Figures 2 and 3 show one robot, the extended one where there is one.
-SCHEME_ROBOT = (EXTENDED or REDUCED)[-1]
+# Figure 2 shows the first robot and has one more for each further one; Figure 3 shows the extended robot where there is one.
+SCHEME_ROBOTS = {"fig2": REDUCED[0], **{f"fig2_{name}": name for name in REDUCED[1:]}, "fig3": (EXTENDED or REDUCED)[-1]}
 # Figures 5a and 5c show the first robot, 5b and 5d the second, as in the paper.
 STIFFNESS_PANELS = dict(zip("ab", REDUCED, strict=False))
 DEVIATION_PANELS = dict(zip("cd", REDUCED, strict=False))
-SCHEMES = {"fig2": "kinematic_scheme", "fig3": "spring_scheme"}
 BEST_TWO = [name for name in (CLASSICAL, "3+6DoF-comb") if name in config["strategies"]]
 FIGURES = [
-    *SCHEMES,
+    *SCHEME_ROBOTS,
     "fig4",
     *(f"fig5{panel}" for panel in (STIFFNESS_PANELS | DEVIATION_PANELS)),
     "bias_and_accuracy",
@@ -23,6 +22,8 @@ FIGURES = [
     "ladder",
     "budget",
     "designs",
+    "arm_map",
+    "metrics",
 ]
 
 
@@ -37,10 +38,10 @@ rule draw_scheme:
     benchmark:
         "results/timings/draw_scheme/{scheme}.tsv"
     wildcard_constraints:
-        scheme="|".join(SCHEMES),
+        scheme="|".join(SCHEME_ROBOTS),
     params:
-        robot=STUDY.robots[SCHEME_ROBOT],
-        scheme=lambda wildcards: SCHEMES[wildcards.scheme],
+        robot=lambda wildcards: STUDY.robots[SCHEME_ROBOTS[wildcards.scheme]],
+        scheme=lambda wildcards: "spring_scheme" if wildcards.scheme == "fig3" else "kinematic_scheme",
     script:
         "../scripts/draw_scheme.py"
 
@@ -66,6 +67,7 @@ rule draw_noise_impact:
 rule draw_stiffness_errors:
     input:
         metrics=lambda wildcards: cells("metrics", STIFFNESS_PANELS[wildcards.panel], TABLE_NOISE),
+        reference="config/paper/reference.csv",
         sources=sources("draw_stiffness_errors.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
@@ -88,6 +90,7 @@ rule draw_stiffness_errors:
 rule draw_deviations:
     input:
         metrics=lambda wildcards: cells("metrics", DEVIATION_PANELS[wildcards.panel], TABLE_NOISE),
+        reference="config/paper/reference.csv",
         sources=sources("draw_deviations.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
@@ -123,6 +126,7 @@ rule draw_bias_and_accuracy:
         titles=REDUCED_TITLES,
         order=[NAMES[name] for name in BEST_TWO],
         noise_um=config["tables"]["noise_um"],
+        accuracy_um=QUESTIONS["accuracies_um"][0],
     script:
         "../scripts/draw_bias_and_accuracy.py"
 
@@ -230,5 +234,41 @@ rule draw_designs:
     params:
         titles=REDUCED_TITLES,
         accuracy_um=QUESTIONS["accuracies_um"][0],
+        joint_range=INTERPRETATIONS["joint_range"],
     script:
         "../scripts/draw_designs.py"
+
+
+rule draw_arm_map:
+    input:
+        table=rules.tabulate_places.output.table,
+        sources=sources("draw_arm_map.py"),
+    output:
+        pdf="reports/figures/arm_map.pdf",
+        png="reports/figures/arm_map.png",
+    log:
+        "results/logs/draw_arm_map.log",
+    benchmark:
+        "results/timings/draw_arm_map.tsv"
+    params:
+        robots={name: STUDY.robots[name] for name in REDUCED},
+        titles=REDUCED_TITLES,
+    script:
+        "../scripts/draw_arm_map.py"
+
+
+rule draw_metrics:
+    input:
+        table=rules.tabulate_uses.output.scores,
+        sources=sources("draw_metrics.py"),
+    output:
+        pdf="reports/figures/metrics.pdf",
+        png="reports/figures/metrics.png",
+    log:
+        "results/logs/draw_metrics.log",
+    benchmark:
+        "results/timings/draw_metrics.tsv"
+    params:
+        titles=REDUCED_TITLES,
+    script:
+        "../scripts/draw_metrics.py"

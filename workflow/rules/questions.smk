@@ -1,8 +1,9 @@
-"""Research questions beyond the paper's strategies: which points (RQ2), how many springs (RQ1), which configurations (RQ3).
+"""Research questions beyond the paper's tables: how many springs (RQ1), which points (RQ2), which configurations (RQ3), which
+metric (RQ4), and what the assumptions are worth.
 
-Needs nothing but the configuration: the data sets are those of the study, drawn again in memory. Writes
-results/budget/{robot}.parquet, results/ladder/, results/designs/ and results/observability/ alike, and reports/tables/budget.csv,
-budget_pairs.csv, configurations_needed.csv, ladder.csv, designs.csv, observability.csv, geometry.csv and weighting.csv.
+Needs the configuration alone, as the data sets are those of the study, drawn again in memory; tabulate_uses needs results/metrics/
+and results/replicates/. Writes results/budget/{robot}.parquet, and results/places/, ladder/, designs/, observability/, uses/,
+geometry/, weighting/ and tubes/ alike, and from each tables of their names in reports/tables/.
 """
 
 QUESTIONS = config["questions"]
@@ -155,7 +156,7 @@ rule vary_assumptions:
     params:
         study=study_in_memory(configurations=config["tables"]["length"]),
         geometry=QUESTIONS["geometry_errors"],
-        weighting=QUESTIONS["unequal_noise"],
+        weighting=QUESTIONS["unequal_noise"] | {"tracker_m": QUESTIONS["tracker_m"]},
     script:
         "../scripts/vary_assumptions.py"
 
@@ -176,3 +177,107 @@ rule tabulate_assumptions:
         robots=REDUCED,
     script:
         "../scripts/tabulate_assumptions.py"
+
+
+rule map_arm:
+    input:
+        sources=sources("map_arm.py"),
+    output:
+        places="results/places/{robot}.parquet",
+    log:
+        "results/logs/map_arm/{robot}.log",
+    benchmark:
+        "results/timings/map_arm/{robot}.tsv"
+    params:
+        study=study_in_memory(configurations=config["tables"]["length"]),
+        tracker_m=QUESTIONS["tracker_m"],
+        arm_points=QUESTIONS["arm_points"],
+    script:
+        "../scripts/map_arm.py"
+
+
+rule judge_in_use:
+    input:
+        sources=sources("judge_in_use.py"),
+    output:
+        uses="results/uses/{robot}.parquet",
+    log:
+        "results/logs/judge_in_use/{robot}.log",
+    benchmark:
+        "results/timings/judge_in_use/{robot}.tsv"
+    params:
+        study=study_in_memory(configurations=config["tables"]["length"]),
+        strategies=list(STUDY.strategies.values()),
+        uses=QUESTIONS["uses"],
+    script:
+        "../scripts/judge_in_use.py"
+
+
+rule vary_tubes:
+    input:
+        sources=sources("vary_tubes.py"),
+    output:
+        tubes="results/tubes/{robot}.parquet",
+    log:
+        "results/logs/vary_tubes/{robot}.log",
+    benchmark:
+        "results/timings/vary_tubes/{robot}.tsv"
+    params:
+        study=study_in_memory(),
+        factors=QUESTIONS["tube_factors"],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/vary_tubes.py"
+
+
+rule tabulate_places:
+    input:
+        places=expand(rules.map_arm.output.places, robot=REDUCED),
+        sources=sources("tabulate_places.py"),
+    output:
+        table="reports/tables/places.csv",
+    log:
+        "results/logs/tabulate_places.log",
+    benchmark:
+        "results/timings/tabulate_places.tsv"
+    params:
+        robots=REDUCED,
+    script:
+        "../scripts/tabulate_places.py"
+
+
+rule tabulate_uses:
+    input:
+        uses=expand(rules.judge_in_use.output.uses, robot=REDUCED),
+        metrics=cells("metrics", REDUCED, TABLE_NOISE),
+        replicates=cells("replicates", REDUCED, TABLE_NOISE),
+        sources=sources("tabulate_uses.py"),
+    output:
+        scores="reports/tables/strategy_scores.csv",
+        pairs="reports/tables/strategy_pairs.csv",
+    log:
+        "results/logs/tabulate_uses.log",
+    benchmark:
+        "results/timings/tabulate_uses.tsv"
+    params:
+        robots=REDUCED,
+        classical=NAMES[CLASSICAL],
+        length=config["tables"]["length"],
+    script:
+        "../scripts/tabulate_uses.py"
+
+
+rule tabulate_tubes:
+    input:
+        tubes=expand(rules.vary_tubes.output.tubes, robot=EXTENDED),
+        sources=sources("tabulate_tubes.py"),
+    output:
+        table="reports/tables/tubes.csv",
+    log:
+        "results/logs/tabulate_tubes.log",
+    benchmark:
+        "results/timings/tabulate_tubes.tsv"
+    params:
+        robots=EXTENDED,
+    script:
+        "../scripts/tabulate_tubes.py"

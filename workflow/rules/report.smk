@@ -14,6 +14,10 @@ rule state_answers:
         needed=rules.tabulate_budget.output.lengths,
         designs=rules.tabulate_designs.output.table,
         observability=rules.tabulate_observability.output.table,
+        places=rules.tabulate_places.output.table,
+        scores=rules.tabulate_uses.output.scores,
+        score_pairs=rules.tabulate_uses.output.pairs,
+        tubes=rules.tabulate_tubes.output.table,
         geometry=rules.tabulate_assumptions.output.geometry,
         weighting=rules.tabulate_assumptions.output.weighting,
         table2=rules.tabulate_initial.output.table,
@@ -35,6 +39,7 @@ rule state_answers:
         cells={key: config["tables"][key] for key in ("noise_um", "length")} | {"classical_strategy": NAMES[CLASSICAL]},
         strategies=list(STUDY.strategies.values()),
         accuracy_um=QUESTIONS["accuracies_um"][0],
+        joint_range=INTERPRETATIONS["joint_range"],
         size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
     script:
         "../scripts/state_answers.py"

@@ -13,7 +13,9 @@ from job import Job, run
 def draw_bias_and_accuracy(job: Job) -> None:
     settings = job.params
     per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
-    figure = bias_and_accuracy(read_long(job.input.metrics, metrics), per_dataset, settings.titles, settings.order)
+    figure = bias_and_accuracy(
+        read_long(job.input.metrics, metrics), per_dataset, settings.titles, settings.order, settings.accuracy_um
+    )
     save(figure, job.output.pdf, job.output.png)
 
 

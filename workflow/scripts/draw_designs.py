@@ -9,7 +9,9 @@ from job import Job, run
 
 
 def draw_designs(job: Job) -> None:
-    save(designs(pd.read_csv(job.input.table), job.params.titles, job.params.accuracy_um), job.output.pdf, job.output.png)
+    settings = job.params
+    figure = designs(pd.read_csv(job.input.table), settings.titles, settings.accuracy_um, settings.joint_range)
+    save(figure, job.output.pdf, job.output.png)
 
 
 run(draw_designs, snakemake)

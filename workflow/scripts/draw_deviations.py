@@ -1,5 +1,7 @@
 """Figures 5c and 5d: deviation of all strategies."""
 
+import pandas as pd
+
 from elastocal.figures.strategies import deviations
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
@@ -10,8 +12,12 @@ from job import Job, run
 
 def draw_deviations(job: Job) -> None:
     settings = job.params
-    frame = read_long(job.input.metrics, metrics)
-    save(deviations(frame, settings.title, settings.robot, settings.order, settings.limit), job.output.pdf, job.output.png)
+    frame, printed = read_long(job.input.metrics, metrics), pd.read_csv(job.input.reference, dtype={"table": str})
+    save(
+        deviations(frame, printed, settings.title, settings.robot, settings.order, settings.limit),
+        job.output.pdf,
+        job.output.png,
+    )
 
 
 run(draw_deviations, snakemake)

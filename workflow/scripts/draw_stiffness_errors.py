@@ -1,5 +1,7 @@
 """Figures 5a and 5b: summed stiffness error of all strategies."""
 
+import pandas as pd
+
 from elastocal.figures.strategies import stiffness_errors
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
@@ -10,9 +12,11 @@ from job import Job, run
 
 def draw_stiffness_errors(job: Job) -> None:
     settings = job.params
-    frame = read_long(job.input.metrics, metrics)
+    frame, printed = read_long(job.input.metrics, metrics), pd.read_csv(job.input.reference, dtype={"table": str})
     save(
-        stiffness_errors(frame, settings.title, settings.robot, settings.order, settings.limit), job.output.pdf, job.output.png
+        stiffness_errors(frame, printed, settings.title, settings.robot, settings.order, settings.limit),
+        job.output.pdf,
+        job.output.png,
     )
 
 

@@ -7,6 +7,7 @@ import pandas as pd
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import read_long
 from elastocal.report.answers import answers
+from elastocal.report.metric_answers import METRIC_NAMES, metric_summary, score_rows, staged_rows
 from elastocal.report.question_answers import (
     budget_rows,
     design_facts,
@@ -14,8 +15,10 @@ from elastocal.report.question_answers import (
     ladder_rows,
     needed_rows,
     observability_rows,
+    place_facts,
     strategy_rows,
     summaries,
+    tube_rows,
     weighting_rows,
 )
 from elastocal.study.strategies import strategy_from_document
@@ -41,13 +44,21 @@ def state_answers(job: Job) -> None:
     )
     titles, length, accuracy = settings.titles, settings.cells["length"], settings.accuracy_um
     ladder, pairs = pd.read_csv(job.input.ladder, dtype={"link_springs": str}), pd.read_csv(job.input.pairs)
-    observability = pd.read_csv(job.input.observability)
+    observability, designs = pd.read_csv(job.input.observability), pd.read_csv(job.input.designs)
+    scores = pd.read_csv(job.input.scores)
     facts |= {
         "strategies": strategy_rows([strategy_from_document(document) for document in settings.strategies]),
         "ladder": ladder_rows(ladder),
         "budget": budget_rows(pd.read_csv(job.input.budget), pairs, length, [*titles]),
         "needed": needed_rows(pd.read_csv(job.input.needed), accuracy, [*titles]),
-        "designs": design_facts(pd.read_csv(job.input.designs), length, accuracy, titles),
+        "designs": {kind: design_facts(some, length, accuracy, titles) for kind, some in designs.groupby("joint_range")},
+        "joint_range": settings.joint_range,
+        "places": place_facts(pd.read_csv(job.input.places), titles),
+        "scores": score_rows(scores, [*titles]),
+        "staged": staged_rows(scores, [*titles]),
+        "metrics": metric_summary(pd.read_csv(job.input.score_pairs)),
+        "metric_names": METRIC_NAMES,
+        "tubes": tube_rows(pd.read_csv(job.input.tubes)),
         "observability": observability_rows(observability, [*titles]),
         "summaries": summaries(ladder, pairs, observability),
         "geometry": geometry_rows(pd.read_csv(job.input.geometry), [*titles]),

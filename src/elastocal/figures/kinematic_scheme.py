@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +72,7 @@ def kinematic_scheme(robot: Robot) -> Figure:
     _draw_labels(sheet, segments, joints, points)
     low, high = sheet.taken[:, :2].min(axis=0), sheet.taken[:, 2:].max(axis=0)
     top = high[1] + 7.0
-    low[1] = _draw_legend(sheet, segments, joints, (low + high)[0] / 2, low[1] - 7.0)
+    low[1] = _draw_legend(sheet, segments, joints, points, (low + high)[0] / 2, low[1] - 7.0)
     sheet.text(((low + high)[0] / 2, top), robot.name, fontproperties=BOLD)
     return sheet.finish(low, (high[0], top + TEXT_HEIGHT_MM / 2))
 
@@ -157,6 +158,10 @@ def _draw_labels(sheet: Sheet, segments: Sequence[Segment], joints: Sequence[Joi
         sheet.label(point.name, [point.place], _outward(point.place, middle), (8.0, 0.0), f"point-{point.name}", frame=colour)
 
 
+def _draw_mark(sheet: Sheet, number: int, place: np.ndarray) -> None:
+    sheet.axes.plot(*place, ls="none", **_point_style(number))
+
+
 def _visible_places(segment: Segment) -> list[np.ndarray]:
     """Places on a link that no joint covers, those near its middle first."""
     places = [segment.start + part * (segment.end - segment.start) for part in (0.5, 0.6, 0.4, 0.7, 0.3, 0.8, 0.2)]
@@ -169,14 +174,18 @@ def _outward(place: np.ndarray, middle: np.ndarray) -> np.ndarray:
     return (place - middle) / distance if distance > 0 else np.array([0.0, 1.0])
 
 
-def _draw_legend(sheet: Sheet, segments: Iterable[Segment], joints: Iterable[Joint], middle: float, top: float) -> float:
+def _draw_legend(
+    sheet: Sheet, segments: Iterable[Segment], joints: Iterable[Joint], points: Sequence[Point], middle: float, top: float
+) -> float:
     """Symbols and what they mean, below the drawing; returns where it ends."""
     entries: list[tuple[Callable[[np.ndarray], Any], float, str]] = []
     if any(not joint.across for joint in joints):
         entries.append((lambda p: _draw_joint(sheet, p, np.array([1.0, 0.0])), 13.0, "joint, axis in plane"))
     if any(joint.across for joint in joints):
         entries.append((lambda p: _draw_joint(sheet, p, None), 8.0, "joint, axis normal to plane"))
-    entries.append((lambda p: sheet.axes.plot(*p, ls="none", **_point_style(0)), 4.0, "measuring point"))
+    for number, point in enumerate(points):
+        name = f"measuring point {point.name}" if number == 0 else point.name
+        entries.append((partial(_draw_mark, sheet, number), 4.0, name))
     if any(not segment.length_m for segment in segments):
         entries.append((lambda p: sheet.line([(p[0] - 4.0, p[1]), (p[0] + 4.0, p[1])], **SEPARATOR), 9.0, "no length"))
     bottom = sheet.legend(entries, middle, top)

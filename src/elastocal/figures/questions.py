@@ -1,9 +1,10 @@
-"""Figures of the research questions: springs that pay, points at an equal budget, configurations that are chosen."""
+"""Figures of the research questions: springs that pay, points at an equal budget, chosen configurations, metrics."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from elastocal.figures.style import PALETTE, line_style, note, panels, styled
@@ -92,7 +93,7 @@ def budget(table: pd.DataFrame, titles: Mapping[str, str], length: int) -> Figur
 
 
 @styled
-def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) -> Figure:
+def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float, joint_range: str) -> Figure:
     """Error that random and optimal configurations leave, by their number.
 
     Parameters
@@ -103,11 +104,14 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) 
         Name of each robot to draw, by its key.
     accuracy_um : float
         Marked by a line.
+    joint_range : str
+        Whose rows are drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
+    table = table[table.joint_range == joint_range]
     figure, axes = panels(1, len(titles), 80, sharey=True)
     for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
         for index, (kind, name) in enumerate(_DESIGNS.items()):
@@ -122,6 +126,43 @@ def designs(table: pd.DataFrame, titles: Mapping[str, str], accuracy_um: float) 
         _plain(axis.yaxis)
     axes[0, 0].set_ylabel("bound of the RMS error (µm)")
     title = f"band: 5 to 95 % of random designs; line: {accuracy_um:g} µm"
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
+    return figure
+
+
+@styled
+def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, str]) -> Figure:
+    """Scores of the strategies over those of the classical one, metric by metric.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From `ranks.ranks_table`.
+    titles : dict of str to str
+        Name of each robot to draw, by its key.
+    names : dict of str to str
+        What each metric is called.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        One estimator under several names is drawn once, under the first of them.
+    """
+    figure, axes = panels(1, len(titles), 26 + 8 * len(names), sharey=True, sharex=True)
+    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+        mine = table[table.robot == robot]
+        strategies = mine[mine.metric == next(iter(names))].drop_duplicates("value").strategy
+        for index, strategy in enumerate(strategies):
+            cells = mine[mine.strategy == strategy].set_index("metric").loc[[*names]]
+            rows = np.arange(len(names)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
+            spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
+            axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)
+        axis.axvline(1.0, color="black", linewidth=0.7)
+        axis.set(title=title, xscale="log", yticks=range(len(names)), ylim=(len(names) - 0.5, -0.5))
+        _plain(axis.xaxis)
+        axis.grid(visible=False, axis="y")
+    axes[0, 0].set_yticklabels(names.values())
+    title = "score over that of the first strategy, 95 % intervals"
     figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
     return figure
 

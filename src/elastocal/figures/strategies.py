@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MICRO = 1e6
+# Of the linear panels of the noise impact: what a reader compares with the wanted accuracy.
+_LINEAR_UM = 20.0
 _LENGTH = "configurations in the data set"
+_BANDS = "bands: ± one Monte Carlo standard error"
 
 
 @styled
@@ -36,30 +40,40 @@ def noise_impact(metrics: pd.DataFrame, strategy: str, titles: Mapping[str, str]
     -------
     matplotlib.figure.Figure
     """
-    figure, axes = panels(1, len(titles), 78, sharey=True)
-    for axis, (robot, title) in zip(axes[0], titles.items(), strict=True):
+    figure, axes = panels(2, len(titles), 118, sharex=True, sharey="row")
+    for column, (robot, title) in zip(axes.T, titles.items(), strict=True):
         cells = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
-        for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
-            trusted = cell[cell.trustworthy]
-            axis.plot(cell.length, MICRO * cell.deviation, color=PALETTE[index], linewidth=0.5, alpha=0.5)
-            axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g}")
-            _band(axis, trusted.length, MICRO * trusted.deviation, MICRO * trusted.deviation_std_error, PALETTE[index])
-        axis.set(title=title, xlabel=_LENGTH, yscale="log", xlim=(1, cells.length.max()), ylim=(1e-4, 3000))
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        for axis in column:
+            for index, (noise, cell) in enumerate(cells.groupby("noise_um")):
+                trusted = cell[cell.trustworthy]
+                axis.plot(cell.length, MICRO * cell.deviation, color=PALETTE[index], linewidth=0.5, alpha=0.5)
+                axis.plot(trusted.length, MICRO * trusted.deviation, color=PALETTE[index], label=f"{noise:g}")
+                # By factors, which keeps a band on a logarithmic axis where the error is as large as the value.
+                spread = np.exp(trusted.deviation_std_error / trusted.deviation)
+                value = MICRO * trusted.deviation
+                axis.fill_between(trusted.length, value / spread, value * spread, color=PALETTE[index], alpha=0.12, linewidth=0)
+        column[0].set(title=title, yscale="log", ylim=(1e-4, 3000))
+        column[0].yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        column[1].set(xlabel=_LENGTH, xlim=(1, cells.length.max()), ylim=(0, _LINEAR_UM))
     axes[0, 0].set_ylabel("dev, equation 15 (µm)")
-    title = "noise (µm and µrad); thin where the mean of 1/c is not to be trusted"
+    axes[1, 0].set_ylabel("the same, linear (µm)")
+    title = "noise (µm and µrad); bands: a standard error as a factor; thin: some ĉ ≤ 0, or ĉ scatters by over a quarter"
     figure.legend(*axes[0, 0].get_legend_handles_labels(), title=title, loc="outside lower center", ncols=5, title_fontsize=7.5)
     return figure
 
 
 @styled
-def stiffness_errors(metrics: pd.DataFrame, title: str, robot: str, order: Iterable[str], limit_percent: float) -> Figure:
+def stiffness_errors(
+    metrics: pd.DataFrame, printed: pd.DataFrame, title: str, robot: str, order: Sequence[str], limit_percent: float
+) -> Figure:
     """Figures 5a and 5b: summed stiffness error of all strategies against the data set length, under both counts of joints.
 
     Parameters
     ----------
     metrics : DataFrame
         Long, of one noise level.
+    printed : DataFrame
+        The printed figures; those of k_sigma are taken to count the joints of the first stage.
     title : str
     robot : str
     order : sequence of str
@@ -71,29 +85,31 @@ def stiffness_errors(metrics: pd.DataFrame, title: str, robot: str, order: Itera
     -------
     matplotlib.figure.Figure
     """
-    figure, axes = panels(1, 2, 88, sharey=True)
-    counts = {
-        "k_sigma": "all joints, as equation 14 says",
-        "k_sigma_first_stage": "joints of the first stage, as Table 4 seems to",
-    }
+    figure, axes = panels(1, 2, 92, sharey=True)
+    counts = {"k_sigma": "all joints (equation 14)", "k_sigma_first_stage": "joints of the first stage"}
     for axis, (quantity, count) in zip(axes[0], counts.items(), strict=True):
         _strategy_lines(axis, metrics, robot, quantity, 1.0, order)
         _limit(axis, limit_percent, "%")
         axis.set(title=count, xlabel=_LENGTH)
+    _printed_marks(axes[0, 1], printed, robot, "k_sigma", order)
     figure.suptitle(title, fontsize=9)
     axes[0, 0].set(ylabel=r"$k_\Sigma$ (%)", ylim=(0, 20))
-    axes[0, 1].legend(loc="upper right")
+    axes[0, 1].legend(loc="upper right", title=_BANDS, title_fontsize=7.5)
     return figure
 
 
 @styled
-def deviations(metrics: pd.DataFrame, title: str, robot: str, order: Iterable[str], limit_um: float) -> Figure:
+def deviations(
+    metrics: pd.DataFrame, printed: pd.DataFrame, title: str, robot: str, order: Sequence[str], limit_um: float
+) -> Figure:
     """Figures 5c and 5d: deviation of all strategies against the data set length.
 
     Parameters
     ----------
     metrics : DataFrame
         Long, of one noise level.
+    printed : DataFrame
+        The printed figures.
     title : str
     robot : str
     order : sequence of str
@@ -109,14 +125,15 @@ def deviations(metrics: pd.DataFrame, title: str, robot: str, order: Iterable[st
     axis = axes[0, 0]
     _strategy_lines(axis, metrics, robot, "deviation", MICRO, order)
     _limit(axis, limit_um, "µm")
+    _printed_marks(axis, printed, robot, "dev", order)
     axis.set(title=title, xlabel=_LENGTH, ylabel="dev, equation 15 (µm)", ylim=(0, 40))
-    axis.legend(loc="upper right", ncols=2)
+    axis.legend(loc="upper right", ncols=2, title=_BANDS, title_fontsize=7.5)
     return figure
 
 
 @styled
 def bias_and_accuracy(
-    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str]
+    metrics: pd.DataFrame, per_dataset: pd.DataFrame, titles: Mapping[str, str], order: Sequence[str], accuracy_um: float
 ) -> Figure:
     """What the paper's metric hides: the bias of the averaged model against the error that one data set leaves.
 
@@ -130,6 +147,8 @@ def bias_and_accuracy(
         Name of each robot to draw, by its key.
     order : sequence of str
         Strategies to draw.
+    accuracy_um : float
+        Wanted; marked by a line.
 
     Returns
     -------
@@ -143,10 +162,12 @@ def bias_and_accuracy(
             color = PALETTE[index]
             axis.fill_between(single.ds, single.mean_um, single.p95_um, color=color, alpha=0.13, linewidth=0)
             axis.plot(single.ds, single.rms_um, color=color, marker="o", markersize=3, label=f"{strategy}: one data set, RMS")
-            axis.plot(single.ds, single.crlb_rms_um, color=color, linestyle=":", label=f"{strategy}: Cramér-Rao bound, RMS")
+            bound = {"color": "black", "marker": "_", "markersize": 7, "linestyle": "none", "zorder": 3 + index}
+            axis.plot(single.ds, single.crlb_rms_um, label=f"{strategy}: Cramér-Rao bound, RMS", **bound)
             axis.plot(
                 averaged.length, MICRO * averaged.deviation, color=color, linestyle="--", label=f"{strategy}: dev of the paper"
             )
+        _limit(axis, accuracy_um, "µm")
         axis.set(title=title, xlabel=_LENGTH, xscale="log", yscale="log", xlim=(2, 100), ylim=(0.5, 2000))
         for plain in (axis.xaxis, axis.yaxis):
             plain.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -187,18 +208,32 @@ def accuracy_of_one_data_set(per_dataset: pd.DataFrame, titles: Mapping[str, str
         axis.set(title=title, xlabel="RMS end-effector error (µm)", yticks=rows)
         axis.set_yticklabels(order)
         axis.grid(visible=False, axis="y")
-    figure.suptitle(f"one data set of {length} configurations; in the bars: efficiency against the bound", fontsize=9)
+    figure.suptitle(f"one data set of {length} configurations; in the bars: efficiency, (bound / RMS)²", fontsize=9)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
 
 
 def _strategy_lines(axis: Axes, metrics: pd.DataFrame, robot: str, quantity: str, scale: float, order: Iterable[str]) -> None:
     for index, strategy in enumerate(order):
-        cell = metrics[(metrics.robot == robot) & (metrics.strategy == strategy)]
-        style = line_style(index)
+        mine = (metrics.robot == robot) & (metrics.strategy == strategy)
+        # Where the mean of 1/c exists in practice.
+        cell, style = metrics[mine & metrics.trustworthy], line_style(index)
         axis.plot(cell.length, scale * cell[quantity], label=strategy, **style)
         _band(axis, cell.length, scale * cell[quantity], scale * cell[f"{quantity}_std_error"], style["color"])
     axis.set_xlim(2, metrics.length.max())
+
+
+def _printed_marks(axis: Axes, printed: pd.DataFrame, robot: str, quantity: str, order: Sequence[str]) -> None:
+    """Scores that the paper prints at a length, and the lengths at which it has them reach a limit."""
+    label = "paper: score, and length at the limit"
+    for row in printed[(printed.table == "4") & (printed.robot == robot) & printed.strategy.isin(order)].itertuples():
+        score = re.fullmatch(rf"{quantity}_(\d+)", str(row.quantity))
+        reached = re.fullmatch(rf"n_{quantity}_([\d.]+)_\w+", str(row.quantity))
+        if score or reached:
+            place = (float(score[1]), row.value) if score else (row.value, float(reached[1]) if reached else np.nan)
+            colour = line_style(order.index(str(row.strategy)))["color"]
+            axis.plot(*place, "D", color=colour, markeredgecolor="black", markersize=4, zorder=4, label=label)
+            label = "_same"
 
 
 def _limit(axis: Axes, value: float, unit: str) -> None:

@@ -76,7 +76,7 @@ def read_studies(paths: Iterable[str | Path], schema: Callable[[int], TableSchem
     frames = []
     for path in paths:
         origin = read_provenance(path)
-        joints = len(origin["configuration"]["robot"]["compliance_urad_per_Nm"])
+        joints = len(origin["configuration"]["study"]["robot"]["compliance_urad_per_Nm"])
         frames.append(pd.DataFrame({"robot": origin["robot"]} | read_table(path, schema(joints))))
     return pd.concat(frames, ignore_index=True)
 

@@ -265,6 +265,66 @@ def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[
     return rows
 
 
+def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
+    """What a second target is worth on the arm, a dictionary for each robot.
+
+    Parameters
+    ----------
+    places : DataFrame
+        From `question_tables.places_table`.
+    titles : dict of str to str
+
+    Returns
+    -------
+    list of dict
+        title, least and largest: ratios with their intervals and where; better: places significantly better than further
+        configurations; turned and fixed: largest percentages of configurations in which a target on a link is seen.
+    """
+    found = []
+    for robot, title in titles.items():
+        mine = places[places.robot == robot]
+        least, largest = mine.iloc[int(mine.ratio.argmin())], mine.iloc[int(mine.ratio.argmax())]
+        found.append(
+            {
+                "title": title,
+                "least": f"{least.ratio:.2f} ({least.ratio_low:.2f} to {least.ratio_high:.2f}; {_where(least)})",
+                "largest": f"{largest.ratio:.2f} ({largest.ratio_low:.2f} to {largest.ratio_high:.2f}; {_where(largest)})",
+                "better": str(int((mine.ratio_high < 1).sum())),
+                "places": str(len(mine)),
+                "turned": f"{mine.seen_turned_percent.max():.0f}",
+                "fixed": f"{mine.seen_fixed_percent.max():.0f}",
+            }
+        )
+    return found
+
+
+def tube_rows(tubes: pd.DataFrame) -> list[dict[str, str]]:
+    """Deflections and errors by the diameter of the tubes.
+
+    Parameters
+    ----------
+    tubes : DataFrame
+        From `question_tables.tubes_table`.
+
+    Returns
+    -------
+    list of dict
+        diameter, mean, std, max, left.
+    """
+    return [
+        {
+            "diameter": f"{row.diameter_mm:.0f}",
+            **{name: f"{row[f'{name}_mm']:.2f} ± {row[f'{name}_mm_between']:.2f}" for name in ("mean", "std", "max")},
+            "left": worded(row.left_um, row.left_um_std_error),
+        }
+        for _, row in tubes.iterrows()
+    ]
+
+
+def _where(place: Any) -> str:
+    return f"on the {place.side}" if place.side.startswith(("flange", "bar")) else f"behind joint {place.joints}"
+
+
 def summaries(ladder: pd.DataFrame, pairs: pd.DataFrame, observability: pd.DataFrame) -> dict[str, str]:
     """What the tables say in a sentence each.
 

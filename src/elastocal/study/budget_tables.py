@@ -88,8 +88,7 @@ def paired_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Se
             # Delta method: deviations of both roots data set by data set.
             each = np.stack([ours, theirs]) / (2 * roots[:, None])
             error = (each[0] - each[1]).std(ddof=1) / np.sqrt(len(ours))
-            relative = (each[0] / roots[0] - each[1] / roots[1]).std(ddof=1) / np.sqrt(len(ours))
-            ratio = roots[0] / roots[1]
+            ratio, low, high = ratio_of_roots(ours, theirs)
             rows.append(
                 {
                     "robot": robot,
@@ -101,8 +100,8 @@ def paired_table(frames: Mapping[str, pd.DataFrame], point_sets: Mapping[str, Se
                     "difference_um": MICRO * (roots[0] - roots[1]),
                     "difference_um_std_error": MICRO * error,
                     "ratio": ratio,
-                    "ratio_low": ratio * np.exp(-_QUANTILE * relative),
-                    "ratio_high": ratio * np.exp(_QUANTILE * relative),
+                    "ratio_low": low,
+                    "ratio_high": high,
                 }
             )
     return pd.DataFrame(rows, columns=[*_PAIRED])
@@ -161,6 +160,24 @@ def root_mean(squares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     root = np.sqrt(squares.mean(axis=0))
     return root, squares.std(axis=0, ddof=1) / np.sqrt(len(squares)) / (2 * root)
+
+
+def ratio_of_roots(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
+    """Ratio of two root mean squares over the same data sets with its 95 % interval, by the delta method.
+
+    Parameters
+    ----------
+    ours, theirs : ndarray (sets,)
+        Mean squares, of one data set at one place.
+
+    Returns
+    -------
+    ratio, low, high : float
+    """
+    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
+    relative = (ours / ours.mean() - theirs / theirs.mean()) / 2
+    error = _QUANTILE * relative.std(ddof=1) / np.sqrt(len(ours))
+    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
 
 
 def _at(frame: pd.DataFrame, points: str, configurations: int) -> pd.DataFrame:

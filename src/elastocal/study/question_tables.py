@@ -8,13 +8,14 @@ import numpy as np
 import pandas as pd
 from scipy.stats import spearmanr
 
-from elastocal.study.budget_tables import MICRO, root_mean
+from elastocal.study.budget_tables import MICRO, ratio_of_roots, root_mean
 from elastocal.study.observability import INDICES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 CHOSEN = "by cross-validation"
+MILLI = 1e3
 
 
 def ladder_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
@@ -58,11 +59,12 @@ def designs_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        robot, design, configurations, rms_um, low_um and high_um: 5 and 95 % of random designs.
+        robot, joint_range, design, configurations, rms_um, low_um and high_um: 5 and 95 % of random designs.
     """
     parts = []
     for robot, frame in frames.items():
-        part = pd.DataFrame({"robot": robot, "design": frame.design, "configurations": frame.configurations})
+        part = frame[["joint_range", "design", "configurations"]].copy()
+        part.insert(0, "robot", robot)
         parts.append(part.assign(**{f"{name}_um": MICRO * frame[name] for name in ("rms", "low", "high")}))
     return pd.concat(parts, ignore_index=True)
 
@@ -140,3 +142,60 @@ def weighting_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
             part[f"{name}_um"] = MICRO * frame[name]
         parts.append(part.assign(ratio=frame.equal / frame.weighted))
     return pd.concat(parts, ignore_index=True)
+
+
+def places_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """A second target at each place of the arm, against the end-effector in twice as many configurations.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The places table of each robot.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, joints, along_m, side, ratio of the bounds at as many measurements with its 95 % interval, ratio_low and
+        ratio_high; seen_turned_percent and seen_fixed_percent: configurations in which a tracker sees the target.
+    """
+    rows: list[dict[str, Any]] = []
+    for robot, frame in frames.items():
+        for (joints, along, side), cell in frame.groupby(["joints", "along", "side"], sort=False):
+            ratio, low, high = ratio_of_roots(cell.bound.to_numpy(), cell.bound_end_effector.to_numpy())
+            row: dict[str, Any] = {"robot": robot, "joints": joints, "along_m": along, "side": side}
+            row |= {"ratio": ratio, "ratio_low": low, "ratio_high": high}
+            for name in ("turned", "fixed"):
+                row[f"seen_{name}_percent"] = 100 * cell[name].mean()
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def tubes_table(frames: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Deflections before calibration in single data sets, and what joint springs alone leave, by the diameter of the tubes.
+
+    Parameters
+    ----------
+    frames : dict of str to DataFrame
+        The tubes table of each robot with links.
+
+    Returns
+    -------
+    pandas.DataFrame
+        robot, diameter_mm; mean_mm, std_mm and max_mm of single data sets, each with the standard deviation between data sets
+        (mean_mm_between ...); left_um with its standard error.
+    """
+    rows: list[dict[str, Any]] = []
+    for robot, frame in frames.items():
+        for diameter, cell in frame.groupby("diameter", sort=False):
+            row: dict[str, Any] = {"robot": robot, "diameter_mm": MILLI * float(str(diameter))}
+            single: dict[str, pd.Series] = {
+                "mean": cell["mean"],
+                "std": (cell.mean_square - cell["mean"] ** 2) ** 0.5,
+                "max": cell.maximum,
+            }
+            for name, values in single.items():
+                row |= {f"{name}_mm": MILLI * values.mean(), f"{name}_mm_between": MILLI * values.std(ddof=1)}
+            left, error = root_mean(cell.left.to_numpy())
+            rows.append(row | {"left_um": MICRO * left, "left_um_std_error": MICRO * error})
+    names = ["robot", "diameter_mm", *(f"{name}_mm{more}" for name in ("mean", "std", "max") for more in ("", "_between"))]
+    return pd.DataFrame(rows, columns=[*names, "left_um", "left_um_std_error"])

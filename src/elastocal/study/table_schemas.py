@@ -131,6 +131,7 @@ LADDER = TableSchema(
 DESIGNS = TableSchema(
     "designs",
     (
+        Column("joint_range", "text", "", "of candidates and validation configurations: full_turn or limits"),
         Column("design", "text", "", "criterion by which the configurations are chosen, random, or the bound of all designs"),
         Column("configurations", "int32", "", "configurations of the design", minimum=1),
         Column("rms", "float64", "m", "Cramér-Rao bound of the RMS end-effector error"),
@@ -170,6 +171,49 @@ WEIGHTING = TableSchema(
         Column("per_metre", "float64", "m/m", "growth of the noise of positions with the tracker's range"),
         Column("equal", "float64", "m", "RMS error by equal weights"),
         Column("weighted", "float64", "m", "RMS error by the weights of the noise"),
+    ),
+)
+
+
+USES = TableSchema(
+    "uses",
+    (
+        Column("strategy", "string", "", "name of the strategy; a row group holds one"),
+        _SET,
+        Column("mean", "float64", "m", "mean end-effector error on test configurations"),
+        Column("mean_square", "float64", "m^2", "mean square of the same"),
+        Column("p95", "float64", "m", "95th percentile of the same"),
+        Column("pooled_p95", "float64", "m", "95th percentile over test configurations and data sets, the same in every row"),
+        Column("pooled_p95_influence", "float64", "m", "influence of the data set on the pooled percentile"),
+        Column("iso_9283", "float64", "m", "largest error at the five poses of ISO 9283"),
+        Column("path_mean_square", "float64", "m^2", "mean square error along the milling path"),
+        Column("path_max", "float64", "m", "largest error along the milling path"),
+    ),
+)
+
+PLACES = TableSchema(
+    "places",
+    (
+        Column("joints", "int32", "", "joints that move the target", minimum=1),
+        Column("along", "float64", "m", "way from the base along the chain"),
+        Column("side", "text", "", "of the link, the flange, or a bar on the flange"),
+        _SET,
+        Column("bound", "float64", "m^2", "Cramér-Rao bound with the target beside the end-effector"),
+        Column("bound_end_effector", "float64", "m^2", "the same of the end-effector in twice as many configurations"),
+        Column("turned", "float64", "", "share of configurations in which a tracker sees a reflector turned to it"),
+        Column("fixed", "float64", "", "the same of a reflector that stays as it is"),
+    ),
+)
+
+TUBES = TableSchema(
+    "tubes",
+    (
+        Column("diameter", "float64", "m", "outer diameter of the tubes"),
+        _SET,
+        Column("mean", "float64", "m", "mean over the data set of the end-effector's displacement under load"),
+        Column("mean_square", "float64", "m^2", "mean square of the same"),
+        Column("maximum", "float64", "m", "largest of the same"),
+        Column("left", "float64", "m^2", "mean square end-effector error on test configurations, by joint springs alone"),
     ),
 )
 

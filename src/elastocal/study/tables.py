@@ -51,7 +51,8 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
     Returns
     -------
     pandas.DataFrame
-        robot, mean_mm, std_mm, max_mm with standard errors, and the spread of the same figures between single data sets,
+        robot, mean_mm, std_mm with standard errors, max_mm without one, as the bootstrap has none for a maximum; and the spread
+        of the same figures between single data sets,
         ``mean_mm_one_set`` (average) and ``mean_mm_one_set_std``.
     """
     rows = []
@@ -59,15 +60,15 @@ def table2(initial: Mapping[str, pd.DataFrame], weights: Mapping[str, np.ndarray
         count = weights[robot] @ frame.configurations
         mean = weights[robot] @ (frame.configurations * frame["mean"]) / count
         std = np.sqrt(weights[robot] @ (frame.configurations * frame.mean_square) / count - mean**2)
-        largest = np.where(weights[robot] > 0, frame.maximum.to_numpy(), 0.0).max(axis=1)
         single: dict[str, pd.Series] = {
             "mean_mm": frame["mean"],
             "std_mm": pd.Series(np.sqrt(frame.mean_square - frame["mean"] ** 2)),
             "max_mm": frame.maximum,
         }
         row: dict[str, str | float] = {"robot": robot}
-        for name, values in (("mean_mm", mean), ("std_mm", std), ("max_mm", largest)):
+        for name, values in (("mean_mm", mean), ("std_mm", std)):
             row |= _value_and_error(name, MILLI * values)
+        row["max_mm"] = MILLI * frame.maximum.max()
         for name, values in single.items():
             row |= {f"{name}_one_set": MILLI * values.mean(), f"{name}_one_set_std": MILLI * values.std(ddof=1)}
         rows.append(row)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from elastocal.study.steps.in_memory import StudyInMemory
+
+# Interpretation R3 both ways: a robot on the floor cannot turn its joints fully.
+JOINT_RANGES = ("full_turn", "limits")
 
 
 def design_worths(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -> dict[str, np.ndarray]:
@@ -29,14 +33,20 @@ def design_worths(study: StudyInMemory, candidates: int, sizes: Sequence[int]) -
     Returns
     -------
     dict of str to ndarray
-        Columns design, configurations, rms, low and high (m).
+        Columns joint_range: of candidates and validation configurations, design, configurations, rms, low and high (m).
     """
-    scaled = study.robot.compliance / study.size.noise
-    drawn = study.experiments([0], candidates, "candidates of designs")
-    rows = scaled * study.regressor(drawn)[0, :, : study.interpretation.rows]
-    accuracy = study.robot.compliance * study.regressor(study.tests())[0, :, :3]
-    found = worths(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
+    found, ranges = [], []
+    for joint_range in JOINT_RANGES:
+        loading = replace(study.interpretation.loading, joint_range=joint_range)
+        within = replace(study, interpretation=replace(study.interpretation, loading=loading))
+        drawn = within.experiments([0], candidates, "candidates of designs")
+        rows = study.robot.compliance / study.size.noise * within.regressor(drawn)[0, :, : study.interpretation.rows]
+        accuracy = study.robot.compliance * within.regressor(within.tests())[0, :, :3]
+        some = worths(rows, accuracy, sizes, stream(study.seed, study.key, "random designs", 0))
+        found += some
+        ranges += [joint_range] * len(some)
     return {
+        "joint_range": np.array(ranges, object),
         "design": np.array([worth.kind for worth in found], object),
         "configurations": np.array([worth.configurations for worth in found]),
         **{name: np.array([getattr(worth, name) for worth in found]) for name in ("rms", "low", "high")},

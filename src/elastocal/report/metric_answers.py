@@ -1,0 +1,112 @@
+"""What the report says about metrics that judge strategies (RQ4), already worded."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from elastocal.study.ranks import REFERENCE
+from elastocal.study.tables import worded
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    import pandas as pd
+
+# In the order in which they are shown.
+METRIC_NAMES = {
+    REFERENCE: "RMS of one data set",
+    "mean_um": "mean of one data set",
+    "p95_um": "p95 of one data set",
+    "pooled_p95_um": "p95, pooled",
+    "iso_9283_um": "ISO 9283, largest of five poses",
+    "path_rms_um": "milling path, RMS",
+    "path_max_um": "milling path, largest",
+    "dev_um": "dev (equation 15)",
+    "k_sigma_percent": "k_Σ, all joints",
+    "k_sigma_percent_first_stage": "k_Σ, joints of the first stage",
+}
+
+
+def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
+    """Every metric of every strategy with its rank.
+
+    Parameters
+    ----------
+    scores : DataFrame
+        From `ranks.ranks_table`.
+    robots : iterable of str
+
+    Returns
+    -------
+    list of dict
+        robot, strategy, and for each of `METRIC_NAMES` the score and, in brackets, its rank.
+    """
+    rows = []
+    for robot in robots:
+        mine = scores[scores.robot == robot]
+        for strategy in dict.fromkeys(mine.strategy):
+            cells = mine[mine.strategy == strategy].set_index("metric")
+            row = {"robot": robot, "strategy": strategy}
+            for metric in METRIC_NAMES:
+                cell = cells.loc[metric]
+                row[metric] = f"{worded(cell.value, cell.value_std_error)} ({cell['rank']})"
+            rows.append(row)
+    return rows
+
+
+def staged_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, str]]:
+    """RMS error of each strategy over that of the classical one, paired by data set.
+
+    Parameters
+    ----------
+    scores, robots
+        As in `score_rows`.
+
+    Returns
+    -------
+    list of dict
+        strategy, and for each robot the ratio with its interval.
+    """
+    mine = scores[scores.metric == REFERENCE]
+    rows = []
+    for strategy in dict.fromkeys(mine.strategy):
+        row = {"strategy": strategy}
+        for robot in robots:
+            cell = mine[(mine.robot == robot) & (mine.strategy == strategy)].iloc[0]
+            # An estimator under another name, and the classical strategy itself.
+            same = cell.ratio_low == cell.ratio_high
+            row[robot] = "the same" if same else f"{cell.ratio:.3f} ({cell.ratio_low:.3f} to {cell.ratio_high:.3f})"
+        rows.append(row)
+    return rows
+
+
+def metric_summary(pairs: pd.DataFrame) -> dict[str, str]:
+    """How often metrics put two estimators in the other order than the RMS error of one data set does.
+
+    Parameters
+    ----------
+    pairs : DataFrame
+        From `ranks.pairs_table`.
+
+    Returns
+    -------
+    dict
+        pairs: of different estimators; reversed_by: metrics that reverse some, with how many; never: metrics that reverse none;
+        example: the most reversed pair.
+    """
+    counts = {name: int(pairs.reversed[pairs.metric == name].sum()) for name in METRIC_NAMES if name != REFERENCE}
+    worst = pairs[pairs.reversed].assign(size=lambda frame: (frame.ratio / frame.rms_ratio).abs())
+    example = ""
+    if len(worst):
+        row = worst.iloc[int(worst["size"].argmax())]
+        example = (
+            f"{METRIC_NAMES[row.metric]} of {row.strategy} on {row.robot} is {row.ratio:.2f} times "
+            f"({row.ratio_low:.2f} to {row.ratio_high:.2f}) that of {row.other}, its RMS {row.rms_ratio:.2f} times "
+            f"({row.rms_ratio_low:.2f} to {row.rms_ratio_high:.2f})"
+        )
+    return {
+        "pairs": str(int((pairs.metric == REFERENCE).sum())),
+        "reversed_by": ", ".join(f"{METRIC_NAMES[name]} ({number})" for name, number in counts.items() if number) or "none",
+        "never": ", ".join(METRIC_NAMES[name] for name, number in counts.items() if not number),
+        "example": example,
+    }

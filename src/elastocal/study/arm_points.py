@@ -1,0 +1,169 @@
+"""Places on an arm where a target can sit, and whether a tracker sees it there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.mechanics.chain import MeasuringPoint
+from elastocal.mechanics.kinematics import poses, poses_of_points
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.mechanics.chain import Chain
+
+FLANGE, BAR = "flange", "bar"
+_AXES = "xyz"
+# Where on a link targets sit, as shares of its length.
+_SHARES = (0.25, 0.5, 0.75)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a target sits and which way it looks.
+
+    Attributes
+    ----------
+    point : MeasuringPoint
+    joints : int
+        How many joints move it.
+    along_m : float
+        Way from the base along the chain.
+    side : str
+        Of the link, as "+y"; or `FLANGE`, or `BAR` and the side to which a bar on the flange stands out.
+    normal : tuple of float
+        Direction in which it looks, in the frame of the point.
+    """
+
+    point: MeasuringPoint
+    joints: int
+    along_m: float
+    side: str
+    normal: tuple[float, ...]
+
+
+def places(chain: Chain, radius_m: float, bar_m: float) -> list[Place]:
+    """Targets on every side of the links that a joint moves, on the flange, and on a bar that stands out from it.
+
+    Parameters
+    ----------
+    chain : Chain
+    radius_m : float
+        From the axis of a link to its surface; links no longer than this have no place of their own.
+    bar_m : float
+
+    Returns
+    -------
+    list of Place
+    """
+    found, joints, along = list[Place](), 0, 0.0
+    for index, transform in enumerate(chain.transforms):
+        if transform.coordinate is not None:
+            joints += 1
+        elif transform.kind == "T":
+            if joints and abs(transform.constant) > radius_m:
+                for share in _SHARES:
+                    for side, normal in _sides(transform.axis):
+                        way = share * transform.constant * np.eye(3)[transform.axis]
+                        offset = tuple((way + radius_m * np.array(normal)).tolist())
+                        point = MeasuringPoint(f"{index} {share:g} {side}", index, offset)
+                        found.append(Place(point, joints, along + share * abs(transform.constant), side, normal))
+            along += abs(transform.constant)
+    end = chain.end_effector
+    ahead = tuple(np.eye(3)[_last_axis(chain)].tolist())
+    found.append(Place(end, joints, along, FLANGE, ahead))
+    for side, across in _sides(_last_axis(chain)):
+        offset = tuple((np.array(end.offset_m) + bar_m * np.array(across)).tolist())
+        found.append(Place(MeasuringPoint(f"{BAR} {side}", end.after, offset), joints, along, f"{BAR} {side}", ahead))
+    return found
+
+
+def outline(chain: Chain, joint_angles: np.ndarray) -> np.ndarray:
+    """Corners of the arm from the base to the flange, one for each fixed translation.
+
+    Parameters
+    ----------
+    chain : Chain
+    joint_angles : ndarray (..., n)
+
+    Returns
+    -------
+    ndarray (K, ..., 3)
+        m, base axes.
+    """
+    corners = [0, *(k + 1 for k, t in enumerate(chain.transforms) if t.kind == "T" and t.coordinate is None)]
+    return poses_of_points(chain, joint_angles, [MeasuringPoint(str(k), k) for k in corners])[0]
+
+
+def in_sight(
+    chain: Chain,
+    joint_angles: np.ndarray,
+    place: Place,
+    tracker_m: Sequence[float],
+    radius_m: float,
+    acceptance_deg: float,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Whether a target looks towards the tracker and no link stands between, by capsules about the links [1]_.
+
+    Parameters
+    ----------
+    chain : Chain
+    joint_angles : ndarray (N, n)
+    place : Place
+    tracker_m : sequence of float
+        Base axes.
+    radius_m : float
+        Of the links.
+    acceptance_deg : float
+        Half angle within which a reflector that nobody turns gives its beam back.
+
+    Returns
+    -------
+    turned, fixed : ndarray of bool (N,)
+        For a reflector that somebody turns to the tracker in every configuration, and for one that stays as it is.
+
+    References
+    ----------
+    .. [1] Ericson, C., Real-Time Collision Detection, section 5.1, Morgan Kaufmann, 2005.
+    """
+    position, rotation = poses(chain, joint_angles, place.point)
+    beam = np.array(tracker_m) - position
+    cosine = (rotation @ np.array(place.normal) * beam).sum(axis=-1) / np.linalg.norm(beam, axis=-1)
+    corners, clear = outline(chain, joint_angles), np.ones(len(joint_angles), bool)
+    links = [k for k, t in enumerate(chain.transforms) if t.kind == "T" and t.coordinate is None]
+    for start, end, link in zip(corners[:-1], corners[1:], links, strict=True):
+        # A target on the surface of a link has this link behind it where it looks towards the tracker.
+        own = place.point.after - link in (0, 1)
+        if not own and chain.transforms[link].constant:
+            clear &= _segment_distances(position, beam, start, end - start) > radius_m
+    return clear & (cosine > 0), clear & (cosine > np.cos(np.radians(acceptance_deg)))
+
+
+def _segment_distances(start: np.ndarray, way: np.ndarray, other: np.ndarray, other_way: np.ndarray) -> np.ndarray:
+    """Least distances (N,) of the segments start + s way and other + t other_way, s and t from 0 to 1."""
+    between = start - other
+    a, e, b = (way * way).sum(-1), (other_way * other_way).sum(-1), (way * other_way).sum(-1)
+    c, f = (way * between).sum(-1), (other_way * between).sum(-1)
+    parallel = np.maximum(a * e - b * b, 1e-12 * a * e)
+    s = np.clip((b * f - c * e) / parallel, 0.0, 1.0)
+    t = np.clip((b * s + f) / e, 0.0, 1.0)
+    # With t at a bound the best s is another one.
+    s = np.clip((b * t - c) / a, 0.0, 1.0)
+    return np.linalg.norm(between + s[..., None] * way - t[..., None] * other_way, axis=-1)
+
+
+def _sides(axis: int) -> list[tuple[str, tuple[float, ...]]]:
+    """Names and directions of the four sides of what lies along an axis."""
+    found = []
+    for other in (k for k in range(3) if k != axis):
+        for sign in (1.0, -1.0):
+            found.append((f"{'+' if sign > 0 else '-'}{_AXES[other]}", tuple((sign * np.eye(3)[other]).tolist())))
+    return found
+
+
+def _last_axis(chain: Chain) -> int:
+    """Axis of the last fixed translation: which way the flange looks."""
+    return [t.axis for t in chain.transforms if t.kind == "T" and t.coordinate is None][-1]

@@ -1,0 +1,75 @@
+"""How to evaluate (RQ4): what each strategy leaves of one data set, by several yardsticks on the same estimates."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.study.identification import estimate_compliance
+from elastocal.study.metrics import make_judge, position_errors
+from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.uses import iso_9283, milling_path
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+    from typing import Any
+
+    from elastocal.study.steps.in_memory import StudyInMemory
+
+# The quantile that is pooled, and over how much about it its density is taken.
+QUANTILE, _ABOUT = 0.95, 0.01
+
+
+def use_blocks(
+    study: StudyInMemory, strategies: Sequence[Strategy], uses: Mapping[str, Any]
+) -> Iterator[dict[str, np.ndarray | str]]:
+    """Errors of the models of all data sets, strategy by strategy, from all configurations of a data set.
+
+    Parameters
+    ----------
+    study : StudyInMemory
+    strategies : sequence of Strategy
+    uses : dict
+        centre_m, edge_m, weight_N, path_m and cutting_N, see `uses`.
+
+    Yields
+    ------
+    dict
+        Columns of one block of the uses table: one strategy.
+    """
+    robot, at = study.robot, study.interpretation.wrench_at
+    stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
+    points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+    found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
+    for sets in study.blocks():
+        measurements = study.measured(sets, points)
+        for estimator in dict.fromkeys(stages.values()):
+            last = estimate_compliance(Strategy("", estimator), measurements, robot.joints)[0][-1]
+            found.setdefault(estimator, []).append(last.T)
+    cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
+    path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
+    judges = [study.judge(), *(make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
+    scores = {
+        estimator: _scores(*(position_errors(judge, np.concatenate(blocks)) for judge in judges))
+        for estimator, blocks in found.items()
+    }
+    for strategy in strategies:
+        columns = scores[stages[strategy.name]]
+        yield {"strategy": strategy.name, "data_set": np.arange(study.size.data_sets), **columns}
+
+
+def _scores(tests: np.ndarray, cube: np.ndarray, path: np.ndarray) -> dict[str, np.ndarray]:
+    """Columns of scores from errors (sets, places)."""
+    low, pooled, high = np.quantile(tests, [QUANTILE - _ABOUT, QUANTILE, QUANTILE + _ABOUT])
+    slope = (high - low) / (2 * _ABOUT)
+    return {
+        "mean": tests.mean(axis=1),
+        "mean_square": (tests**2).mean(axis=1),
+        "p95": np.quantile(tests, QUANTILE, axis=1),
+        "pooled_p95": np.full(len(tests), pooled),
+        "pooled_p95_influence": slope * ((tests > pooled).mean(axis=1) - (1 - QUANTILE)),
+        "iso_9283": cube.max(axis=1),
+        "path_mean_square": (path**2).mean(axis=1),
+        "path_max": path.max(axis=1),
+    }

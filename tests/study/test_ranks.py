@@ -1,0 +1,89 @@
+"""Ranks of strategies by several metrics, and paired intervals that hold."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from elastocal.study.ranks import REFERENCE, Score, pairs_table, ranks_table, scores
+
+LENGTH, SETS = 20, 400
+
+
+def uses_of(strategy, size, seed=1, tests=50):
+    """Errors of data sets that strategies share, times a size in µm."""
+    errors = 1e-6 * size * np.abs(np.random.default_rng(seed).normal(size=(SETS, tests)))
+    pooled = np.quantile(errors, 0.95)
+    # Of |normal|: density 2 phi(1.96) at the quantile.
+    slope = 1e-6 * size / (2 * np.exp(-(1.96**2) / 2) / np.sqrt(2 * np.pi))
+    return pd.DataFrame(
+        {
+            "strategy": strategy,
+            "data_set": np.arange(SETS),
+            "mean": errors.mean(axis=1),
+            "mean_square": (errors**2).mean(axis=1),
+            "p95": np.quantile(errors, 0.95, axis=1),
+            "pooled_p95": pooled,
+            "pooled_p95_influence": slope * ((errors > pooled).mean(axis=1) - 0.05),
+            "iso_9283": errors[:, :5].max(axis=1),
+            "path_mean_square": (errors[:, 5:10] ** 2).mean(axis=1),
+            "path_max": errors[:, 5:10].max(axis=1),
+        }
+    )
+
+
+def averaged(strategy, k_sigma, first_stage):
+    values = {"k_sigma": k_sigma, "k_sigma_first_stage": first_stage, "deviation": 1e-6 * k_sigma}
+    metrics = pd.DataFrame([{"strategy": strategy, "length": LENGTH} | values])
+    drawn = [{"strategy": strategy, "length": LENGTH, "replicate": n + 1} for n in range(50)]
+    wobble = 1 + 0.05 * np.random.default_rng(2).normal(size=50)
+    replicates = pd.DataFrame(drawn).assign(**{name: value * wobble for name, value in values.items()})
+    return metrics, replicates
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Strategy B leaves 1.5 times the error of A; C is A under another name; only the first stage of B looks better."""
+    uses = pd.concat([uses_of("A", 50.0), uses_of("B", 75.0), uses_of("C", 50.0)])
+    both = [averaged("A", 4.0, 4.0), averaged("B", 6.0, 2.0), averaged("C", 4.0, 4.0)]
+    metrics, replicates = (pd.concat(parts) for parts in zip(*both, strict=True))
+    return {"arm": scores(uses, metrics, replicates, LENGTH)}
+
+
+def test_scores_are_in_the_units_of_people_with_roots_of_means_of_squares(found):
+    rms = found["arm"][REFERENCE]
+    # Root of the mean square of a normal variable: its standard deviation.
+    assert rms["A"].value == pytest.approx(50.0, rel=0.02) and rms["B"].value == pytest.approx(1.5 * rms["A"].value)
+    assert found["arm"]["pooled_p95_um"]["A"].value == pytest.approx(1.96 * 50, rel=0.03)
+    assert found["arm"]["dev_um"]["A"].value == pytest.approx(4.0)
+
+
+def test_one_estimator_under_two_names_has_one_rank_and_ratio_one(found):
+    table = ranks_table(found, "A").set_index(["metric", "strategy"])
+    assert table["rank"][REFERENCE].to_dict() == {"A": 1, "B": 3, "C": 1}
+    assert table.loc[(REFERENCE, "C"), ["ratio", "ratio_low", "ratio_high"]].tolist() == [1.0, 1.0, 1.0]
+    assert table["rank"]["k_sigma_percent_first_stage"].to_dict() == {"A": 2, "B": 1, "C": 2}
+
+
+def test_only_the_metric_that_puts_them_in_the_other_order_reverses(found):
+    table = pairs_table(found)
+    assert set(table.strategy) == {"A"} and set(table.other) == {"B"}
+    assert table[table.reversed].metric.tolist() == ["k_sigma_percent_first_stage"]
+
+
+@pytest.mark.parametrize("metric", [REFERENCE, "mean_um", "pooled_p95_um"])
+def test_intervals_of_ratios_hold_the_ratio_of_the_population(metric):
+    """Two independent strategies of ratio 1.5: 95 % of 200 intervals hold it; fewer than 90 % by chance in 1 of 1000 tries."""
+    held = 0
+    for seed in range(200):
+        one, other = uses_of("A", 75.0, 2 * seed), uses_of("B", 50.0, 2 * seed + 1)
+        metrics, replicates = (pd.concat(parts) for parts in zip(averaged("A", 1, 1), averaged("B", 1, 1), strict=True))
+        by = scores(pd.concat([one, other]), metrics, replicates, LENGTH)[metric]
+        _, low, high = by["A"].ratio(by["B"])
+        held += low < 1.5 < high
+    assert held / 200 > 0.90
+
+
+def test_pairing_takes_out_what_strategies_share():
+    shared = np.random.default_rng(3).normal(size=100)
+    one, other = Score(2.0, shared, 0.1), Score(1.0, shared, 0.1)
+    assert one.ratio(other) == (2.0, 2.0, 2.0) and one.std_error() == pytest.approx(0.2 * shared.std(ddof=1))

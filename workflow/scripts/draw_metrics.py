@@ -1,0 +1,16 @@
+"""Strategies by every metric."""
+
+import pandas as pd
+
+from elastocal.figures.questions import metrics
+from elastocal.figures.style import save
+from elastocal.report.metric_answers import METRIC_NAMES
+
+from job import Job, run
+
+
+def draw_metrics(job: Job) -> None:
+    save(metrics(pd.read_csv(job.input.table), job.params.titles, METRIC_NAMES), job.output.pdf, job.output.png)
+
+
+run(draw_metrics, snakemake)
