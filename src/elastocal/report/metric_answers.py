@@ -17,13 +17,13 @@ METRIC_NAMES = {
     REFERENCE: "RMS of one data set",
     "mean_um": "mean of one data set",
     "p95_um": "p95 of one data set",
-    "pooled_p95_um": "p95, pooled",
-    "iso_9283_um": "ISO 9283, largest of five poses",
-    "path_rms_um": "milling path, RMS",
-    "path_max_um": "milling path, largest",
+    "pooled_p95_um": "p95 pooled over data sets",
+    "iso_9283_um": "largest at the ISO 9283 poses",
+    "path_rms_um": "RMS on a milling path",
+    "path_max_um": "largest on a milling path",
     "dev_um": "dev (equation 15)",
-    "k_sigma_percent": "k_Σ, all joints",
-    "k_sigma_percent_first_stage": "k_Σ, joints of the first stage",
+    "k_sigma_percent": "k_Σ of all joints",
+    "k_sigma_percent_first_stage": "k_Σ of the first stage",
 }
 
 
