@@ -151,3 +151,8 @@ def test_a_urdf_for_a_document_is_told_how_it_is_imported(tmp_path, start):
 def test_a_value_on_one_line_reads_back(value):
     text = one_line(value)
     assert "\n" not in text and yaml.safe_load(f"key: {text}") == {"key": value}
+
+
+def test_a_date_stays_the_text_that_it_is(tmp_path):
+    (tmp_path / "a.yaml").write_text("measured_on: 2026-11-20\nat: 2026-11-20 10:00:00\n", encoding="utf-8")
+    assert read_document(tmp_path / "a.yaml") == {"measured_on": "2026-11-20", "at": "2026-11-20 10:00:00"}

@@ -22,7 +22,7 @@ def certificate(
     tolerance: Annotated[str, typer.Option(help="On the RMS position error, such as 0.2mm.")],
     risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
     compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
-    serial: Annotated[str, typer.Option(help="Serial number of the robot.")] = "",
+    serial: Annotated[str, typer.Option(help="Serial number of the robot; the campaign's without.")] = "",
     date: Annotated[str, typer.Option(help="Date of the certificate; today without.")] = "",
     output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
@@ -32,6 +32,7 @@ def certificate(
 
     import pandas as pd
 
+    from elastocal.campaigns.reading import read_descriptions
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save
     from elastocal.io.json_files import read_json, write_json
@@ -41,6 +42,7 @@ def certificate(
     from elastocal.report.certificate_words import certificate_facts
 
     console = Console(stderr=True)
+    stated = read_descriptions(folder, checkout() / "config" / "robots")[0].get("serial_number", "")
     limit = length_m("--tolerance", tolerance)
     found = diagnosed_campaign(folder)
     other = None if compare is None else diagnosed_campaign(compare)
@@ -53,7 +55,7 @@ def certificate(
     if any(effect["family"] == "data" for effect in verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2])
-    wanted = Wanted(limit, risk, serial, date or calendar.today().isoformat(), seed)
+    wanted = Wanted(limit, risk, serial or stated, date or calendar.today().isoformat(), seed)
     with console.status("working"):
         document, maps = certified(folder, checkout() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
         facts = certificate_facts(document)

@@ -7,7 +7,7 @@ import math
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import jsonschema
 import yaml
@@ -30,7 +30,14 @@ if TYPE_CHECKING:
 
 
 # The safe loader, in C where libyaml is there: the study is read at every call of snakemake.
-_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """Safe, and a date stays the text that it is in the file."""
+
+    yaml_implicit_resolvers: ClassVar = {
+        first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:timestamp"]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
 
 # Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
 _Validator = jsonschema.validators.extend(

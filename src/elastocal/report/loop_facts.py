@@ -17,7 +17,7 @@ from elastocal.report.first_page import (
 from elastocal.report.loop_effects import NONE_FOUND, effect_facts
 from elastocal.report.loop_errors import as_judged, range_sentence, split_rows, step_rows
 from elastocal.report.loop_experiment import experiment_facts
-from elastocal.report.loop_measurements import NOISE_SOURCES, measured, misfit_sentence, noise_rows
+from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
 from elastocal.report.loop_method import method, setting_rows, untestable_rows
 from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
 from elastocal.report.wording import as_sentence, length
@@ -61,6 +61,7 @@ def loop_facts(
     return {
         "campaign": verdict["campaign"],
         "robot": descriptions["robot"]["name"],
+        "made": made(descriptions["campaign"]),
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
         "faulty": faulty,
         "sentences": sentences(verdict),

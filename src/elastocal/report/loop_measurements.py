@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal import __version__
 from elastocal.diagnosis.words import listed
 from elastocal.report.wording import MICRO, counted, grouped, length, percent, plain
 
@@ -19,6 +20,22 @@ NOISE_SOURCES = {
     "declared": "The noise is taken as the campaign declares it; there are too few repeats to check it.",
     "residual": "The noise is not known: with neither repeats nor a declared noise the residual itself was taken for it.",
 }
+
+
+def made(campaign: Mapping[str, Any]) -> str:
+    """What the report is of and by: serial number and date, where the campaign states them, and the version of this program.
+
+    Parameters
+    ----------
+    campaign : dict
+        Contents of campaign.yaml.
+
+    Returns
+    -------
+    str
+    """
+    stated = {"serial number ": campaign.get("serial_number"), "measured on ": campaign.get("measured_on")}
+    return ", ".join([*(name + value for name, value in stated.items() if value), f"by elastocal {__version__}"])
 
 
 def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:
