@@ -88,13 +88,14 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
         raise InputError(
             source, "robots", f"{config['robots']}, all with links", "at least one robot without links for Tables 3 and 4"
         )
-    # A set may be there for robots that this study leaves out.
-    known = sorted(
-        {point for file in Path(folder, "robots").glob("*.yaml") for point in _POINT.findall(file.read_text("utf-8"))}
-    )
+    own = {point.name for chain in chains.values() for point in chain.points}
     for label, names in config["questions"]["point_sets"].items():
-        for name in (name for name in names if name not in known):
-            raise InputError(source, f"questions.point_sets.{label}", repr(name), ", ".join(known))
+        for name in (name for name in names if name not in own):
+            # A set may be there for robots that this study leaves out.
+            files = Path(folder, "robots").glob("*.yaml")
+            known = sorted({point for file in files for point in _POINT.findall(file.read_text("utf-8"))})
+            if name not in known:
+                raise InputError(source, f"questions.point_sets.{label}", repr(name), ", ".join(known))
     _check_cells(config, source)
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
