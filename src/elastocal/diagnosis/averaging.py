@@ -13,7 +13,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 # Models that hold less than this move no digit that is reported.
 _LEAST_PROBABILITY = 0.002
+# Sizes of the pose error with less than this under the best model, in log probability, move none either.
+_UNLIKELY = -9.0
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,8 @@ def averaged(linearized: Linearized, posterior: Posterior, best: Model, owners: 
     """
     likely = _likely(posterior, best)
     equations = {tau: normal_equations(linearized.products, tau)[0] for tau in {model.pose_error_rad for model, _ in likely}}
-    each = [(model, _moments(linearized, model, equations[model.pose_error_rad], owners)) for model, _ in likely]
+    kept = _likely_pose_errors(linearized.problem, best, [model.pose_error_rad for model, _ in likely])
+    each = [(model, _moments(linearized, model, equations[model.pose_error_rad], owners, kept)) for model, _ in likely]
     exact = next(found for model, found in each if model is best)
     moments: dict[tuple[str, str], list[tuple[float, float, float]]] = {}
     for (_, probability), (_, found) in zip(likely, each, strict=True):
@@ -115,6 +118,15 @@ def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     return [(model, probability) for model, probability in pairs if probability >= _LEAST_PROBABILITY or model is best]
 
 
+def _likely_pose_errors(problem: Problem, best: Model, of_models: Sequence[float]) -> np.ndarray:
+    """Places of the sizes of the pose error that the best model makes likely, and of those of the models that count."""
+    sizes = problem.statistics.pose_error_rad
+    if not best.units:
+        return np.arange(len(sizes))
+    density = _joint(problem, [problem.units[number] for number in best.units], best).by_pose_error
+    return np.flatnonzero((density > density.max() + _UNLIKELY) | np.isin(sizes, of_models))
+
+
 def squares_explained(problem: Problem, model: Model) -> dict[str, float]:
     """Sum of squares of the whitened displacements that each mechanism of a model makes, dict of str to float."""
     coefficients, gram = _predicted(problem, model), problem.statistics.gram[0]
@@ -132,14 +144,14 @@ def _predicted(problem: Problem, model: Model) -> np.ndarray:
     if model.units:
         units = [problem.units[number] for number in model.units]
         place = int(np.argmin(np.abs(problem.statistics.pose_error_rad - model.pose_error_rad)))
-        joint = _joint(replace(problem, statistics=problem.statistics.at(slice(place, place + 1))), units, model)
+        joint = _joint(problem, units, model, slice(place, place + 1))
         columns = np.concatenate([unit.columns for unit in units])
         coefficients[columns] = np.repeat(joint.scales, np.diff(joint.starts)) * joint.mean[0]
     return coefficients
 
 
 def _moments(
-    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]]
+    linearized: Linearized, model: Model, equations: np.ndarray, owners: Sequence[tuple[str, str]], kept: np.ndarray
 ) -> dict[tuple[str, str], tuple[float, float]]:
     """Mean and variance of every parameter of one model, by owner and name; declared ones up to a constant in the mean."""
     products, units = linearized.products, [linearized.problem.units[number] for number in model.units]
@@ -156,7 +168,7 @@ def _moments(
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)
     variance = ((back @ covariance) * back).sum(axis=1)
     found = dict(zip(owners, zip(back @ mean, variance, strict=True), strict=True))
-    for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model), strict=True):
+    for unit, (value, spread) in zip(units, _coefficients(linearized.problem, units, model, kept), strict=True):
         if unit.candidate is None:
             continue
         for index, parameter in enumerate(unit.candidate.parameters):
@@ -164,12 +176,15 @@ def _moments(
     return found
 
 
-def _coefficients(problem: Problem, units: Sequence[Unit], model: Model) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Mean and variance of the coefficients of each unit of a model, averaged over its size and the pose error."""
-    return _joint(problem, units, model).moments() if units else []
+def _coefficients(
+    problem: Problem, units: Sequence[Unit], model: Model, kept: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Mean and variance of the coefficients of each unit of a model, averaged over its size and some of the pose error."""
+    return _joint(problem, units, model, kept).moments() if units else []
 
 
-def _joint(problem: Problem, units: Sequence[Unit], model: Model) -> Joint:
+def _joint(problem: Problem, units: Sequence[Unit], model: Model, kept: np.ndarray | slice = slice(None)) -> Joint:
+    """Density under a model, at some sizes of the pose error, all without."""
     places = np.searchsorted(problem.grid.scales, model.scales)
-    base = problem.statistics.log_likelihood + problem.log_pose
-    return Joint(problem.statistics, units, problem.grid, base, places)
+    base = (problem.statistics.log_likelihood + problem.log_pose)[kept]
+    return Joint(problem.statistics.at(kept), units, problem.grid, base, places)

@@ -128,7 +128,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     noise, warnings = estimated_noise(case)
     declared = fit(case.model, case.observations, noise)
     tell(f"declared model fitted to {len(case.observations)} measurements")
-    bare = fit(replace(case.model, effects=()), case.observations, noise)
+    bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
     if decisive:
         found, final = None, declared
@@ -188,7 +188,8 @@ def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> lis
     steps = [Step(f"+ {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
     for number in range(len(alone), 0, -1):
         some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
-        fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted)
+        # Only its errors are shown, which a tenth of a standard error in a parameter hardly moves.
+        fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
         steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))
     return steps
 

@@ -114,6 +114,18 @@ class Conditions:
             on_each += self._falling[1][i] * (self._behind @ first[:, i])
         return self.motion.by_coordinate(on_each).T
 
+    def gravity_of_correction(self, number: int) -> np.ndarray:
+        """By how much `gravity` grows with one of the `mass_corrections`, per unit, ndarray (S, C)."""
+        body, kind = divmod(number, MASS_PARAMETERS)
+        rotation, behind = self._body_rotation[body], self._behind[:, body].astype(bool)
+        mass, first = 0.0, rotation[:, kind - 1]
+        if kind == 0:
+            mass, first = 1.0, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1))
+        falling, turning = self._falling
+        on_each = np.zeros_like(falling)
+        on_each[behind] = mass * falling[behind] + sum(turning[i][behind] * first[i] for i in range(3))
+        return self.motion.by_coordinate(on_each).T
+
     @cached_property
     def total(self) -> np.ndarray:
         """External load and weight of the declared masses on every coordinate of the sites, ndarray (S, C)."""
@@ -301,9 +313,14 @@ def with_springs(conditions: Conditions, compliance: np.ndarray, mass_correction
         return conditions
     changed = replace(conditions, compliance=compliance, mass_corrections=mass_corrections)
     # What is known of the loads stays so: they do not depend on the springs but by way of the motion.
-    for name in ("load", "gravity", "total", "mass_torques", "_falling", "end_jacobian", "weight"):
+    for name in ("load", "gravity", "total", "mass_torques", "_falling", "_behind", "end_jacobian", "weight"):
         if name in vars(conditions) and (same or name not in ("gravity", "total")):
             vars(changed)[name] = vars(conditions)[name]
+    off = mass_corrections - conditions.mass_corrections
+    if np.count_nonzero(off) == 1 and "gravity" in vars(conditions):
+        # Gravity is linear in the masses.
+        number = int(np.flatnonzero(off)[0])
+        vars(changed)["gravity"] = conditions.gravity + off[number] * conditions.gravity_of_correction(number)
     return changed
 
 

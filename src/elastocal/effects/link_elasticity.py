@@ -70,14 +70,16 @@ def _deflection(sites: Sites, link: int, load: np.ndarray, taper: float) -> tupl
     coordinates = sites.link_end[link]
     length = np.linalg.norm(sites.link_vectors_m[link])
     along = sites.link_vectors_m[link] / length
-    force, moment = np.split(load[:, coordinates], 2, axis=1)
-    across, twist = force - np.outer(force @ along, along), np.outer(moment @ along, along)
-    bending = moment - twist
-    shift = shift_by_force * length**3 * across + by_either * length**2 * np.cross(bending, along)
-    turn = by_either * length**2 * np.cross(along, across) + turn_by_moment * length * bending
+    lengthwise = np.outer(along, along)
+    across, turned = np.eye(3) - lengthwise, np.cross(np.eye(3), along).T * by_either * length**2
+    # Linear in force and moment: one product for all states.
+    bending = np.block(
+        [[shift_by_force * length**3 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]]
+    )
+    wrench = load.T[list(coordinates)]
     return (
-        dict(zip(coordinates, np.concatenate([shift, turn], axis=1).T, strict=True)),
-        dict(zip(coordinates[3:], (turn_by_moment * length * twist).T, strict=True)),
+        dict(zip(coordinates, bending @ wrench, strict=True)),
+        dict(zip(coordinates[3:], turn_by_moment * length * lengthwise @ wrench[3:], strict=True)),
     )
 
 
