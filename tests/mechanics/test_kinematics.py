@@ -18,7 +18,9 @@ from support import (
 )
 
 from elastocal.mechanics import chain_walk
+from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import (
+    corners,
     jacobians,
     poses,
     poses_and_jacobians,
@@ -315,3 +317,9 @@ def test_joints_that_shift_or_move_several_transforms_have_the_slopes_of_central
             step = 1e-6 * np.eye(chain.coordinates)[coordinate]
             slope = pose_differences(*poses(chain, q + step, point), *poses(chain, q - step, point)) / 2e-6
             np.testing.assert_allclose(jacobian[..., coordinate], slope, rtol=0, atol=1e-9)
+
+
+def test_corners_go_from_the_base_to_the_last_point():
+    chain = parse_chain("Tz(h) Rz(q1) Tx(a) Rz(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
+    found = corners(chain, np.array([[0.0, np.pi / 2]]))
+    np.testing.assert_allclose(found[:, 0], [[0, 0, 0], [0, 0, 0.5], [1, 0, 0.5], [1, 0.5, 0.5]], atol=1e-12)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from elastocal.plant.campaigns import Design, schedule_of
 from elastocal.plant.defects import KINDS, Defect, drawn_defect, with_defects
 from elastocal.plant.sizing import Yardstick, size_for
 from elastocal.plant.tracker import Move
@@ -31,13 +32,17 @@ def test_a_wrong_force_scale_is_absorbed_at_any_size_but_for_what_the_weights_te
         return lambda size: with_defects(robot, [Defect("force_scale", (), size)])
 
     with pytest.raises(ValueError, match="no size found"):
-        size_for(Yardstick(weightless, schedule), scaled(weightless), 0.02, 50.0)
+        size_for(Yardstick(weightless, schedule), scaled(weightless), 0.02, 50.0, largest=KINDS["force_scale"].largest)
     yardstick = Yardstick(fanuc_specimen, schedule, declared=declared_masses(fanuc_specimen.arm))
     with pytest.raises(ValueError, match="no size found"):
         size_for(yardstick, scaled(fanuc_specimen), 0.02, 50.0, largest=KINDS["force_scale"].largest)
-    # Weights that are known without error would tell the compliances, and these the scale.
-    exact = Yardstick(fanuc_specimen, schedule).signal(scaled(fanuc_specimen)(0.02)).retained
-    assert exact > 100 * yardstick.signal(scaled(fanuc_specimen)(0.02)).retained
+    # Weights that are known without error would tell the compliances, and these the scale; by poses enough.
+    longer = schedule_of(fanuc_specimen.arm, Design(poses=20), 2)
+    exact, open_weights = (
+        Yardstick(fanuc_specimen, longer, declared=masses).signal(scaled(fanuc_specimen)(0.02)).retained
+        for masses in ((), declared_masses(fanuc_specimen.arm))
+    )
+    assert exact > 100 * open_weights
 
 
 def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc_specimen, schedule):
@@ -51,8 +56,9 @@ def test_weights_that_differ_as_declared_are_absorbed_up_to_their_own_cost(fanuc
     )
     signal = Yardstick(nominal, schedule, declared=declared).signal(off)
     assert 0.5 < signal.retained < 2.0 < 0.01 * signal.raw
-    # Where this link's weight alone is open. The shoulder feels its mass times its lever; the elbow does not.
-    assert Yardstick(nominal, schedule, declared=declared[2:3]).signal(off).retained == pytest.approx(2.0, rel=0.02)
+    # Where this link's weight alone is open, by poses enough. The shoulder feels its mass times its lever; the elbow does not.
+    longer = schedule_of(arm, Design(poses=20), 2)
+    assert Yardstick(nominal, longer, declared=declared[2:3]).signal(off).retained == pytest.approx(2.0, rel=0.02)
 
 
 def test_the_retained_signal_is_what_a_fit_of_the_compliances_leaves(fanuc_specimen, schedule):

@@ -6,7 +6,7 @@ from scipy.optimize import minimize
 
 from elastocal.mechanics.chain import parse_chain
 from elastocal.mechanics.kinematics import poses
-from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, outline, places
+from elastocal.study.arm_points import BAR, FLANGE, _segment_distances, in_sight, places
 
 # Upright column, then an arm of a metre that a joint turns in the level plane, then one of half a metre.
 CHAIN = parse_chain("Tz(h) Rz(q1) Tx(a) [elbow] Rz(q2) Tx(b) [end]", {"h": 0.5, "a": 1.0, "b": 0.5}, "test")
@@ -34,12 +34,6 @@ def test_places_lie_on_the_surface_of_links_that_a_joint_moves_and_on_the_flange
 
 def test_a_link_no_longer_than_its_radius_has_no_place():
     assert {place.joints for place in places(CHAIN, 0.6, 0.4) if place.side != FLANGE and BAR not in place.side} == {1}
-
-
-def test_the_outline_goes_from_the_base_to_the_flange():
-    np.testing.assert_allclose(
-        outline(CHAIN, np.array([0.0, np.pi / 2])), [[0, 0, 0], [0, 0, 0.5], [1, 0, 0.5], [1, 0.5, 0.5]], atol=1e-12
-    )
 
 
 def test_a_target_that_looks_away_is_not_seen_and_one_askance_only_if_somebody_turns_it():

@@ -87,3 +87,9 @@ def test_pairing_takes_out_what_strategies_share():
     shared = np.random.default_rng(3).normal(size=100)
     one, other = Score(2.0, shared, 0.1), Score(1.0, shared, 0.1)
     assert one.ratio(other) == (2.0, 2.0, 2.0) and one.std_error() == pytest.approx(0.2 * shared.std(ddof=1))
+
+
+def test_metrics_at_places_that_a_robot_does_not_reach_are_left_out():
+    uses = uses_of("A", 50.0).assign(iso_9283=np.nan)
+    found = scores(uses, *averaged("A", 4.0, 4.0), LENGTH)
+    assert "iso_9283_um" not in found and {REFERENCE, "path_rms_um"} < set(found)

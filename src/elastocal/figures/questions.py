@@ -153,7 +153,7 @@ def metrics(table: pd.DataFrame, titles: Mapping[str, str], names: Mapping[str, 
         mine = table[table.robot == robot]
         strategies = mine[mine.metric == next(iter(names))].drop_duplicates("value").strategy
         for index, strategy in enumerate(strategies):
-            cells = mine[mine.strategy == strategy].set_index("metric").loc[[*names]]
+            cells = mine[mine.strategy == strategy].set_index("metric").reindex([*names])
             rows = np.arange(len(names)) + 0.7 * ((index + 0.5) / len(strategies) - 0.5)
             spans = np.abs(cells[["ratio_low", "ratio_high"]].to_numpy() - cells[["ratio"]].to_numpy()).T
             axis.errorbar(cells.ratio, rows, xerr=spans, fmt="o", color=PALETTE[index], markersize=3.5, label=strategy)

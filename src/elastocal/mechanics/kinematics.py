@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.mechanics.chain import MeasuringPoint
 from elastocal.mechanics.chain_walk import blocks, store_pose, sweep
 from elastocal.mechanics.products import product, product_difference
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from elastocal.mechanics.chain import Chain, MeasuringPoint
+    from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.chain_walk import Screw, Vector
 
 
@@ -63,6 +64,23 @@ def poses_of_points(chain: Chain, coordinates: np.ndarray, points: Sequence[Meas
         for number, frame in enumerate(frames):
             store_pose(*frame, position[number, :, part], rotation[number, :, :, part])
     return _each_batch_first(position, batch), _each_batch_first(rotation, batch)
+
+
+def corners(chain: Chain, coordinates: np.ndarray) -> np.ndarray:
+    """Where an arm has corners: at its base and behind each translation.
+
+    Parameters
+    ----------
+    chain, coordinates
+        As in `poses`.
+
+    Returns
+    -------
+    ndarray (K, ..., 3)
+        m, base axes.
+    """
+    places = [0, *(number + 1 for number, transform in enumerate(chain.transforms) if transform.kind == "T")]
+    return poses_of_points(chain, coordinates, [MeasuringPoint(str(place), place) for place in places])[0]
 
 
 def poses_and_jacobians(

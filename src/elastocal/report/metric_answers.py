@@ -39,7 +39,8 @@ def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, st
     Returns
     -------
     list of dict
-        robot, strategy, and for each of `METRIC_NAMES` the score and, in brackets, its rank.
+        robot, strategy, and for each of `METRIC_NAMES` the score and, in brackets, its rank; a dash where the robot does not
+        reach what it is used for.
     """
     rows = []
     for robot in robots:
@@ -48,8 +49,10 @@ def score_rows(scores: pd.DataFrame, robots: Iterable[str]) -> list[dict[str, st
             cells = mine[mine.strategy == strategy].set_index("metric")
             row = {"robot": robot, "strategy": strategy}
             for metric in METRIC_NAMES:
-                cell = cells.loc[metric]
-                row[metric] = f"{worded(cell.value, cell.value_std_error)} ({cell['rank']})"
+                row[metric] = "–"
+                if metric in cells.index:
+                    cell = cells.loc[metric]
+                    row[metric] = f"{worded(cell.value, cell.value_std_error)} ({cell['rank']})"
             rows.append(row)
     return rows
 
@@ -94,7 +97,9 @@ def metric_summary(pairs: pd.DataFrame) -> dict[str, str]:
         pairs: of different estimators; reversed_by: metrics that reverse some, with how many; never: metrics that reverse none;
         example: the most reversed pair.
     """
-    counts = {name: int(pairs.reversed[pairs.metric == name].sum()) for name in METRIC_NAMES if name != REFERENCE}
+    counts = {
+        name: int(pairs.reversed[pairs.metric == name].sum()) for name in METRIC_NAMES if name in {*pairs.metric} - {REFERENCE}
+    }
     worst = pairs[pairs.reversed].assign(size=lambda frame: (frame.ratio / frame.rms_ratio).abs())
     example = ""
     if len(worst):

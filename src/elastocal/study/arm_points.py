@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.mechanics.chain import MeasuringPoint
-from elastocal.mechanics.kinematics import poses, poses_of_points
+from elastocal.mechanics.kinematics import corners, poses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,23 +81,6 @@ def places(chain: Chain, radius_m: float, bar_m: float) -> list[Place]:
     return found
 
 
-def outline(chain: Chain, joint_angles: np.ndarray) -> np.ndarray:
-    """Corners of the arm from the base to the flange, one for each fixed translation.
-
-    Parameters
-    ----------
-    chain : Chain
-    joint_angles : ndarray (..., n)
-
-    Returns
-    -------
-    ndarray (K, ..., 3)
-        m, base axes.
-    """
-    corners = [0, *(k + 1 for k, t in enumerate(chain.transforms) if t.kind == "T" and t.coordinate is None)]
-    return poses_of_points(chain, joint_angles, [MeasuringPoint(str(k), k) for k in corners])[0]
-
-
 def in_sight(
     chain: Chain,
     joint_angles: np.ndarray,
@@ -132,9 +115,9 @@ def in_sight(
     position, rotation = poses(chain, joint_angles, place.point)
     beam = np.array(tracker_m) - position
     cosine = (rotation @ np.array(place.normal) * beam).sum(axis=-1) / np.linalg.norm(beam, axis=-1)
-    corners, clear = outline(chain, joint_angles), np.ones(len(joint_angles), bool)
-    links = [k for k, t in enumerate(chain.transforms) if t.kind == "T" and t.coordinate is None]
-    for start, end, link in zip(corners[:-1], corners[1:], links, strict=True):
+    ends, clear = corners(chain, joint_angles), np.ones(len(joint_angles), bool)
+    links = [k for k, t in enumerate(chain.transforms) if t.kind == "T"]
+    for start, end, link in zip(ends[:-1], ends[1:], links, strict=True):
         # A target on the surface of a link has this link behind it where it looks towards the tracker.
         own = place.point.after - link in (0, 1)
         if not own and chain.transforms[link].constant:

@@ -75,7 +75,7 @@ def scores(uses: pd.DataFrame, metrics: pd.DataFrame, replicates: pd.DataFrame, 
     Returns
     -------
     dict of str to dict of str to Score
-        Metric, strategy.
+        Metric, strategy; without metrics at places that the robot does not reach.
     """
     found: dict[str, dict[str, Score]] = {}
     for strategy in dict.fromkeys(uses.strategy):
@@ -172,6 +172,8 @@ def _of_single_sets(mine: pd.DataFrame) -> dict[str, Score]:
         ("path_max_um", "path_max", False),
     ):
         values = mine[column].to_numpy()
+        if np.isnan(values).any():
+            continue
         mean = values.mean()
         # The logarithm of a root deviates half as much as that of the mean below it.
         relative = (values / mean - 1) / (2 if root else 1)

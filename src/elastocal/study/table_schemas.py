@@ -185,9 +185,9 @@ USES = TableSchema(
         Column("p95", "float64", "m", "95th percentile of the same"),
         Column("pooled_p95", "float64", "m", "95th percentile over test configurations and data sets, the same in every row"),
         Column("pooled_p95_influence", "float64", "m", "influence of the data set on the pooled percentile"),
-        Column("iso_9283", "float64", "m", "largest error at the five poses of ISO 9283"),
-        Column("path_mean_square", "float64", "m^2", "mean square error along the milling path"),
-        Column("path_max", "float64", "m", "largest error along the milling path"),
+        Column("iso_9283", "float64", "m", "largest error at the five poses of ISO 9283", missing=True),
+        Column("path_mean_square", "float64", "m^2", "mean square error along the milling path", missing=True),
+        Column("path_max", "float64", "m", "largest error along the milling path", missing=True),
     ),
 )
 

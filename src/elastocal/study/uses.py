@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits
-from elastocal.errors import InputError
 from elastocal.study.experiments import Experiments
 
 if TYPE_CHECKING:
@@ -31,8 +30,8 @@ _PATH_POSES = 50
 _DOWN = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float) -> Experiments:
-    """The five test poses in the sloped plane of a cube, under a weight.
+def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: float) -> Experiments | None:
+    """The five poses in the sloped plane of a cube, under a weight.
 
     Parameters
     ----------
@@ -45,20 +44,15 @@ def iso_9283(robot: Robot, centre_m: Sequence[float], edge_m: float, weight_N: f
 
     Returns
     -------
-    Experiments
-        One set of five configurations within the joint limits.
-
-    Raises
-    ------
-    InputError
-        The robot does not reach a pose.
+    Experiments or None
+        One set of five configurations within the joint limits; None where the robot does not reach them all.
     """
     reach = 0.5 * edge_m * (1 - 2 * _FROM_ENDS)
     corners = np.array([[0, 0, 0], [-1, -1, -1], [-1, 1, -1], [1, 1, 1], [1, -1, 1]])
     return _loaded(robot, np.array(centre_m) + reach * corners, np.tile([0.0, 0.0, -weight_N], (5, 1)))
 
 
-def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float) -> Experiments:
+def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutting_N: float) -> Experiments | None:
     """A straight level path across, the cutting force half against the feed and half upwards off the part.
 
     Parameters
@@ -69,13 +63,8 @@ def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutti
 
     Returns
     -------
-    Experiments
-        One set of configurations within the joint limits.
-
-    Raises
-    ------
-    InputError
-        The robot does not reach the path.
+    Experiments or None
+        One set of configurations within the joint limits; None where the robot does not reach all of the path.
     """
     along = np.array([0.0, 1.0, 0.0])
     position = np.array(centre_m) + length_m * np.linspace(-0.5, 0.5, _PATH_POSES)[:, None] * along
@@ -83,10 +72,8 @@ def milling_path(robot: Robot, centre_m: Sequence[float], length_m: float, cutti
     return _loaded(robot, position, np.tile(force, (_PATH_POSES, 1)))
 
 
-def _loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Experiments:
+def _loaded(robot: Robot, position: np.ndarray, force: np.ndarray) -> Experiments | None:
     angles, left = along_path(robot, position, np.broadcast_to(_DOWN, (len(position), 3, 3)))
-    missed = np.flatnonzero((left > SOLVED_M) | beyond_limits(robot, angles).any(axis=-1))
-    if len(missed):
-        place = ", ".join(f"{coordinate:.3f}" for coordinate in position[missed[0]])
-        raise InputError("config.yaml", "questions.uses", f"{robot.name} does not reach [{place}]", "poses within its limits")
+    if (left > SOLVED_M).any() or beyond_limits(robot, angles).any():
+        return None
     return Experiments(angles[None], np.pad(force, ((0, 0), (0, 3)))[None])

@@ -8,7 +8,7 @@ from made_studies import few_of
 from elastocal.study.steps.arm_points import place_columns
 from elastocal.study.steps.budget import budget_blocks
 
-ARM = {"data_sets": 6, "radius_m": 0.15, "bar_m": 0.5, "acceptance_deg": 30}
+ARM = {"sets": 6, "radius_m": 0.15, "bar_m": 0.5, "acceptance_deg": 30}
 
 
 @pytest.fixture(scope="module")

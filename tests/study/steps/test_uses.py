@@ -49,3 +49,9 @@ def test_deflections_in_use_are_tenths_of_a_millimetre_and_a_model_leaves_little
     for name in ("iso_9283", "path_max"):
         assert (tables["6DoF"][name] > 0).all() and tables["6DoF"][name].mean() < 1e-4
     assert (tables["6DoF"].path_max ** 2 >= tables["6DoF"].path_mean_square).all()
+
+
+def test_a_robot_that_does_not_reach_has_no_errors_there(kuka, strategies):
+    study = StudyInMemory(kuka, "kuka", 1, USUAL, Size(data_sets=3, configurations=10, tests=30, noise=1e-5))
+    (block,) = use_blocks(study, [strategies["6DoF"]], USES | {"centre_m": (9.0, 0.0, 1.0)})
+    assert np.isnan(block["iso_9283"]).all() and np.isnan(block["path_max"]).all() and (block["mean"] > 0).all()

@@ -29,7 +29,7 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
         With as many configurations as both are measured in.
     tracker_m : sequence of float
     arm : dict
-        data_sets, radius_m, bar_m, acceptance_deg; see `arm_points`.
+        sets, radius_m, bar_m, acceptance_deg; see `arm_points`.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
         Columns joints, along (m), side, data_set, bound and bound_end_effector (m^2), turned and fixed: shares of the
         configurations of the data set in which the target is seen.
     """
-    chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["data_sets"])
+    chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["sets"])
     drawn, moment = study.experiments(sets, 2 * length), error_moment(study.judge())
     first = Experiments(drawn.joint_angles[:, :length], drawn.wrench[:, :length])
     alone = _information(study, drawn, chain.end_effector)

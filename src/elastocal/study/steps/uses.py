@@ -36,7 +36,7 @@ def use_blocks(
     Yields
     ------
     dict
-        Columns of one block of the uses table: one strategy.
+        Columns of one block of the uses table: one strategy; not a number for uses out of the robot's reach.
     """
     robot, at = study.robot, study.interpretation.wrench_at
     stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
@@ -49,14 +49,19 @@ def use_blocks(
             found.setdefault(estimator, []).append(last.T)
     cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
     path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
-    judges = [study.judge(), *(make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
-    scores = {
-        estimator: _scores(*(position_errors(judge, np.concatenate(blocks)) for judge in judges))
-        for estimator, blocks in found.items()
-    }
+    judges = [study.judge(), *(use and make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
+    scores = {}
+    for estimator, blocks in found.items():
+        models = np.concatenate(blocks)
+        scores[estimator] = _scores(*(position_errors(judge, models) if judge else _none(models) for judge in judges))
     for strategy in strategies:
         columns = scores[stages[strategy.name]]
         yield {"strategy": strategy.name, "data_set": np.arange(study.size.data_sets), **columns}
+
+
+def _none(models: np.ndarray) -> np.ndarray:
+    """No errors at places that the robot does not reach."""
+    return np.full((len(models), 1), np.nan)
 
 
 def _scores(tests: np.ndarray, cube: np.ndarray, path: np.ndarray) -> dict[str, np.ndarray]:
