@@ -17,6 +17,7 @@ LOOP_REPORTS = [
     "next_experiment.csv",
     *(f"figures/{figure}.pdf" for figure in LOOP_FIGURES),
     "report.pdf",
+    "report.html",
 ]
 
 

@@ -1,7 +1,7 @@
 """What the loop shows of a campaign: figures of its residuals, candidates and errors, and the report for whoever asked for it.
 
 Needs results/loop/{campaign}/ and the tables of reports/loop/{campaign}/. Writes reports/loop/{campaign}/figures/*.pdf and *.png,
-reports/loop/{campaign}/report.pdf and, of the study too, the pictures of the README.
+reports/loop/{campaign}/report.pdf and report.html, and, of the study too, the pictures of the README.
 """
 
 
@@ -106,6 +106,29 @@ rule compile_loop_report:
         "results/timings/compile_loop_report/{campaign}.tsv"
     script:
         "../scripts/compile_loop_report.py"
+
+
+rule compile_loop_page:
+    input:
+        verdict=rules.judge_campaign.output.verdict,
+        before_after=rules.judge_campaign.output.before_after,
+        splits=rules.judge_campaign.output.splits,
+        residuals=rules.judge_campaign.output.residuals,
+        experiment="reports/loop/{campaign}/next_experiment.csv",
+        diagnosis=rules.diagnose_campaign.output.diagnosis,
+        steps=rules.diagnose_campaign.output.steps,
+        descriptions=rules.read_campaign.output.descriptions,
+        template="src/elastocal/report/loop.html",
+        script="src/elastocal/report/loop.js",
+        sources=sources("compile_loop_page.py"),
+    output:
+        page="reports/loop/{campaign}/report.html",
+    log:
+        "results/logs/compile_loop_page/{campaign}.log",
+    benchmark:
+        "results/timings/compile_loop_page/{campaign}.tsv"
+    script:
+        "../scripts/compile_loop_page.py"
 
 
 rule pictures:

@@ -1,0 +1,126 @@
+"""A campaign's page to look into: one HTML file that asks nothing of the network.
+
+Drawn by plotly.js, whose source stands in the page: it turns, zooms and answers to touch, and is kept by many.
+"""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from jinja2 import Environment
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from elastocal.diagnosis.words import hypotheses_words
+from elastocal.io.atomic_writes import write_text
+from elastocal.mechanics.kinematics import corners
+from elastocal.report.wording import capital, grouped, probability_words
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from elastocal.mechanics.robot import Robot
+
+MICRO = 1e6
+# Measurements that a page shows: more are slow to turn on a phone.
+_MOST_SHOWN = 4000
+# Poses in which the robot can be drawn.
+_POSES = 40
+# Arrows of the middle length are this share of the width of what they are drawn in.
+_ARROW = 0.03
+_FACTS = ("campaign", "robot", "made", "verdict", "sentences", "held_out_sentence", "probabilities", "now", "warnings")
+
+
+def loop_page(
+    facts: Mapping[str, Any], verdict: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """What the page of a campaign says, and what it draws.
+
+    Parameters
+    ----------
+    facts : dict
+        From `loop_facts.loop_facts`.
+    verdict : dict
+        Contents of verdict.json.
+    table : dict of str to ndarray (N,)
+        Columns of the residuals.
+    robot : Robot
+        As declared.
+
+    Returns
+    -------
+    page : dict
+        Texts and tables, worded.
+    data : dict
+        JSON-serialisable: positions (m), residuals (µm), what they may be drawn against, corners of the robot (m), hypotheses.
+    """
+    count = len(table["x"])
+    shown = np.unique(np.linspace(0, count - 1, min(count, _MOST_SHOWN)).round().astype(int))
+    some = {name: values[shown] for name, values in table.items()}
+    position = np.column_stack([some[name] for name in "xyz"])
+    off = {step: MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
+    angles = np.column_stack([some[f"q{joint}"] for joint in range(1, robot.joints + 1)])
+    first = np.unique(np.column_stack([some["session"], some["pose"]]), axis=0, return_index=True)[1]
+    drawn = first[np.unique(np.linspace(0, len(first) - 1, min(len(first), _POSES)).round().astype(int))]
+    sets = (verdict["probabilities"] or {}).get("sets", [])
+    hypotheses = [
+        {"name": capital(name), "probability": entry["probability"], "words": probability_words(entry["probability"])}
+        for name, entry in zip(hypotheses_words(sets), sets, strict=True)
+    ]
+    middle = np.median(np.linalg.norm(off["before"], axis=1)) / MICRO
+    data = {
+        "position": position.round(6).tolist(),
+        **{step: values.round(2).tolist() for step, values in off.items()},
+        "held_out": some["held_out"].astype(bool).tolist(),
+        "against": _against(some, angles, robot),
+        "outlines": corners(robot.chain, robot.model_angles(angles[drawn])).swapaxes(0, 1).round(4).tolist(),
+        "poses": [f"{some['pose'][row]}" for row in drawn],
+        "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
+        "hypotheses": hypotheses,
+    }
+    page = {name: facts[name] for name in _FACTS}
+    page |= {"hypotheses": hypotheses, "effects": facts["effects"]}
+    page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
+    page["shown_sentence"] = (
+        "" if len(shown) == count else f"{grouped(len(shown))} of {grouped(count)} measurements are shown, evenly spread."
+    )
+    return page, data
+
+
+def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str, Any]) -> None:
+    """Write the page of a campaign; the file appears whole or not at all.
+
+    Parameters
+    ----------
+    path : str
+        The HTML file.
+    page, data : dict
+        From `loop_page`.
+    """
+    folder = resources.files("elastocal.report")
+    template, script = (folder.joinpath(name).read_text(encoding="utf-8") for name in ("loop.html", "loop.js"))
+    # Texts come from files of other people: they are escaped, and nothing in the data can end the script that holds it.
+    numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
+    text = Environment(autoescape=True).from_string(template)
+    write_text(path, text.render(page=page, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs())))
+
+
+def _against(some: Mapping[str, np.ndarray], angles: np.ndarray, robot: Robot) -> list[dict[str, Any]]:
+    """Quantities that a residual may be drawn against, those that vary."""
+    force = np.linalg.norm(np.column_stack([some[f"f{axis}"] for axis in "xyz"]), axis=1)
+    found = []
+    for joint, prismatic in enumerate(robot.chain.prismatic):
+        name, unit = (f"joint {joint + 1}", "m") if prismatic else (f"angle of joint {joint + 1}", "°")
+        found.append((name, unit, angles[:, joint] if prismatic else np.degrees(angles[:, joint])))
+    found += [("force", "N", force), *((f"force along {axis}", "N", some[f"f{axis}"]) for axis in "xyz")]
+    found += [(f"position {axis}", "m", some[axis]) for axis in "xyz"]
+    found += [("order of measurement", "row", some["row"]), ("time", "s", some.get("time_s", np.zeros(0)))]
+    return [
+        {"name": name, "unit": unit, "values": np.asarray(values, float).round(5).tolist()}
+        for name, unit, values in found
+        if len(values) and np.isfinite(values).all() and np.ptp(values) > 0
+    ]

@@ -1,0 +1,131 @@
+"""The page to look into: it draws what the tables have, asks nothing of the network, and every control works by key."""
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+from made_loop_facts import CAMPAIGNS, facts_of
+from made_loop_tables import residual_table
+
+from elastocal.report import loop_page as module
+from elastocal.report.loop_page import loop_page, write_loop_page
+
+CHROMIUM = shutil.which("chromium")
+# Three-dimensional drawing without a graphics card.
+IN_SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+
+def page_of(kuka, name="named", **changed):
+    verdict = CAMPAIGNS[name] | changed
+    return loop_page(facts_of(verdict), verdict, residual_table(), kuka)
+
+
+def data_in(path):
+    text = path.read_text(encoding="utf-8")
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.DOTALL)[1])
+
+
+@pytest.fixture(scope="module")
+def written(kuka, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_loop_page(path, *page_of(kuka))
+    return path
+
+
+def test_measurements_are_in_metres_and_micrometres_with_what_they_may_be_drawn_against(kuka):
+    table = residual_table()
+    _, data = page_of(kuka)
+    np.testing.assert_allclose(data["position"], np.column_stack([table[axis] for axis in "xyz"]), atol=1e-6)
+    np.testing.assert_allclose(data["after"], 1e6 * np.column_stack([table[f"after_d{axis}"] for axis in "xyz"]), atol=0.01)
+    assert data["held_out"] == table["held_out"].astype(bool).tolist()
+    against = {entry["name"]: entry for entry in data["against"]}
+    np.testing.assert_allclose(against["angle of joint 2"]["values"], np.degrees(table["q2"]), atol=1e-4)
+    # What does not vary explains nothing.
+    assert all(np.ptp(entry["values"]) > 0 for entry in data["against"])
+
+
+def test_the_robot_stands_where_its_chain_says(kuka):
+    _, data = page_of(kuka)
+    assert len(data["outlines"]) == len(data["poses"])
+    # Base, and behind each of the six lengths.
+    assert np.shape(data["outlines"][0]) == (7, 3)
+    np.testing.assert_allclose(data["outlines"][0][:2], [[0, 0, 0], [0, 0, 0.675]], atol=1e-4)
+
+
+def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(kuka, monkeypatch):
+    monkeypatch.setattr(module, "_MOST_SHOWN", 11)
+    page, data = page_of(kuka)
+    count = len(residual_table()["x"])
+    assert len(data["position"]) == 11 and page["shown_sentence"] == f"11 of {count} measurements are shown, evenly spread."
+
+
+def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):
+    page, data = page_of(kuka, "fault of the data", probabilities=None)
+    write_loop_page(tmp_path / "report.html", page, data)
+    assert data["hypotheses"] == [] and 'id="causes"' not in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
+def test_texts_of_other_people_stay_texts(kuka, tmp_path):
+    """A campaign may be called anything; what it is called is shown and never run."""
+    page, data = page_of(kuka)
+    evil = "</script><script>alert(1)</script>"
+    data = data | {"poses": [evil]}
+    write_loop_page(tmp_path / "report.html", page | {"robot": evil}, data)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "alert(1)</script>" not in text.replace("&lt;/script&gt;", "") and data_in(tmp_path / "report.html")["poses"] == [
+        evil
+    ]
+
+
+def test_the_page_names_nothing_that_a_browser_would_fetch(written):
+    text = re.sub(r"<script>.*?</script>", "", written.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert re.findall(r'(?:src|href)="(?!data:)', text) == [] and "@import" not in text and "url(" not in text
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")
+@pytest.mark.parametrize("width", [1280, 390])
+def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(written, width):
+    from playwright.sync_api import sync_playwright
+
+    faults, requests = [], []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=IN_SOFTWARE)
+        page = browser.new_page(viewport={"width": width, "height": 844})
+        page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto(written.as_uri())
+        page.wait_for_selector("body[data-ready=yes]", timeout=60_000)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+        def drawn(plot):
+            return page.evaluate(f"JSON.stringify(document.getElementById('{plot}').data)")
+
+        def eye():
+            return page.evaluate("JSON.stringify(document.getElementById('robot').layout.scene.camera.eye)")
+
+        for control, key, plot in (
+            ("which", "ArrowDown", "robot"),
+            ("factor", "ArrowRight", "robot"),
+            ("pose", "ArrowRight", "robot"),
+            ("component", "ArrowDown", "scatter"),
+            ("against", "ArrowDown", "scatter"),
+            ("step", "ArrowDown", "scatter"),
+        ):
+            before = drawn(plot)
+            page.focus(f"#{control}")
+            page.keyboard.press(key)
+            page.wait_for_timeout(100)
+            assert drawn(plot) != before, control
+        for button in page.query_selector_all("button"):
+            before = eye()
+            button.focus()
+            page.keyboard.press("Enter")
+            page.wait_for_timeout(200)
+            assert eye() != before, button.inner_text()
+        unlabelled = page.evaluate("[...document.querySelectorAll('select, input')].filter(e => !e.labels.length).length")
+        browser.close()
+    assert faults == [] and unlabelled == 0
+    assert [url for url in requests if not url.startswith(("file:", "data:", "blob:"))] == []
