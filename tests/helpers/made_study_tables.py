@@ -13,6 +13,7 @@ from elastocal.report.question_answers import (
     needed_rows,
     observability_rows,
     place_facts,
+    stated,
     strategy_rows,
     summaries,
     tube_rows,
@@ -22,6 +23,8 @@ from elastocal.study.strategies import Stage, Strategy
 
 TITLES = {"kuka": "Kuka", "fanuc": "Fanuc"}
 CELLS = {"noise_um": 200.0, "length": 20, "classical_strategy": "6DoF"}
+STATED = {"force_N": 1000, "offset_m": 0.5, "tracker_m": [4.0, 0.0, 1.5], "edge_m": 1.0, "weight_N": 1000, "path_m": 0.5}
+STATED |= {"cutting_N": 500, "bar_m": 0.5, "acceptance_deg": 30}
 STRATEGIES = ("6DoF", "2DoF+6DoF")
 
 
@@ -209,6 +212,7 @@ def question_facts():
         "geometry": geometry_rows(geometry(), robots),
         "weighting": weighting_rows(weighting(), robots),
         "titles": TITLES,
+        "stated": stated(STATED),
         "size": {"data_sets": "1000", "configurations": "100", "test_configurations": "500", "seed": "1"},
     }
 

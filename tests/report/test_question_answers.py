@@ -57,6 +57,10 @@ def test_places_are_summed_up_by_their_extremes_and_by_what_is_certain():
     assert (kuka["better"], kuka["places"], kuka["turned"], kuka["fixed"]) == ("0", "4", "50", "15")
 
 
+def test_loads_and_places_are_stated_as_the_configuration_has_them():
+    assert question_facts()["stated"]["tracker_m"] == "4, 0, 1.5" and question_facts()["stated"]["force_N"] == "1000"
+
+
 def test_tubes_have_the_scatter_between_data_sets():
     (row,) = question_facts()["tubes"]
     assert [*row.values()] == ["248", "1.75 ± 0.12", "1.19 ± 0.10", "5.73 ± 0.83", "459.7 ± 1.1"]

@@ -3,6 +3,15 @@
 Needs reports/tables/ and reports/figures/. Writes reports/answers.json and reports/study.pdf.
 """
 
+# What the text of the report says of loads and places.
+STATED = {
+    "force_N": config["loading"]["force_N"],
+    "offset_m": max(map(abs, config["loading"]["offset_m"])),
+    "tracker_m": QUESTIONS["tracker_m"],
+    **{key: QUESTIONS["uses"][key] for key in ("edge_m", "weight_N", "path_m", "cutting_N")},
+    **{key: QUESTIONS["arm_points"][key] for key in ("bar_m", "acceptance_deg")},
+}
+
 
 rule state_answers:
     input:
@@ -41,6 +50,7 @@ rule state_answers:
         accuracy_um=QUESTIONS["accuracies_um"][0],
         joint_range=INTERPRETATIONS["joint_range"],
         size={key: config[key] for key in ("data_sets", "configurations", "test_configurations", "seed")},
+        stated=STATED,
     script:
         "../scripts/state_answers.py"
 

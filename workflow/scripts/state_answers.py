@@ -16,6 +16,7 @@ from elastocal.report.question_answers import (
     needed_rows,
     observability_rows,
     place_facts,
+    stated,
     strategy_rows,
     summaries,
     tube_rows,
@@ -65,6 +66,7 @@ def state_answers(job: Job) -> None:
         "weighting": weighting_rows(pd.read_csv(job.input.weighting), [*titles]),
         "titles": titles,
         "size": {name: f"{value:g}" for name, value in settings.size.items()},
+        "stated": stated(settings.stated),
     }
     write_text(job.output.answers, json.dumps(facts, indent=1, ensure_ascii=False, allow_nan=False))
 

@@ -80,7 +80,7 @@ function drawCauses() {
   if (!data.hypotheses.length) return;
   const rows = data.hypotheses.slice().reverse();
   // A number stays with its joint.
-  const wrapped = (text) => text.replace(/ (?=\d)/g, "\u00a0").replace(/(.{1,34})(\s|$)/g, "$1<br>").replace(/<br>$/, "");
+  const wrapped = (text) => text.replace(/ (?=\d)/g, "\u00a0").replace(/(.{1,34})( |$)/g, "$1<br>").replace(/<br>$/, "");
   Plotly.react("causes", [{
     type: "bar", orientation: "h", x: rows.map((row) => 100 * row.probability), y: rows.map((row) => wrapped(row.name)),
     text: rows.map((row) => row.words), textposition: "auto", marker: { color: AFTER.color }, hoverinfo: "skip",

@@ -265,6 +265,22 @@ def weighting_rows(weighting: pd.DataFrame, robots: Iterable[str]) -> list[dict[
     return rows
 
 
+def stated(settings: Mapping[str, float | Sequence[float]]) -> dict[str, str]:
+    """Loads and places of the configuration as the text states them.
+
+    Parameters
+    ----------
+    settings : dict
+        Numbers, and points as lists of coordinates.
+
+    Returns
+    -------
+    dict of str to str
+        Numbers as they are, coordinates with commas between them.
+    """
+    return {name: ", ".join(f"{value:g}" for value in np.atleast_1d(values)) for name, values in settings.items()}
+
+
 def place_facts(places: pd.DataFrame, titles: Mapping[str, str]) -> list[dict[str, str]]:
     """What a second target is worth on the arm, a dictionary for each robot.
 
