@@ -11,7 +11,7 @@ FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
 # Names of the rules' files by which others know them; what is not listed is a Parquet table.
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
-SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf"}
+SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf", "page": ".html"}
 
 
 class Files:

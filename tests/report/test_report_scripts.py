@@ -10,7 +10,7 @@ from elastocal.io.json_files import read_json
 
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 SUFFIXES = dict.fromkeys(("descriptions", "diagnosis", "verdict"), ".json")
-SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf"}
+SUFFIXES |= dict.fromkeys(("before_after", "splits", "experiment"), ".csv") | {"report": ".pdf", "page": ".html"}
 
 
 class Files:
@@ -46,3 +46,4 @@ def test_a_campaign_ends_in_a_report(turned, kuka, config_folder, tmp_path):
     verdict = read_json((tmp_path / "verdict.json").as_posix())
     assert (verdict["probabilities"] is None) == (turned < 0) == any(e["family"] == "data" for e in verdict["effects"])
     assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert "<title>Calibration report: made</title>" in (tmp_path / "page.html").read_text(encoding="utf-8")

@@ -96,39 +96,17 @@ rule compile_loop_report:
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
-        pages="src/elastocal/report/loop.typ",
+        pages=[f"src/elastocal/report/loop.{ending}" for ending in ("typ", "html", "js")],
         sources=sources("compile_loop_report.py"),
     output:
         report="reports/loop/{campaign}/report.pdf",
+        page="reports/loop/{campaign}/report.html",
     log:
         "results/logs/compile_loop_report/{campaign}.log",
     benchmark:
         "results/timings/compile_loop_report/{campaign}.tsv"
     script:
         "../scripts/compile_loop_report.py"
-
-
-rule compile_loop_page:
-    input:
-        verdict=rules.judge_campaign.output.verdict,
-        before_after=rules.judge_campaign.output.before_after,
-        splits=rules.judge_campaign.output.splits,
-        residuals=rules.judge_campaign.output.residuals,
-        experiment="reports/loop/{campaign}/next_experiment.csv",
-        diagnosis=rules.diagnose_campaign.output.diagnosis,
-        steps=rules.diagnose_campaign.output.steps,
-        descriptions=rules.read_campaign.output.descriptions,
-        template="src/elastocal/report/loop.html",
-        script="src/elastocal/report/loop.js",
-        sources=sources("compile_loop_page.py"),
-    output:
-        page="reports/loop/{campaign}/report.html",
-    log:
-        "results/logs/compile_loop_page/{campaign}.log",
-    benchmark:
-        "results/timings/compile_loop_page/{campaign}.tsv"
-    script:
-        "../scripts/compile_loop_page.py"
 
 
 rule pictures:

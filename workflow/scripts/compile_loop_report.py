@@ -1,4 +1,4 @@
-"""The report of a campaign as PDF."""
+"""The report of a campaign: as PDF, and as a page to look into."""
 
 import pandas as pd
 
@@ -6,8 +6,9 @@ from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters
 from elastocal.loop.schemas import STEPS, residuals
-from elastocal.mechanics.robot_file import joint_count
+from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.report.loop_facts import loop_facts
+from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.loop_pages import write_loop_report
 
 from job import Job, run
@@ -15,16 +16,13 @@ from job import Job, run
 
 def compile_loop_report(job: Job) -> None:
     verdict, descriptions = read_json(job.input.verdict), read_json(job.input.descriptions)
-    joints = joint_count(descriptions["robot"])
+    robot = robot_from_document(descriptions["robot"])
     rows = [pd.read_csv(path).to_dict("records") for path in (job.input.before_after, job.input.splits, job.input.experiment)]
-    facts = loop_facts(
-        verdict,
-        *rows,
-        read_table(job.input.residuals, residuals(joints)),
-        descriptions,
-        final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS)),
-    )
+    table = read_table(job.input.residuals, residuals(robot.joints))
+    parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
+    facts = loop_facts(verdict, *rows, table, descriptions, parameters)
     write_loop_report(job.output.report, facts, job.input.figures)
+    write_loop_page(job.output.page, *loop_page(facts, verdict, table, robot))
 
 
 run(compile_loop_report, snakemake)

@@ -20,6 +20,7 @@ import numpy as np
 
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.refit import mean_square_left
+from elastocal.diagnosis.search import UNLIKELY
 from elastocal.diagnosis.statistics import normal_equations
 
 if TYPE_CHECKING:
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
 
 # Models that hold less than this move no digit that is reported.
 _LEAST_PROBABILITY = 0.002
-# Sizes of the pose error with less than this under the best model, in log probability, move none either.
-_UNLIKELY = -9.0
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ def _likely_pose_errors(problem: Problem, best: Model, of_models: Sequence[float
     if not best.units:
         return np.arange(len(sizes))
     density = _joint(problem, [problem.units[number] for number in best.units], best).by_pose_error
-    return np.flatnonzero((density > density.max() + _UNLIKELY) | np.isin(sizes, of_models))
+    return np.flatnonzero((density > density.max() + UNLIKELY) | np.isin(sizes, of_models))
 
 
 def squares_explained(problem: Problem, model: Model) -> dict[str, float]:

@@ -47,7 +47,7 @@ _NEGLIGIBLE = 9.0
 # A round that raises the best by less than this brings nothing.
 _BETTER = 0.1
 # Sizes of the pose error with less than this, in log probability, under all of so many good single units are left out.
-_UNLIKELY, _TELLING_UNITS = -9.0, 10
+UNLIKELY, _TELLING_UNITS = -9.0, 10
 # Sizes with less than this under the best model met so far are left out from there on: what comes near to that model differs
 # from it by a few units, which over a hundred orders of magnitude do not hang on.
 _OUT_OF_QUESTION = -300.0
@@ -181,7 +181,7 @@ def pose_errors_within_reach(statistics: Statistics, settings: Settings) -> np.n
     """
     problem = Problem(statistics, (), Prior({}, {}), settings)
     weights = evaluate(statistics, [], problem.grid, problem.log_pose, ()).log_pose
-    largest = max(np.flatnonzero(weights > weights.max() + _UNLIKELY)[-1], np.argmax(weights) + REACH)
+    largest = max(np.flatnonzero(weights > weights.max() + UNLIKELY)[-1], np.argmax(weights) + REACH)
     return np.arange(len(weights)) <= largest
 
 
@@ -213,7 +213,7 @@ def _likely(by_pose_error: np.ndarray, total: np.ndarray, empty: Evaluated) -> n
     good = np.argsort(-total)[:_TELLING_UNITS]
     weights = log_sum_exp(by_pose_error[:, good], axis=2)
     weights = np.column_stack([weights - log_sum_exp(weights, axis=0), empty.log_pose])
-    return np.any(weights > _UNLIKELY, axis=1)
+    return np.any(weights > UNLIKELY, axis=1)
 
 
 class _Searcher:

@@ -116,15 +116,7 @@ class Conditions:
 
     def gravity_of_correction(self, number: int) -> np.ndarray:
         """By how much `gravity` grows with one of the `mass_corrections`, per unit, ndarray (S, C)."""
-        body, kind = divmod(number, MASS_PARAMETERS)
-        rotation, behind = self._body_rotation[body], self._behind[:, body].astype(bool)
-        mass, first = 0.0, rotation[:, kind - 1]
-        if kind == 0:
-            mass, first = 1.0, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1))
-        falling, turning = self._falling
-        on_each = np.zeros_like(falling)
-        on_each[behind] = mass * falling[behind] + sum(turning[i][behind] * first[i] for i in range(3))
-        return self.motion.by_coordinate(on_each).T
+        return self._weighing(*self._correction(number), slice(None))
 
     @cached_property
     def total(self) -> np.ndarray:
@@ -134,12 +126,8 @@ class Conditions:
     @cached_property
     def mass_torques(self) -> np.ndarray:
         """Torque on each joint per unit of each of the `mass_corrections`, ndarray (4 m, S, n)."""
-        found = []
-        for number, mass in enumerate(self.sites.masses):
-            rotation, after = self._body_rotation[number], self.sites.followed[self.sites.joints + 2 + number].after
-            centre = self._body_position[number] + np.tensordot(mass.centre_m, rotation, (0, 1))
-            found += [self._weighing(after, centre), *(self._weighing(after, rotation[:, axis], 0.0) for axis in range(3))]
-        return np.array(found)
+        numbers = range(MASS_PARAMETERS * len(self.sites.masses))
+        return np.array([self._weighing(*self._correction(number)) for number in numbers])
 
     @cached_property
     def weight(self) -> np.ndarray:
@@ -151,13 +139,24 @@ class Conditions:
         """Torque on each joint of a first moment of one kg m along an axis of the frame at the far end of a link, (S, n)."""
         return self._weighing(self.sites.followed[1 + link].after, self.motion.rotation[1 + link][:, axis], 0.0)
 
-    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
-        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
+    def _correction(self, number: int) -> tuple[int, np.ndarray, float]:
+        """Of what one of the `mass_corrections` adds: how many transforms come before it, its first moment (3, S), its mass."""
+        body, kind = divmod(number, MASS_PARAMETERS)
+        rotation, after = self._body_rotation[body], self.sites.followed[self.sites.joints + 2 + body].after
+        if kind:
+            return after, rotation[:, kind - 1], 0.0
+        return after, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1)), 1.0
+
+    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0, transforms: slice | None = None) -> np.ndarray:
+        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n).
+
+        Or the generalized force on the coordinates of other moving transforms.
+        """
         moved = self.motion
-        joints = slice(np.searchsorted(moved.coordinate, self.sites.joints))
+        chosen = transforms or slice(np.searchsorted(moved.coordinate, self.sites.joints))
         falling, turning = self._falling
-        on_each = mass * falling[joints] + sum(turning[i][joints] * first_moment[i] for i in range(3))
-        return moved.by_coordinate(on_each * (moved.place[joints] < after)[:, None]).T
+        on_each = mass * falling[chosen] + sum(turning[i][chosen] * first_moment[i] for i in range(3))
+        return moved.by_coordinate(on_each * (moved.place[chosen] < after)[:, None]).T
 
     @cached_property
     def end_rotation(self) -> np.ndarray:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +30,7 @@ import numpy as np
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
 AXES = "xyz"
 _TOKEN = re.compile(r"(?P<kind>[TR])(?P<axis>[xyz])\((?P<sign>-?)(?P<argument>[^()\s-]+)\)|\[(?P<point>[^\[\]\s]+)\]")
@@ -125,6 +125,32 @@ class Chain:
         """Whether the transform at a place is moved by a coordinate that moves one before it as well."""
         coordinate = self.transforms[place].coordinate
         return coordinate is not None and any(t.coordinate == coordinate for t in self.transforms[:place])
+
+
+def with_inserted(chain: Chain, inserted: Mapping[int, Sequence[tuple[str, int]]]) -> Chain:
+    """A chain with further coordinates, such as springs or errors of lengths.
+
+    Parameters
+    ----------
+    chain : Chain
+    inserted : dict of int to sequence of (kind, axis)
+        How many transforms of the chain come before them, and what moves; measuring points there come after them.
+
+    Returns
+    -------
+    Chain
+        Coordinates as before, then the inserted ones in their order along the chain.
+    """
+    transforms: list[Transform] = []
+    count, new_index = chain.coordinates, {}
+    for index in range(len(chain.transforms) + 1):
+        for kind, axis in inserted.get(index, ()):
+            transforms.append(Transform(kind, axis, 0.0, count))
+            count += 1
+        new_index[index] = len(transforms)
+        transforms += chain.transforms[index : index + 1]
+    points = tuple(replace(point, after=new_index[point.after]) for point in chain.points)
+    return Chain(tuple(transforms), points, count)
 
 
 def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain:

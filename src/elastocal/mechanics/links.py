@@ -7,10 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import Chain, MeasuringPoint, Transform
+from elastocal.mechanics.chain import with_inserted
 
 if TYPE_CHECKING:
+    from elastocal.mechanics.chain import Chain
     from elastocal.mechanics.robot import Link, Robot, Tube
+
+# Kind and axis of the springs at the end of a link.
+_SIX = tuple((kind, axis) for kind in "TR" for axis in range(3))
 
 
 def tube_compliance(tube: Tube, length_m: float) -> np.ndarray:
@@ -103,19 +107,7 @@ def extended_chain(robot: Robot) -> Chain:
     .. [1] Pashkevich, A., Chablat, D. and Wenger, P., Stiffness analysis of overconstrained parallel manipulators, Mechanism
        and Machine Theory 44, 2009.
     """
-    transforms: list[Transform] = []
-    count, new_index = robot.joints, {}
-    ends = {link.after for link in robot.links}
-    for index in range(len(robot.chain.transforms) + 1):
-        if index in ends:
-            for number in range(6):
-                transforms.append(Transform("TTTRRR"[number], number % 3, 0.0, count + number))
-            count += 6
-        new_index[index] = len(transforms)
-        if index < len(robot.chain.transforms):
-            transforms.append(robot.chain.transforms[index])
-    points = tuple(MeasuringPoint(p.name, new_index[p.after], p.offset_m) for p in robot.chain.points)
-    return Chain(tuple(transforms), points, count)
+    return with_inserted(robot.chain, dict.fromkeys((link.after for link in robot.links), _SIX))
 
 
 def spring_compliance(robot: Robot) -> np.ndarray:

@@ -17,7 +17,7 @@ from plotly.offline import get_plotlyjs
 from elastocal.diagnosis.words import hypotheses_words
 from elastocal.io.atomic_writes import write_text
 from elastocal.mechanics.kinematics import corners
-from elastocal.report.wording import capital, grouped, probability_words
+from elastocal.report.wording import MICRO, capital, grouped, probability_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from elastocal.mechanics.robot import Robot
 
-MICRO = 1e6
 # Measurements that a page shows: more are slow to turn on a phone.
 _MOST_SHOWN = 4000
 # Poses in which the robot can be drawn.
@@ -59,13 +58,13 @@ def loop_page(
         JSON-serialisable: positions (m), residuals (µm), what they may be drawn against, corners of the robot (m), hypotheses.
     """
     count = len(table["x"])
-    shown = np.unique(np.linspace(0, count - 1, min(count, _MOST_SHOWN)).round().astype(int))
+    shown = _spread(count, _MOST_SHOWN)
     some = {name: values[shown] for name, values in table.items()}
     position = np.column_stack([some[name] for name in "xyz"])
     off = {step: MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
     angles = np.column_stack([some[f"q{joint}"] for joint in range(1, robot.joints + 1)])
     first = np.unique(np.column_stack([some["session"], some["pose"]]), axis=0, return_index=True)[1]
-    drawn = first[np.unique(np.linspace(0, len(first) - 1, min(len(first), _POSES)).round().astype(int))]
+    drawn = first[_spread(len(first), _POSES)]
     sets = (verdict["probabilities"] or {}).get("sets", [])
     hypotheses = [
         {"name": capital(name), "probability": entry["probability"], "words": probability_words(entry["probability"])}
@@ -107,6 +106,11 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = Environment(autoescape=True).from_string(template)
     write_text(path, text.render(page=page, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs())))
+
+
+def _spread(count: int, most: int) -> np.ndarray:
+    """Places of at most so many of `count` things, evenly spread."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
 
 
 def _against(some: Mapping[str, np.ndarray], angles: np.ndarray, robot: Robot) -> list[dict[str, Any]]:

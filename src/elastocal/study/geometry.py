@@ -7,12 +7,12 @@ it makes of the parameters that it leaves out, follow in closed form.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.chain import Transform
+from elastocal.mechanics.chain import with_inserted
 from elastocal.mechanics.kinematics import jacobians
 
 if TYPE_CHECKING:
@@ -61,19 +61,14 @@ def geometry_columns(chain: Chain, joint_angles: np.ndarray) -> np.ndarray:
     ndarray (..., 6, n + L)
         Per rad, and per m for each fixed translation that is not zero.
     """
-    n, transforms, new_index = chain.coordinates, list[Transform](), {}
-    count = n
-    for index, transform in enumerate(chain.transforms):
-        new_index[index] = len(transforms)
-        transforms.append(transform)
-        if transform.kind == "T" and transform.coordinate is None and transform.constant:
-            transforms.append(Transform("T", transform.axis, 0.0, count))
-            count += 1
-    new_index[len(chain.transforms)] = len(transforms)
-    points = tuple(replace(point, after=new_index[point.after]) for point in chain.points)
-    coordinates = np.zeros((*joint_angles.shape[:-1], count))
-    coordinates[..., :n] = joint_angles
-    longer = replace(chain, transforms=tuple(transforms), points=points, coordinates=count)
+    lengths = {
+        number + 1: [("T", transform.axis)]
+        for number, transform in enumerate(chain.transforms)
+        if transform.kind == "T" and transform.coordinate is None and transform.constant
+    }
+    longer = with_inserted(chain, lengths)
+    coordinates = np.zeros((*joint_angles.shape[:-1], longer.coordinates))
+    coordinates[..., : chain.coordinates] = joint_angles
     return jacobians(longer, coordinates, longer.end_effector)
 
 

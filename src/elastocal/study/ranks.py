@@ -19,10 +19,11 @@ import numpy as np
 import pandas as pd
 from scipy.stats import rankdata
 
+from elastocal.study.budget_tables import MICRO
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-MICRO = 1e6
 REFERENCE = "rms_um"
 # Of a normal distribution: 95 % within.
 _QUANTILE = 1.96

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.mechanics.elastostatics import joint_torques, loaded_point, regressor
-from elastocal.mechanics.kinematics import jacobians
 from elastocal.study.arm_points import in_sight, places
 from elastocal.study.experiments import Experiments
 from elastocal.study.metrics import error_moment
@@ -40,10 +38,10 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
     chain, length, sets = study.robot.chain, study.size.configurations, np.arange(arm["sets"])
     drawn, moment = study.experiments(sets, 2 * length), error_moment(study.judge())
     first = Experiments(drawn.joint_angles[:, :length], drawn.wrench[:, :length])
-    alone = _information(study, drawn, chain.end_effector)
     once = _information(study, first, chain.end_effector)
     angles = first.joint_angles.reshape(-1, chain.coordinates)
     scale, columns = study.size.noise**2, []
+    alone = scale * _bounds(_information(study, drawn, chain.end_effector), moment)
     for place in places(chain, arm["radius_m"], arm["bar_m"]):
         seen = in_sight(chain, angles, place, tracker_m, arm["radius_m"], arm["acceptance_deg"])
         turned, fixed = (each.reshape(len(sets), length).mean(axis=1) for each in seen)
@@ -54,7 +52,7 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
                 "side": np.full(len(sets), place.side, object),
                 "data_set": sets,
                 "bound": scale * _bounds(once + _information(study, first, place.point), moment),
-                "bound_end_effector": scale * _bounds(alone, moment),
+                "bound_end_effector": alone,
                 "turned": turned,
                 "fixed": fixed,
             }
@@ -64,10 +62,7 @@ def place_columns(study: StudyInMemory, tracker_m: Sequence[float], arm: Mapping
 
 def _information(study: StudyInMemory, experiments: Experiments, point: MeasuringPoint) -> np.ndarray:
     """Sum of A' A (sets, n, n) over the configurations of each data set, from what is measured of a point."""
-    chain, angles = study.robot.chain, experiments.joint_angles
-    loaded = loaded_point(chain, point, study.interpretation.wrench_at)
-    torques = joint_torques(chain, angles, experiments.wrench, loaded)
-    rows = regressor(jacobians(chain, angles, point), torques)[:, :, : study.interpretation.rows]
+    rows = study.regressor(experiments, point)[:, :, : study.interpretation.rows]
     flat = rows.reshape(len(rows), -1, rows.shape[-1])
     return flat.swapaxes(1, 2) @ flat
 

@@ -24,6 +24,7 @@ from elastocal.study.steps.design import Design, configuration_first
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
+    from elastocal.mechanics.chain import MeasuringPoint
     from elastocal.study.experiments import Experiments
 
 
@@ -86,12 +87,12 @@ class StudyInMemory:
         name = point or self.robot.chain.end_effector.name
         return measurement_noise(self.seed, self.key, name, sets, configurations or self.size.configurations)
 
-    def regressor(self, experiments: Experiments) -> np.ndarray:
-        """Regressors (sets, configurations, 6, n) of poses of the end-effector."""
+    def regressor(self, experiments: Experiments, point: MeasuringPoint | None = None) -> np.ndarray:
+        """Regressors (sets, configurations, 6, n) of poses of a point of the arm, of the end-effector without."""
         chain, angles = self.robot.chain, experiments.joint_angles
-        loaded = loaded_point(chain, chain.end_effector, self.interpretation.wrench_at)
-        torques = joint_torques(chain, angles, experiments.wrench, loaded)
-        return regressor(jacobians(chain, angles, chain.end_effector), torques)
+        point = point or chain.end_effector
+        torques = joint_torques(chain, angles, experiments.wrench, loaded_point(chain, point, self.interpretation.wrench_at))
+        return regressor(jacobians(chain, angles, point), torques)
 
     def judge(self, number: int = 0) -> Judge:
         """Score sheet of the test configurations of a study."""
@@ -122,7 +123,7 @@ class StudyInMemory:
             found[name] = Measurements(regressors[name], np.moveaxis(configuration_first(deflection)[..., :rows], -1, 0))
         return found
 
-    def _point(self, name: str | None) -> Any:
+    def _point(self, name: str | None) -> MeasuringPoint:
         return self.robot.chain.point(name) if name else self.robot.chain.end_effector
 
 

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.study.evaluation import average
-from elastocal.study.identification import estimate_compliance, first_solvable_length
 from elastocal.study.metrics import k_sigma
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.steps.estimates import estimates
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.mechanics.robot import Robot
     from elastocal.study.steps.in_memory import StudyInMemory
+    from elastocal.study.strategies import Strategy
 
 
 def repeated_blocks(
@@ -41,19 +41,9 @@ def repeated_blocks(
     robot, interpretation = study.robot, study.interpretation
     for number in studies:
         judge = study.judge(number)
-        # Strategies that are one estimator under equation 11 are worked out once.
-        stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
-        found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
-        for sets in study.blocks(number):
-            points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
-            measurements = study.measured(sets, points)
-            for estimator in dict.fromkeys(stages.values()):
-                strategy = Strategy("", estimator)
-                compliance = estimate_compliance(strategy, measurements, robot.joints)[0]
-                compliance[: first_solvable_length(strategy, interpretation.rows) - 1] = np.nan
-                found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
+        found = estimates(study, strategies, number)
         for strategy in strategies:
-            blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[stages[strategy.name]])
+            blocks = ((compliance, np.ones((1, len(compliance)))) for compliance in found[strategy.name])
             averages = average(
                 blocks, judge, interpretation.average, interpretation.deviation_of, np.ones((1, study.size.tests))
             )

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.study.identification import estimate_compliance
 from elastocal.study.metrics import make_judge, position_errors
-from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+from elastocal.study.steps.estimates import estimates
 from elastocal.study.uses import iso_9283, milling_path
 
 if TYPE_CHECKING:
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from elastocal.study.steps.in_memory import StudyInMemory
+    from elastocal.study.strategies import Strategy
 
 # The quantile that is pooled, and over how much about it its density is taken.
 QUANTILE, _ABOUT = 0.95, 0.01
@@ -39,24 +39,13 @@ def use_blocks(
         Columns of one block of the uses table: one strategy; not a number for uses out of the robot's reach.
     """
     robot, at = study.robot, study.interpretation.wrench_at
-    stages = {strategy.name: without_forgotten_stages(strategy, robot.joints).stages for strategy in strategies}
-    points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
-    found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
-    for sets in study.blocks():
-        measurements = study.measured(sets, points)
-        for estimator in dict.fromkeys(stages.values()):
-            last = estimate_compliance(Strategy("", estimator), measurements, robot.joints)[0][-1]
-            found.setdefault(estimator, []).append(last.T)
     cube = iso_9283(robot, uses["centre_m"], uses["edge_m"], uses["weight_N"])
     path = milling_path(robot, uses["centre_m"], uses["path_m"], uses["cutting_N"])
     judges = [study.judge(), *(use and make_judge(robot, use, study.deflections(use), at) for use in (cube, path))]
-    scores = {}
-    for estimator, blocks in found.items():
-        models = np.concatenate(blocks)
-        scores[estimator] = _scores(*(position_errors(judge, models) if judge else _none(models) for judge in judges))
-    for strategy in strategies:
-        columns = scores[stages[strategy.name]]
-        yield {"strategy": strategy.name, "data_set": np.arange(study.size.data_sets), **columns}
+    for strategy, blocks in estimates(study, strategies).items():
+        models = np.concatenate([block[:, -1] for block in blocks])
+        columns = _scores(*(position_errors(judge, models) if judge else _none(models) for judge in judges))
+        yield {"strategy": strategy, "data_set": np.arange(study.size.data_sets), **columns}
 
 
 def _none(models: np.ndarray) -> np.ndarray:

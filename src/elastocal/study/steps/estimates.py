@@ -1,0 +1,45 @@
+"""Compliances of a study in memory, by several strategies from the same measurements."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.study.identification import estimate_compliance, first_solvable_length
+from elastocal.study.strategies import Stage, Strategy, without_forgotten_stages
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.study.steps.in_memory import StudyInMemory
+
+
+def estimates(study: StudyInMemory, strategies: Sequence[Strategy], number: int = 0) -> dict[str, list[np.ndarray]]:
+    """Estimates of all data sets of a study, block by block.
+
+    Parameters
+    ----------
+    study : StudyInMemory
+    strategies : sequence of Strategy
+        Those that are one estimator under equation 11 are worked out once and share their arrays.
+    number : int
+        Of the study.
+
+    Returns
+    -------
+    dict of str to list of ndarray (sets, lengths, n)
+        By the names of the strategies; rad/(N m), not a number where a length does not determine them.
+    """
+    joints = study.robot.joints
+    stages = {strategy.name: without_forgotten_stages(strategy, joints).stages for strategy in strategies}
+    points = tuple(dict.fromkeys(name for some in stages.values() for stage in some for name in stage.points))
+    found: dict[tuple[Stage, ...], list[np.ndarray]] = {}
+    for sets in study.blocks(number):
+        measurements = study.measured(sets, points)
+        for estimator in dict.fromkeys(stages.values()):
+            strategy = Strategy("", estimator)
+            compliance = estimate_compliance(strategy, measurements, joints)[0]
+            compliance[: first_solvable_length(strategy, study.interpretation.rows) - 1] = np.nan
+            found.setdefault(estimator, []).append(np.moveaxis(compliance, -1, 0))
+    return {name: found[estimator] for name, estimator in stages.items()}
