@@ -2,30 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
-from elastocal.effects.conditions import offered
 from elastocal.fitting.displacement import conditions
-from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import each_approach, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
-from elastocal.validation.fitted_range import outside_fitted_range, predictive_variances
+from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import (
     METRICS,
     errors_by_range,
     grown,
     intervals,
     noise_floor,
-    placed_estimate,
     position_errors,
     share_below_largest,
     summary,
 )
+from elastocal.validation.placing import placed
 from elastocal.validation.splits import error_row, split_rows
 
 if TYPE_CHECKING:
@@ -34,9 +32,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.case import Case
-    from elastocal.fitting.fit_result import Fit
-    from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations, States
+    from elastocal.fitting.observations import Observations
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
@@ -118,13 +114,13 @@ def heldout_errors(
         As in verdict.json.
     warnings : list of str
     """
-    placed = [_placed(step.fitted, case, held_out) for step in steps]
-    errors = [position_errors(model, estimate, held_out.observations) for model, estimate in placed]
+    there = [placed(step.fitted, case, held_out) for step in steps]
+    errors = [position_errors(model, estimate, held_out.observations) for model, estimate in there]
     before = next(number for number, step in enumerate(steps) if step.kind == "declared")
     after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
-    floor = noise_floor(steps[after].fitted, held_out.observations, *placed[after])
+    floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
         training = summary(np.linalg.norm(step.fitted.residual[:, :3], axis=1))
@@ -137,7 +133,7 @@ def heldout_errors(
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
     ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
-    outside = outside_poses(steps, case, held_out)
+    outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
         "before": ends[0],
@@ -150,27 +146,6 @@ def heldout_errors(
         "outside_range": by_range,
     }
     return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
-
-
-def outside_poses(steps: Iterable[Step], case: Case, held_out: Case) -> np.ndarray:
-    """Which held-out poses lie outside the range of those that the last model was fitted to.
-
-    Parameters
-    ----------
-    steps, case, held_out
-        As in `judge`.
-
-    Returns
-    -------
-    ndarray of bool (P,)
-        By `Observations.cluster`.
-    """
-    fitted, unseen = [step.fitted for step in steps if step.kind in ("declared", "effect")][-1], held_out.observations
-    if not _same_campaign(case, held_out):
-        fitted = carried_over(fitted, unseen.states)
-    variances = predictive_variances(fitted, case.observations, *_placed(fitted, case, held_out), unseen)
-    outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
-    return np.bincount(state_clusters(unseen.states), outside) > 0
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
@@ -188,58 +163,22 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
     """
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     draws = stream(seed, case.campaign.name, "splits", 0)
-    unseen = [position_errors(*_placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
+    unseen = [position_errors(*placed(fitted, case, held_out), held_out.observations) for fitted in (before, after)]
     rows = [error_row("held out", "all", unseen[0], unseen[1], _REPLICATES, draws)]
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
 def residual_blocks(diagnosis: Diagnosis, held_out: Case) -> Iterator[dict[str, np.ndarray]]:
     """Blocks of the residuals table: training measurements, then held-out ones; every measurement before and after."""
-    case, steps, before, after = diagnosis.case, diagnosis.steps, diagnosis.declared, diagnosis.final
+    case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     inside = np.zeros(case.observations.cluster.max() + 1, bool)
-    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(steps, case, held_out))):
+    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(after, case, held_out))):
         observations, order = _in_order(part.campaign.measurements)
-        placed = [_placed(fitted, case, part) for fitted in (before, after)]
-        off = [residuals(*each, observations, conditions(*each, observations.states)) for each in placed]
-        position = measured_in_base(placed[-1][1], observations)[0]
+        there = [placed(fitted, case, part) for fitted in (before, after)]
+        off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
+        position = measured_in_base(there[-1][1], observations)[0]
         measurements = part.campaign.measurements.select(order)
         yield residual_columns(measurements, unseen, outside[state_clusters(measurements)], position, *off)
-
-
-def _placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
-    """Model and estimate for the measurements of a part: as fitted, or with frames and targets of another campaign."""
-    if _same_campaign(case, part):
-        return fitted.model, placed_estimate(fitted, part.observations)
-    carried = carried_over(fitted, part.observations.states)
-    model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=carried.model.effects)
-    return model, fit_frames(carried, model, part.observations, fitted.noise)
-
-
-def _same_campaign(case: Case, part: Case) -> bool:
-    return part is case or part.campaign.name == case.campaign.name
-
-
-def carried_over(fitted: Fit, states: States) -> Fit:
-    """A fit without the effects that another campaign cannot have, or does not record: a wandering tracker, a temperature.
-
-    Parameters
-    ----------
-    fitted : Fit
-    states : States
-        Of the other campaign.
-
-    Returns
-    -------
-    Fit
-    """
-    there = offered(fitted.model.sites, states) | {"load", "external load"}
-    kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
-    model = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
-    coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes
-    estimate = replace(
-        fitted.estimate, coefficients=tuple(coefficients[n] for n in kept), shapes=tuple(shapes[n] for n in kept)
-    )
-    return replace(fitted, model=model, estimate=estimate)
 
 
 def _in_order(measurements: Measurements) -> tuple[Observations, np.ndarray]:

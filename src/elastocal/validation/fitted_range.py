@@ -11,8 +11,10 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.observations import part_at, parts_of, state_clusters
+from elastocal.validation.placing import carried_over, placed, same_campaign
 
 if TYPE_CHECKING:
+    from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
     from elastocal.fitting.observations import Observations, States
@@ -56,6 +58,29 @@ def outside_fitted_range(
 def _angles_of_poses(states: States) -> np.ndarray:
     """Joint angles of each pose, (P, n): its loads and repeats share them."""
     return states.joint_angles[np.unique(state_clusters(states), return_index=True)[1]]
+
+
+def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
+    """Which poses lie outside the range of those that a model was fitted to, see `outside_fitted_range`.
+
+    Parameters
+    ----------
+    fitted : Fit
+    case : Case
+        Which it was fitted to.
+    held_out : Case
+
+    Returns
+    -------
+    ndarray of bool (P,)
+        By `Observations.cluster`.
+    """
+    unseen = held_out.observations
+    if not same_campaign(case, held_out):
+        fitted = carried_over(fitted, unseen.states)
+    variances = predictive_variances(fitted, case.observations, *placed(fitted, case, held_out), unseen)
+    outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
+    return np.bincount(state_clusters(unseen.states), outside) > 0
 
 
 def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:

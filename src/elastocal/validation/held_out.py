@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.stats import binom
 
 from elastocal.fitting.displacement import conditions
-from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
 from elastocal.fitting.noise import measurement_covariances
-from elastocal.fitting.observations import part_at, parts_of, select_states
+from elastocal.fitting.observations import part_at, parts_of
 from elastocal.fitting.prediction import residuals
 from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval
 
@@ -67,42 +66,27 @@ def position_errors(model: Model, estimate: Estimate, observations: Observations
     -------
     Errors
     """
-    distance = np.empty(len(observations))
-    for states, seen in parts_of(observations, observations_at_once(observations.rows, 0)):
-        some = part_at(observations, states, seen)
-        off = residuals(model, estimate, some, conditions(model, estimate, some.states))
-        distance[seen] = np.linalg.norm(off[:, :3], axis=1)
-    return Errors(distance, observations.cluster)
+    return Errors(np.linalg.norm(position_residuals(model, estimate, observations), axis=1), observations.cluster)
 
 
-def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
-    """The estimate of a fit for other observations of its targets, whose sessions it may not have seen.
-
-    A tracker set up anew stands somewhere else: the frame of such a session is fitted to the very observations that test it,
-    six numbers of each session, and so its errors come out slightly too small. Everything else stays.
+def position_residuals(model: Model, estimate: Estimate, observations: Observations) -> np.ndarray:
+    """Measured less predicted positions, in parts that fit into memory.
 
     Parameters
     ----------
-    fitted : Fit
-    observations : Observations
+    model, estimate, observations
+        As in `position_errors`.
 
     Returns
     -------
-    Estimate
+    ndarray (M, 3)
+        m, base axes.
     """
-    found = fitted.estimate
-    unseen = ~np.isin(observations.states.session, found.sessions)
-    if not unseen.any():
-        return found
-    there = fit_frames(fitted, fitted.model, select_states(observations, unseen), fitted.noise, own_targets=False)
-    sessions = (*found.sessions, *there.sessions)
-    order = np.argsort(sessions)
-    return replace(
-        found,
-        sessions=tuple(sessions[number] for number in order),
-        frame_rotation=np.concatenate([found.frame_rotation, there.frame_rotation])[order],
-        frame_position=np.concatenate([found.frame_position, there.frame_position])[order],
-    )
+    off = np.empty((len(observations), 3))
+    for states, seen in parts_of(observations, observations_at_once(observations.rows, 0)):
+        some = part_at(observations, states, seen)
+        off[seen] = residuals(model, estimate, some, conditions(model, estimate, some.states))[:, :3]
+    return off
 
 
 def summary(distance: np.ndarray) -> dict[str, np.ndarray]:

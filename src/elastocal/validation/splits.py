@@ -22,7 +22,8 @@ from elastocal.campaigns.joint_space import blocks
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import select_states, state_clusters
 from elastocal.fitting.registration import registered
-from elastocal.validation.held_out import Errors, intervals, placed_estimate, position_errors, summary
+from elastocal.validation.held_out import Errors, intervals, position_errors, summary
+from elastocal.validation.placing import placed_estimate
 
 if TYPE_CHECKING:
     from typing import Any
@@ -82,7 +83,7 @@ def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -
 
     Leave-one-block-out cross-validation. A refit starts from the nominal robot, so that a parameter that only the part left out
     identifies does not keep its value, and keeps the shapes of the fit. A session that is left out has its frame fitted to
-    itself, see `held_out.placed_estimate`.
+    itself, see `placing.placed_estimate`.
 
     Parameters
     ----------
