@@ -9,7 +9,7 @@ import pytest
 from support import refused
 
 from elastocal.campaigns import public_data
-from elastocal.campaigns.public_data import FILES, FOLDER_VARIABLE, PublicFile, fetch
+from elastocal.campaigns.public_data import FILES, FOLDER_VARIABLE, PublicFile, fetch, not_at_hand
 
 CONTENTS = b"0 1 2\n"
 
@@ -91,3 +91,19 @@ def test_download_that_fails_is_refused_and_tells_of_the_folder(served, tmp_path
 def test_unknown_name_is_refused(registered, tmp_path):
     with refused("public data", "", "'yours'", "mine"):
         fetch("yours", tmp_path)
+
+
+def test_what_is_missing_is_named_only_where_a_folder_stands_for_the_network(registered, monkeypatch, tmp_path):
+    assert not_at_hand(["mine"], tmp_path / "cache") is None
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    assert not_at_hand(["mine"], tmp_path / "cache") == "mine/values.csv"
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
+    assert not_at_hand(["mine"], tmp_path / "cache") is None
+
+
+def test_what_was_downloaded_before_is_at_hand(served, monkeypatch, tmp_path):
+    served.write_bytes(CONTENTS)
+    fetch("mine", tmp_path / "cache")
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
+    assert not_at_hand(["mine"], tmp_path / "cache") is None

@@ -254,3 +254,19 @@ def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config
     blocks = list(residual_blocks(diagnosis_of(case, steps), held_out))
     off = np.column_stack([blocks[1][f"after_d{axis}"] for axis in "xyz"])
     assert np.sqrt((off**2).sum(axis=1).mean()) < 2e-4
+
+
+def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_sound(made):
+    case, held_out, steps = made
+    found = diagnosis_of(case, steps)
+    found = replace(
+        found, document=found.document | {"effects": [{"name": "joint_offset", "family": "geometry", "heldout_gain": None}]}
+    )
+    assert judge(found, held_out, 1).document["remainder"] is None
+    asked = replace(found, case=replace(case, campaign=replace(case.campaign, remainder="gaussian_process")))
+    facts = judge(asked, held_out, 1).document["remainder"]
+    # Two thirds of the error are the offset that the final model has, and nothing smooth is left.
+    assert facts["physics"] > 0.6 and abs(facts["regression_share"]) < 0.1
+    assert facts["physics"] + facts["regression_share"] + facts["left"] == pytest.approx(1.0)
+    faulty = asked.document | {"effects": [asked.document["effects"][0] | {"family": "data"}]}
+    assert judge(replace(asked, document=faulty), held_out, 1).document["remainder"] is None

@@ -7,6 +7,7 @@ from made_loop_tables import (
     effect_entry,
     fault_entry,
     parameter_table,
+    remainder_facts,
     residual_table,
     split_rows,
     step_rows,
@@ -33,6 +34,7 @@ CAMPAIGNS = {
     "fault of the data": verdict_document(NAMED, [fault_entry()], ["the fit of the final model did not converge"]),
     "noise not known": verdict_document(ADEQUATE, noise="residual", warnings=["no repeats and no declared noise"]),
     "hundreds of parameters": verdict_document(SEVERAL, [effect_entry("transmission_harmonic", HARMONICS, range(1, 7), WAVES)]),
+    "with a remainder": verdict_document(NAMED, [effect_entry()], outside=3, remainder=remainder_facts(outside=3)),
     "poses outside the range": verdict_document(NAMED, [effect_entry()], outside=3),
 }
 # The private dialect of earlier versions, and words of the table in the design.

@@ -193,6 +193,23 @@ def fault_entry():
     }
 
 
+def remainder_facts(outside=0):
+    """What verdict.json says of a regression on the remainder."""
+    return {
+        "regression": "gaussian_process",
+        "errors": {"mean_m": 5.5e-5, "rms_m": 6.0e-5, "p95_m": 1.0e-4, "max_m": 1.5e-4},
+        "rms_ci95_m": [5.0e-5, 7.2e-5],
+        "reduction_ci95": [-0.05, 0.31],
+        "physics": 0.51,
+        "regression_share": 0.24,
+        "left": 0.25,
+        "outside": outside,
+        "confidence": 0.95,
+        "covered": 0.952,
+        "half_width_m": {"within": 1.0e-4, "outside": 4.0e-4 if outside else None},
+    }
+
+
 def verdict_document(
     word,
     effects=(),
@@ -204,6 +221,7 @@ def verdict_document(
     outside=0,
     reduction=(0.15, 0.32),
     next_experiment=None,
+    remainder=None,
 ):
     """Contents of verdict.json."""
     known, faulty = noise != "residual", any(effect["family"] == "data" for effect in effects)
@@ -226,6 +244,7 @@ def verdict_document(
             "factor": 1.0,
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},
+        "remainder": remainder,
         "heldout": {
             "before": errors,
             "after": after,

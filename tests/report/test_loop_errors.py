@@ -1,9 +1,9 @@
 """Errors stand with their intervals, by step, by split and by range."""
 
 from made_loop_facts import CAMPAIGNS, facts_of, plainly
-from made_loop_tables import split_rows, step_rows
+from made_loop_tables import remainder_facts, split_rows, step_rows
 
-from elastocal.report.loop_errors import range_sentence
+from elastocal.report.loop_errors import range_sentence, remainder_sentence
 from elastocal.report.loop_errors import split_rows as rows_of_splits
 from elastocal.report.loop_errors import step_rows as table_rows
 
@@ -45,3 +45,14 @@ def test_poses_outside_the_fitted_range_are_told_apart():
     )
     assert outside.startswith("3 of 10 validation poses lie outside the range")
     assert "120 µm before and 84.0 µm after outside that range" in outside
+
+
+def test_what_a_regression_adds_is_said_with_shares_intervals_and_where_it_corrects_nothing():
+    said = plainly(remainder_sentence(remainder_facts(outside=3), CAMPAIGNS["named"]["heldout"]))
+    assert "RMS error of 60.0 µm (95 %: 50.0 µm to 72.0 µm) instead of 84.0 µm: a change of the error by −31 to +5 %" in said
+    assert "the effects explain 51 % and the process 24 %; 25 % is left" in said
+    assert "± 100 µm within the range of the fitted poses, ± 400 µm outside (median of a coordinate), hold 95 %" in said
+    assert "At the 3 poses outside that range it corrects nothing" in said
+    within = plainly(remainder_sentence(remainder_facts(), CAMPAIGNS["named"]["heldout"]))
+    assert "outside" not in within
+    assert remainder_sentence(None, CAMPAIGNS["named"]["heldout"]) == ""

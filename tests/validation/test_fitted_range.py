@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from planted import planted
+from synthetic import made_estimate, made_model, made_states, seen_exactly
 
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.linearization import linearize
+from elastocal.fitting.noise import Noise
 from elastocal.fitting.observations import select_states
 from elastocal.validation.fitted_range import beyond_campaign, outside_fitted_range, predictive_variances
 
@@ -95,3 +97,14 @@ def test_poses_forces_and_moments_beyond_those_of_a_campaign_are_marked(fanuc):
     wrench[3, 0] = force
     angles[0, 2] = states.joint_angles[:, 2].max() + 1.0
     assert beyond_campaign(states, angles, wrench).tolist() == [True, True, True, False]
+
+
+def test_a_model_without_parameters_is_as_sure_everywhere(fanuc):
+    model = replace(made_model(fanuc.chain, rows=3, compliance=fanuc.compliance), fitted_frames=False, effects=())
+    model = replace(model, targets=tuple(replace(target, offset_m=(0.0, 0.0, 0.1)) for target in model.targets))
+    states = made_states(6, 12, seed=4)
+    seen = seen_exactly(model, made_estimate(model, tuple(np.unique(states.session)), seed=3), states)
+    fitted = fit(model, seen, Noise("declared", 6e-5, 6e-5, np.zeros(6)))
+    assert not fitted.parameters
+    own, other = predictive_variances(fitted, seen, model, fitted.estimate, seen)
+    assert not own.any() and not other.any() and len(other) == len(seen.states)

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from elastocal.campaigns.reading import campaign_files
-from elastocal.campaigns.sources import campaign_sources, user_campaign
+from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.study.configuration import check_study, rows_read
 from elastocal.errors import InputError
 
@@ -104,12 +104,16 @@ def folder_of(campaign):
 
 
 def files_of(wildcards):
+    return files_of_campaign(wildcards.campaign)
+
+
+def files_of_campaign(campaign):
     """Files that a campaign is read from, those of the campaign that holds its test included."""
-    if wildcards.campaign in OWN:
-        return campaign_files(OWN[wildcards.campaign], "config/robots")
-    source = SOURCES[wildcards.campaign]
+    if campaign in OWN:
+        return campaign_files(OWN[campaign], "config/robots")
+    source = SOURCES[campaign]
     other = source.get("holdout", {}).get("campaign")
-    names = [wildcards.campaign, *([Path(other).name] if other else [])]
+    names = [campaign, *([Path(other).name] if other else [])]
     files = expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
     # An import has its robots among its inputs; a simulation does not have the robot that it declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []

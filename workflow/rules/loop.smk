@@ -6,7 +6,7 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-MEASURED_ROBOTS = ["fanuc_static", "fanuc_cpa", "fanuc_measured", "ur10", "ur5", "wam"]
+MEASURED_ROBOTS = ["fanuc_static", "fanuc_cpa", "fanuc_measured", "ur10", "ur5", "wam", "motoman_right_arm"]
 LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confounding"]
 LOOP_REPORTS = [
     "verdict.json",

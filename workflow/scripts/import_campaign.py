@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa
+from elastocal.campaigns.importers import fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa
 from elastocal.campaigns.public_data import fetch
 from elastocal.campaigns.reading import folds_of
 
@@ -14,6 +14,7 @@ IMPORTERS = {
     "fanuc_joint": fanuc_joint,
     "ur10_ipa": ur10_ipa,
     "jacobi": jacobi,
+    "motoman": motoman,
 }
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 DOCUMENT = "campaign.yaml"
 DEFAULT_HOLDOUT = {"fraction": 0.3, "seed": 1}
+NO_REMAINDER = "none"
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,8 @@ class Campaign:
     holdout : dict
         ``fraction`` and ``seed``, ``blocks`` and ``seed``, ``session``, ``poses`` or ``campaign``.
     measurements : Measurements
+    remainder : str or None
+        Regression on what the final model leaves, a name in `remainder.catalogue`.
     """
 
     name: str
@@ -133,6 +136,7 @@ class Campaign:
     noise: dict[str, Any] | None
     holdout: dict[str, Any]
     measurements: Measurements
+    remainder: str | None = None
 
 
 def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
@@ -154,6 +158,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
     Campaign
     """
     compliance = document.get("compliance", "nominal")
+    remainder = document.get("remainder", NO_REMAINDER)
     rigid = compliance == "nominal" and not robot.compliance_known
     return Campaign(
         name=document["campaign"],
@@ -166,6 +171,7 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
         noise=document.get("noise"),
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
+        remainder=None if remainder == NO_REMAINDER else remainder,
     )
 
 

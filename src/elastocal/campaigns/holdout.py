@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
-from elastocal.campaigns.joint_space import blocks
+from elastocal.campaigns.joint_space import blocks_of_poses
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -159,8 +159,6 @@ def _chosen_poses(
     if "blocks" in holdout:
         if holdout["blocks"] > total:
             raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as poses, {total}")
-        middle = np.zeros((total, measurements.joint_angles.shape[1]))
-        np.add.at(middle, index, measurements.joint_angles)
-        return blocks(middle / np.bincount(index)[:, None], holdout["blocks"]) == draws.integers(holdout["blocks"])
+        return blocks_of_poses(measurements.joint_angles, index, holdout["blocks"]) == draws.integers(holdout["blocks"])
     chosen[draws.permutation(total)[: round(holdout["fraction"] * total)]] = True
     return chosen

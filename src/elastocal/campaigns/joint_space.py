@@ -61,6 +61,27 @@ def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
     return found
 
 
+def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:
+    """The same where poses were measured more than once: a block for each by the means of its angles.
+
+    Parameters
+    ----------
+    joint_angles : ndarray (N, n)
+        Of each measurement or state, rad.
+    pose : ndarray of int (N,)
+        0 .. P-1.
+    count : int
+        Of blocks.
+
+    Returns
+    -------
+    ndarray of int (P,)
+    """
+    mean = np.zeros((pose.max() + 1, joint_angles.shape[1]))
+    np.add.at(mean, pose, joint_angles)
+    return blocks(mean / np.bincount(pose)[:, None], count)
+
+
 def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
     """Poses at which a joint stands farther beyond those of other poses than chance explains.
 

@@ -1,14 +1,20 @@
 """Measured data of other people: where they are, what their contents must be, how to get them. Never part of this project."""
 
+from __future__ import annotations
+
 import hashlib
 import logging
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pooch
 
 from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 # Names a folder that already has the files, for machines without a network.
 FOLDER_VARIABLE = "ELASTOCAL_DATA"
@@ -46,6 +52,9 @@ class PublicFile:
 
 _UR10 = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
 _JACOBI = "pauljac7700/serial_robots_datasets", "759068d85a8b95183cd71ff96d9dfc5173bc57fc"
+_MOTOMAN = "ctu-vras/multirobot-calibration", "a20f0454732bc36f1d980ff08c3d30536b8b1b19"
+# The toolbox that holds these files says so in its sources; it has no licence file.
+_LGPL = "LGPL-3.0-or-later"
 FILES = {
     "fanuc_static": PublicFile(
         "Sarrasor/RoboticManipulators",
@@ -105,7 +114,48 @@ FILES = {
         "jacobi_wam/3D_WAM_uncalibrated_random_cleaned.csv",
         "MIT",
     ),
+    "motoman_workspace": PublicFile(
+        *_MOTOMAN,
+        "UserData/Robots/Motoman/Dataset/leica_dataset/updated_leica_dataset.mat",
+        "a4e62319d0d9ba35590032648ccd260ee7c8261b0d73eea97995da7f3e68f3ca",
+        "motoman_leica/updated_leica_dataset.mat",
+        _LGPL,
+    ),
+    "motoman_grid": PublicFile(
+        *_MOTOMAN,
+        "UserData/Robots/Motoman/Dataset/leica_dataset/leica_right_hand_6x6x6_dataset.mat",
+        "170ef4301d0ca949e5e1bc39d6a6c8d0f722f47c0afaf5215e4b6b36637bee4f",
+        "motoman_leica/leica_right_hand_6x6x6_dataset.mat",
+        _LGPL,
+    ),
 }
+
+
+def not_at_hand(names: Iterable[str], kept: str | Path) -> str | None:
+    """What of some files is missing where `FOLDER_VARIABLE` stands for a network.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Keys of `FILES`.
+    kept : str or Path
+        Folder of what was downloaded before.
+
+    Returns
+    -------
+    str or None
+        The first file that is missing, below that folder; None where all are there, or may be downloaded.
+    """
+    given = os.environ.get(FOLDER_VARIABLE)
+    for name in names if given else ():
+        file = FILES[name]
+        if not (Path(given or "") / file.local).is_file() and not (Path(kept) / _kept_as(name)).is_file():
+            return file.local
+    return None
+
+
+def _kept_as(name: str) -> str:
+    return f"{name}{Path(FILES[name].path).suffix}"
 
 
 def fetch(name: str, folder: str | Path) -> Path:
@@ -139,7 +189,7 @@ def fetch(name: str, folder: str | Path) -> Path:
         return local
     pooch.get_logger().setLevel(logging.ERROR)
     try:
-        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", f"{name}{Path(file.path).suffix}", folder)
+        kept = pooch.retrieve(file.address, f"sha256:{file.sha256}", _kept_as(name), folder)
     except ValueError as error:
         raise InputError(file.address, "", f"other contents ({error})", f"SHA-256 {file.sha256}") from None
     except OSError as error:

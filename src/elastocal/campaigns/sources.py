@@ -39,7 +39,7 @@ def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str 
         The first fault found.
     """
     found = {}
-    for name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+    for name in named_campaigns(config):
         document = named_document(folder, "campaigns", "campaign_source", name, source)
         if document["source"] == "simulated":
             path = document_path(folder, "campaigns", name)
@@ -47,6 +47,18 @@ def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str 
             named_document(folder, "robots", "robot", document["declared_robot"], path)
         found[name] = document
     return found
+
+
+def named_campaigns(config: Mapping[str, Any]) -> list[str]:
+    """Campaigns that a configuration names, each once: simulated, measured and of the league."""
+    return list(dict.fromkeys((*config["loop"]["campaigns"], *config["loop"]["measured"], *named_league(config))))
+
+
+def named_league(config: Mapping[str, Any]) -> list[str]:
+    """Data sets of all leagues, each once."""
+    return list(
+        dict.fromkeys(data for robots in config["league"]["data"].values() for names in robots.values() for data in names)
+    )
 
 
 def user_campaign(config: Mapping[str, Any], robots_folder: str | Path) -> dict[str, str]:
@@ -75,6 +87,6 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path) -> dict[
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
     if not re.fullmatch(r"[\w.-]+", name):
         raise InputError(source, "campaign", repr(name), "letters, digits, _, - and . for the name of its folder of results")
-    if name in (*config["loop"]["campaigns"], *config["loop"]["measured"]):
+    if name in named_campaigns(config):
         raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
     return {name: str(folder).rstrip("/")}

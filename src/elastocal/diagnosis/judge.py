@@ -12,6 +12,8 @@ from elastocal.fitting.displacement import conditions
 from elastocal.fitting.observations import each_approach, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
+from elastocal.remainder.corrected import Plan
+from elastocal.remainder.shares import remainder_facts
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import (
     METRICS,
@@ -76,9 +78,21 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     document = diagnosis.document | {
         "effects": effects,
         "heldout": heldout,
+        "remainder": _remainder(diagnosis, held_out, seed),
         "warnings": [*diagnosis.document["warnings"], *warnings],
     }
     return Verdict(document, rows)
+
+
+def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
+    """What a regression on the remainder of the final model adds on held-out poses, where the campaign asks for one."""
+    campaign = diagnosis.case.campaign
+    if campaign.remainder is None or any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+        return None
+    # Poses held out at random have neighbours among those fitted; others have not, and nor may those that set the intervals.
+    plan = Plan(campaign.remainder, blocks="fraction" not in campaign.holdout, within_range=True, seed=seed)
+    draws = stream(seed, campaign.name, "remainder", 0)
+    return remainder_facts(plan, diagnosis.declared, diagnosis.final, diagnosis.case, held_out, draws)
 
 
 def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:

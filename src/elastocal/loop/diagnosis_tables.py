@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
 
 
@@ -85,12 +86,28 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, n
     -------
     Diagnosis
     """
-    steps: list[Step] = []
-    for step in facts["steps"]:
-        model, estimate = step_model(case, facts, columns, len(steps))
-        fitted = fit(model, case.observations, noise_from({"noise": step["noise"]}), estimate)
-        steps.append(Step(step["name"], step["kind"], fitted))
+    steps = [
+        Step(step["name"], step["kind"], step_fit(case, facts, columns, number)) for number, step in enumerate(facts["steps"])
+    ]
     return Diagnosis(case, tuple(steps), None, facts["document"])
+
+
+def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:
+    """The fit of one step; it starts where it once ended.
+
+    Parameters
+    ----------
+    case, facts, columns
+        As in `diagnosis_from`.
+    number : int
+        Of the step, from 0.
+
+    Returns
+    -------
+    Fit
+    """
+    model, estimate = step_model(case, facts, columns, number)
+    return fit(model, case.observations, noise_from({"noise": facts["steps"][number]["noise"]}), estimate)
 
 
 def step_model(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> tuple[Model, Estimate]:

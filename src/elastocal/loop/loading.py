@@ -45,6 +45,27 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
     return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.measurements
 
 
+def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements]:
+    """Read a campaign without parting its measurements.
+
+    Parameters
+    ----------
+    folder, robots_folder : str
+        As in `reading.read_campaign`.
+
+    Returns
+    -------
+    descriptions : dict
+        As by `load_campaign`, but for the campaign that holds the test.
+    measurements : Measurements
+
+    Raises
+    ------
+    InputError
+    """
+    return _descriptions(folder, robots_folder), read_campaign(folder, robots_folder, effects()).measurements
+
+
 def _descriptions(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     document, robot_path = read_descriptions(folder, robots_folder)
     # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.

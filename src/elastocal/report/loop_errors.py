@@ -118,6 +118,33 @@ def range_sentence(heldout: Mapping[str, Any]) -> str:
     )
 
 
+def remainder_sentence(remainder: Mapping[str, Any] | None, heldout: Mapping[str, Any]) -> str:
+    """What a regression on the remainder adds on validation poses, and how far its intervals are to be believed."""
+    if remainder is None:
+        return ""
+    low, high = (length(end) for end in remainder["rms_ci95_m"])
+    fall = [minus(f"{-100 * end:+.0f}") for end in reversed(remainder["reduction_ci95"])]
+    shares = {name: minus(f"{100 * remainder[name]:.0f} %") for name in ("physics", "regression_share", "left")}
+    sentence = (
+        "A Gaussian process, fitted to what the final model leaves of the fitted poses, predicts the validation poses with an "
+        f"RMS error of {length(remainder['errors']['rms_m'])} (95 %: {low} to {high}) instead of "
+        f"{length(heldout['after']['rms_m'])}: a change of the error by {fall[0]} to {fall[1]} %. Of the squared error that "
+        f"the declared model leaves, the effects explain {shares['physics']} and the process {shares['regression_share']}; "
+        f"{shares['left']} is left."
+    )
+    widths = remainder["half_width_m"]
+    if widths and remainder["covered"] is not None:
+        beyond = f", ± {length(widths['outside'])} outside" if widths["outside"] is not None else ""
+        within = f"± {length(widths['within'])} within the range of the fitted poses" if widths["within"] is not None else ""
+        sentence += (
+            f" Its 95 % intervals, {within}{beyond} (median of a coordinate), hold {percent(remainder['covered'])} of the "
+            "coordinates."
+        )
+    if remainder["outside"]:
+        sentence += f" At the {counted(remainder['outside'], 'pose')} outside that range it corrects nothing."
+    return sentence + " It names no cause and is not part of the exported model."
+
+
 def _before_and_after(before: str, after: str) -> str:
     return after if before == after else f"{before} before and {after} after"
 

@@ -15,7 +15,7 @@ from elastocal.report.first_page import (
     what_to_do,
 )
 from elastocal.report.loop_effects import NONE_FOUND, effect_facts
-from elastocal.report.loop_errors import as_judged, range_sentence, split_rows, step_rows
+from elastocal.report.loop_errors import as_judged, range_sentence, remainder_sentence, split_rows, step_rows
 from elastocal.report.loop_experiment import experiment_facts
 from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
 from elastocal.report.loop_method import method, setting_rows, untestable_rows
@@ -77,6 +77,7 @@ def loop_facts(
         "steps": step_rows(steps, floor),
         "splits": split_rows(as_judged(splits, steps, verdict["heldout"])),
         "range": range_sentence(verdict["heldout"]),
+        "remainder": "" if faulty else remainder_sentence(verdict["remainder"], verdict["heldout"]),
         "effects": [effect_facts(effect) for effect in verdict["effects"]],
         "none_found": NONE_FOUND.get(verdict["verdict"], NONE_FOUND["adequate"]),
         "experiment": experiment_facts(experiment, verdict.get("next_experiment")),

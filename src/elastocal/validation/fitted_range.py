@@ -136,7 +136,7 @@ def predictive_variances(
     own : ndarray (P,)
         m², of the least sure reading of each pose.
     other : ndarray (S,)
-        m², of the least sure reading of each state.
+        m², of the least sure reading of each state. Zero without parameters.
 
     References
     ----------
@@ -144,6 +144,8 @@ def predictive_variances(
     .. [2] Hager, W. W., Updating the inverse of a matrix, SIAM Review 31, 1989.
     """
     listed = fitted.parameters
+    if not listed:
+        return np.zeros(observations.cluster.max() + 1), np.zeros(len(unseen.states))
     shared = model.targets == fitted.model.targets and set(unseen.states.session) <= set(observations.states.session)
     kept = np.array([shared or not owner.startswith(("frame ", "target ")) for owner, _ in listed], bool)
     plausible = np.array([parameter.prior_std or parameter.plausible for _, parameter in listed])

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.joint_space import blocks
+from elastocal.campaigns.joint_space import blocks_of_poses
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import select_states, state_clusters
 from elastocal.fitting.registration import registered
@@ -67,14 +67,11 @@ def splits_of(states: States) -> list[Split]:
     """
     pose = state_clusters(states)
     poses = pose.max() + 1
-    angles = np.zeros((poses, states.joint_angles.shape[1]))
-    np.add.at(angles, pose, states.joint_angles)
-    angles /= np.bincount(pose)[:, None]
     sessions, session = np.unique(states.session, return_inverse=True)
     found = [Split("session", tuple(sessions.tolist()), session.ravel())] if len(sessions) > 1 else []
     if poses >= JOINT_SPACE_BLOCKS:
         labels = tuple(range(1, JOINT_SPACE_BLOCKS + 1))
-        found.insert(0, Split("joint space", labels, blocks(angles, JOINT_SPACE_BLOCKS)[pose]))
+        found.insert(0, Split("joint space", labels, blocks_of_poses(states.joint_angles, pose, JOINT_SPACE_BLOCKS)[pose]))
     return [split for split in found if _fewest_left(split, pose) >= FEWEST_TRAINING_POSES]
 
 

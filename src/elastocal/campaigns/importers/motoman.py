@@ -1,0 +1,106 @@
+"""Right arm of a Motoman with one reflector (ctu-vras/multirobot-calibration): MAT files as campaigns.
+
+A file holds a row for each camera image that was taken of a pose; rows of one pose repeat its joint angles and its reflector.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.io
+
+from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.writing import write_campaign as write_folder
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+    from typing import Any
+
+ROBOT, TARGET = "motoman_right_arm", "reflector"
+# One coordinate, pooled over the four series of 18 to 20 repeats at one posture each without contact (leica_rep_table1, table2,
+# wall1, wall2 of the source): robot and tracker together.
+NOISE = {"position_m": 1.2e-5}
+_NAME, _COLUMNS = "dataset", 26
+_POSE, _TURNTABLE, _ANGLES, _POSITION = 0, 6, slice(7, 13), slice(19, 22)
+# The source's own reader (loadNewLeicaDataset.m) leaves out the 13th of the 587 poses of its larger file.
+_WITH_A_WRONG_POSE, _WRONG_POSE = 587, 12
+# The turntable stands still; its encoder's last digits move.
+_STILL_RAD = 1e-3
+
+
+def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
+    """Measurements of one file.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    joint_angles : ndarray (P, 6)
+        Of the right arm, rad.
+    position : ndarray (P, 3)
+        m, tracker frame. Poses whose reflector the tracker did not see are left out,
+        and so is the one that the source's own reader leaves out.
+
+    Raises
+    ------
+    InputError
+        No MAT file, another shape, or a turntable that turns.
+    """
+    try:
+        found = scipy.io.loadmat(path, variable_names=[_NAME])
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
+    except Exception as error:  # the reader lets through whatever broken bytes make of its parts
+        raise InputError(path, "", f"no readable MAT file ({error})", "a MAT file of version 5") from None
+    rows = np.asarray(found.get(_NAME, np.zeros(0)))
+    if rows.ndim != 2 or rows.shape[1] != _COLUMNS or rows.dtype.kind != "f":
+        raise InputError(path, _NAME, f"shape {rows.shape}", f"(rows, {_COLUMNS}) numbers")
+    rows = rows[np.unique(rows[:, _POSE], return_index=True)[1]]
+    rows = rows[np.isfinite(rows[:, _POSITION]).all(axis=1)]
+    if len(rows) == _WITH_A_WRONG_POSE:
+        rows = np.delete(rows, _WRONG_POSE, axis=0)
+    if not len(rows) or not np.isfinite(rows[:, _ANGLES]).all():
+        raise InputError(path, _NAME, "no pose with angles and a position", "poses of the right arm with a reflector")
+    turned = np.abs(rows[:, _TURNTABLE]).max()
+    if turned > _STILL_RAD:
+        raise InputError(path, f"{_NAME} column {_TURNTABLE + 1}", f"a turntable at {turned:g} rad", "one that stands at 0")
+    return rows[:, _ANGLES], rows[:, _POSITION]
+
+
+def write_campaign(
+    path: str | Path,
+    folder: str | Path,
+    name: str,
+    holdout: Mapping[str, Any] | None = None,
+    noise: Mapping[str, float] | None = NOISE,
+) -> None:
+    """Write one file as a campaign's folder.
+
+    Parameters
+    ----------
+    path : str or Path
+        ``updated_leica_dataset.mat`` or ``leica_right_hand_6x6x6_dataset.mat``.
+    folder : str or Path
+    name : str
+    holdout : dict, optional
+        As in ``campaign.yaml``.
+    noise : dict or None
+        The same.
+
+    Raises
+    ------
+    InputError
+        As in `read`.
+    """
+    angles, position = read(path)
+    count = len(angles)
+    table = {"pose": np.arange(count), "load": np.zeros(count, int), "repeat": np.zeros(count, int)}
+    table |= {"target": np.full(count, TARGET)}
+    table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
+    table |= {axis: position[:, i] for i, axis in enumerate("xyz")}
+    write_folder(folder, unloaded_document(name, ROBOT, "position", [TARGET], holdout, noise), table, angles.shape[1])

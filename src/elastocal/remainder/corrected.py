@@ -1,0 +1,151 @@
+"""A regression on what a fitted model leaves, tuned on its training poses, and what it makes of poses that no fit has seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.fitting.least_squares import fit, fit_frames
+from elastocal.fitting.observations import sample_of, select_states, state_clusters
+from elastocal.fitting.registration import registered
+from elastocal.remainder.catalogue import regressions
+from elastocal.remainder.inputs import inputs_of
+from elastocal.remainder.intervals import calibrated
+from elastocal.remainder.protocol import Part
+from elastocal.remainder.tuning import tuned
+from elastocal.validation.fitted_range import outside_poses
+from elastocal.validation.held_out import position_residuals
+from elastocal.validation.placing import placed, placed_estimate, same_campaign
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.observations import Observations
+    from elastocal.remainder.protocol import Predictor, Setting
+
+# As many folds choose a setting as judge the method.
+_INNER_FOLDS = 5
+# Intervals are scaled by so many observations at most: one quantile, which they fix to two per cent.
+_MOST_FOR_INTERVALS = 2_000
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a remainder is to be regressed.
+
+    Attributes
+    ----------
+    regression : str
+        Name in `catalogue`.
+    blocks : bool
+        Whether settings and intervals come from blocks of joint space, as for poses far from those fitted; else from random
+        folds.
+    within_range : bool
+        Whether nothing is corrected at poses outside the range of those fitted.
+    seed : int
+    """
+
+    regression: str
+    blocks: bool
+    within_range: bool
+    seed: int
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """What a model and a regression leave of poses that they have not seen; arrays of M.
+
+    Attributes
+    ----------
+    residual : ndarray (M, 3)
+        Measured less predicted positions, m, base axes.
+    std : ndarray (M, 3) or None
+        Standard deviation stated for them, m; None where the regression states none.
+    outside : ndarray of bool (M,)
+        Whether the pose lies outside the range of those fitted.
+    setting : dict or None
+        As chosen; None where no correction was best.
+    """
+
+    residual: np.ndarray
+    std: np.ndarray | None
+    outside: np.ndarray
+    setting: Setting | None
+
+
+def corrected(plan: Plan, fitted: Fit, case: Case, held_out: Case) -> Corrected:
+    """Predict held-out poses by a model and a regression on what it leaves of the training poses.
+
+    The regression's setting and the width of its intervals come from cross-validation of the training poses, with the model
+    fitted anew to each of its parts: nested cross-validation [1]_. Poses of another campaign have their frames and targets
+    fitted to what both leave of them.
+
+    Parameters
+    ----------
+    plan : Plan
+    fitted : Fit
+        To the training poses.
+    case : Case
+        Of the training poses.
+    held_out : Case
+
+    Returns
+    -------
+    Corrected
+
+    References
+    ----------
+    .. [1] Varma, S. and Simon, R., Bias in error estimation when using cross-validation for model selection, BMC Bioinformatics
+       7, 2006.
+    """
+    there, (model, estimate) = held_out.observations, placed(fitted, case, held_out)
+    outside, elsewhere = outside_poses(fitted, case, held_out)[there.cluster], not same_campaign(case, held_out)
+    predictor, setting = _regression(plan, fitted, case, elsewhere)
+    prediction = predictor(inputs_of(model, estimate, there, elsewhere))
+    mean = np.where(outside[:, None], 0.0, prediction.mean) if plan.within_range else prediction.mean
+    if elsewhere:
+        session = np.searchsorted(estimate.sessions, there.states.session[there.state])
+        moved = there.position - (estimate.frame_rotation[session] @ mean[..., None])[..., 0]
+        known = replace(fitted, model=model, estimate=estimate)
+        estimate = fit_frames(known, model, replace(there, position=moved), fitted.noise)
+    residual = position_residuals(model, estimate, there) - mean
+    return Corrected(residual, prediction.std, outside, setting)
+
+
+def _regression(plan: Plan, fitted: Fit, case: Case, elsewhere: bool) -> tuple[Predictor, Setting | None]:
+    seen, regression = case.observations, regressions()[plan.regression]
+    inputs = inputs_of(fitted.model, fitted.estimate, seen, elsewhere)
+    left = position_residuals(fitted.model, fitted.estimate, seen)
+    found = tuned(regression, _inner_parts(plan, fitted, seen, elsewhere), inputs, left, plan.seed)
+    if not regression.HAS_INTERVALS or found.setting is None:
+        return found.predictor, found.setting
+    parts = _inner_parts(plan, fitted, sample_of(seen, _MOST_FOR_INTERVALS), elsewhere)
+    return calibrated(regression, found.setting, found.predictor, parts, plan.seed), found.setting
+
+
+def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere: bool) -> Iterator[Part]:
+    """Training poses in folds, the model fitted anew from nothing without each."""
+    states, model = observations.states, fitted.model
+    pose = state_clusters(states)
+    count = min(_INNER_FOLDS, pose.max() + 1)
+    if plan.blocks:
+        fold = blocks_of_poses(states.joint_angles, pose, count)
+    else:
+        fold = np.random.default_rng(plan.seed).permutation(pose.max() + 1) % count
+    for number in range(count):
+        within = fold[pose] == number
+        rest, judged = select_states(observations, ~within), select_states(observations, within)
+        start = replace(registered(model, rest), shapes=fitted.estimate.shapes)
+        refit = fit(model, rest, fitted.noise, start)
+        there = placed_estimate(refit, judged)
+        yield Part(
+            inputs_of(model, refit.estimate, rest, elsewhere),
+            position_residuals(model, refit.estimate, rest),
+            inputs_of(model, there, judged, elsewhere),
+            position_residuals(model, there, judged),
+        )

@@ -1,0 +1,118 @@
+"""What a regression on residuals is: inputs, a prediction with its uncertainty, and settings among which poses choose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    Setting = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What a regression may know of an observation; arrays of M.
+
+    Attributes
+    ----------
+    joint_angles : ndarray (M, n)
+        rad.
+    others : ndarray (M, k)
+        Wrench, place of the target in its measuring point, time and temperature, as far as the measurements have them.
+    jacobian : ndarray (M, 3, C)
+        Of the target's position with respect to the joints, first, and whatever else of the chain may be displaced: base and
+        links; base axes, m per rad or m.
+    """
+
+    joint_angles: np.ndarray
+    others: np.ndarray
+    jacobian: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.joint_angles)
+
+    @property
+    def columns(self) -> np.ndarray:
+        """ndarray (M, n + k): joint angles, then the others."""
+        return np.hstack([self.joint_angles, self.others])
+
+    def select(self, chosen: np.ndarray) -> Inputs:
+        """The inputs of some observations."""
+        return Inputs(self.joint_angles[chosen], self.others[chosen], self.jacobian[chosen])
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Predicted residuals.
+
+    Attributes
+    ----------
+    mean : ndarray (M, 3)
+        m, base axes.
+    std : ndarray (M, 3) or None
+        Standard deviation of a new measurement about it; None where the regression states none.
+    """
+
+    mean: np.ndarray
+    std: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class Part:
+    """One fold of the training poses: a regression is fitted to some and judged by the others.
+
+    Attributes
+    ----------
+    fitted, judged : Inputs
+    fitted_residual, judged_residual : ndarray (M, 3)
+        Of a model that was fitted without the poses that judge, m, base axes.
+    """
+
+    fitted: Inputs
+    fitted_residual: np.ndarray
+    judged: Inputs
+    judged_residual: np.ndarray
+
+
+class Predictor(Protocol):
+    """A fitted regression."""
+
+    def __call__(self, inputs: Inputs) -> Prediction:
+        """Predict the residuals of other observations."""
+        ...
+
+
+class Regression(Protocol):
+    """A module of this package.
+
+    Attributes
+    ----------
+    NAME : str
+        As configurations name it.
+    SETTINGS : sequence of dict
+        Among which `tuning.tuned` chooses by poses that a fit has not seen; a single one where the regression chooses itself.
+    HAS_INTERVALS : bool
+        Whether it states standard deviations; `intervals.calibrated` makes them honest.
+    """
+
+    NAME: str
+    SETTINGS: Sequence[Setting]
+    HAS_INTERVALS: bool
+
+    def fitted(self, inputs: Inputs, residual: np.ndarray, settings: Sequence[Setting], seed: int) -> Iterator[Predictor]:
+        """Fit the regression with each of some settings, in their order.
+
+        Parameters
+        ----------
+        inputs : Inputs
+        residual : ndarray (M, 3)
+            m, base axes.
+        settings : sequence of dict
+        seed : int
+            Of whatever is drawn.
+        """
+        ...

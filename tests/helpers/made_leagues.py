@@ -1,0 +1,40 @@
+"""Small data sets and results of a league."""
+
+import numpy as np
+import pandas as pd
+from made_remainders import smoothly_wrong_folder
+
+from elastocal.campaigns.columns import columns_of
+from elastocal.league.folds import dealt
+from elastocal.league.rounds import DataSet
+from elastocal.league.table import Result
+from elastocal.loop.loading import load_whole_campaign
+
+
+def made_data_set(folder, robot, robots_folder, poses=24, **changes):
+    """A data set of an unloaded robot that misses its poses by something smooth."""
+    changes = {"frame": "tracker", "offset_m": "unknown", "declared": ["joint_offset"]} | changes
+    smoothly_wrong_folder(folder, robot, poses=poses, **changes)
+    descriptions, seen = load_whole_campaign(folder, robots_folder)
+    return DataSet(descriptions, columns_of(seen), dealt(seen, 4, np.random.default_rng(1)))
+
+
+def made_entries(size_m, poses=40, seed=1, std_m=None, folds=4):
+    """Rows of the entries table with errors of some size, each pose seen by two targets."""
+    draws = np.random.default_rng(seed)
+    pose = np.repeat(np.arange(poses), 2)
+    off = draws.normal(0.0, size_m, (2 * poses, 3))
+    columns = {"fold": pose % folds + 1, "set": np.zeros(2 * poses, int), "session": np.zeros(2 * poses, int), "pose": pose}
+    columns |= {"load": np.zeros(2 * poses, int), "target": np.tile([0, 1], poses), "outside_range": pose % 10 == 0}
+    columns |= {f"d{axis}": off[:, number] for number, axis in enumerate("xyz")}
+    return pd.DataFrame(columns | {f"std_{axis}": np.full(2 * poses, np.nan if std_m is None else std_m) for axis in "xyz"})
+
+
+def made_results(data=("one", "two"), splits=("random", "blocks", "session")):
+    """Results of three methods: geometry, one half as wrong, and one that states intervals."""
+    found = []
+    for number, name in enumerate(data):
+        for split in splits:
+            for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
+                found.append(Result(name, split, method, made_entries(size, 30 + 10 * number, number + 1, std)))
+    return found

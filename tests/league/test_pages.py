@@ -1,0 +1,53 @@
+"""The page of the league has every figure in words that a stranger knows."""
+
+import pandas as pd
+import pytest
+from made_leagues import made_results
+
+from elastocal.league.methods import Method
+from elastocal.league.pages import league_page
+from elastocal.league.table import league_table
+
+METHODS = {
+    "geometry": Method("geometry", words="geometry"),
+    "half": Method("diagnosis", words="ours"),
+    "process": Method("geometry", words="GP"),
+}
+COSTS = pd.DataFrame([{"data": "one", "split": "random", "method": "half", "seconds_per_fold": 3.14159, "memory_MB": 512.3}])
+MECHANISMS = pd.DataFrame(
+    [
+        {"robot": "A robot", "data": "one", "mechanism": name, "probability": p, "probability_low": p, "probability_high": p}
+        | {"share": s, "share_low": s, "share_high": s}
+        for name, p, s in (("link_weight", 0.9, 0.4), ("payload", 0.01, 0.2))
+    ]
+)
+FIGURE = {"rms_mm": 0.5, "what": "RMS", "source": "somebody", "why": "fitted poses"}
+PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
+
+
+@pytest.fixture(scope="module")
+def page():
+    table = league_table(made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1)
+    return league_page(table, COSTS, MECHANISMS, PUBLISHED, METHODS)
+
+
+def test_each_split_has_a_table_in_which_the_best_is_bold(page):
+    assert page.count("## ") == 7
+    for line in (line for line in page.splitlines() if line.startswith("| one ") and "(" in line and "**" in line):
+        assert line.count("**") == 2
+    assert page.count("**") == 2 * 6
+
+
+def test_methods_stand_by_their_words_and_costs_with_their_units(page):
+    assert "| ours" in page and "| half" not in page
+    assert "3.1 s, 512 MB" in page
+
+
+def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
+    assert "link weight" in page and "payload" not in page
+    assert "somebody" in page and "three" not in page
+
+
+def test_only_methods_with_intervals_have_a_coverage(page):
+    section = page.split("## Intervals")[1].split("## ")[0]
+    assert "GP" in section and "ours" not in section

@@ -1,0 +1,76 @@
+"""What a model and a regression together leave of poses that neither has seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_remainders import SMOOTH_M, smoothly_wrong_cases
+
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.noise import Noise
+from elastocal.remainder.corrected import Plan, corrected
+from elastocal.validation.held_out import position_errors
+from elastocal.validation.placing import placed
+
+NOISE = Noise("declared", 2e-5, 2e-5, np.zeros(6))
+PLAN = Plan("gaussian_process", blocks=False, within_range=False, seed=1)
+
+
+@pytest.fixture(scope="module")
+def made(kuka, config_folder, tmp_path_factory):
+    case, held_out = smoothly_wrong_cases(tmp_path_factory.mktemp("corrected"), kuka, config_folder / "robots", poses=150)
+    return case, held_out, fit(case.model, case.observations, NOISE)
+
+
+def rms(values):
+    return np.sqrt((values**2).sum(axis=-1).mean())
+
+
+def test_a_smooth_remainder_is_predicted_and_its_intervals_hold(made):
+    case, held_out, fitted = made
+    before = rms(position_errors(*placed(fitted, case, held_out), held_out.observations).distance[:, None])
+    found = corrected(PLAN, fitted, case, held_out)
+    assert before > 0.8 * SMOOTH_M and rms(found.residual) < 0.5 * before
+    # 45 poses, three coordinates each: a standard error of 2 to 3 %.
+    assert (np.abs(found.residual) < 1.96 * found.std).mean() > 0.87
+
+
+def test_outside_the_range_nothing_is_corrected_where_that_is_asked_for(made):
+    case, held_out, fitted = made
+    angles = held_out.observations.states.joint_angles.copy()
+    angles[:5, 1] += 9.0
+    moved = replace(held_out.observations, states=replace(held_out.observations.states, joint_angles=angles))
+    beyond = replace(held_out, observations=moved)
+    plain = corrected(PLAN, fitted, case, beyond)
+    careful = corrected(replace(PLAN, within_range=True), fitted, case, beyond)
+    seen = np.isin(moved.state, np.arange(5))
+    assert careful.outside[seen].all()
+    alone = rms(position_errors(*placed(fitted, case, beyond), moved).distance[careful.outside][:, None])
+    np.testing.assert_allclose(rms(careful.residual[careful.outside]), alone)
+    np.testing.assert_array_equal(careful.residual[~careful.outside], plain.residual[~careful.outside])
+    assert (careful.std[seen] > 1.5 * np.median(careful.std[~careful.outside], axis=0)).all()
+
+
+def test_another_campaign_has_its_frame_fitted_to_what_both_leave(made, kuka, config_folder, tmp_path):
+    """A tracker that stands elsewhere: what the regression predicts turns with it."""
+    case, _, fitted = made
+    _, other = smoothly_wrong_cases(tmp_path, kuka, config_folder / "robots", poses=60, seed=5, frame="tracker")
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    moved = replace(other.observations, position=other.observations.position @ turn.T + [0.5, 0.2, -1.0])
+    other = replace(other, observations=moved, campaign=replace(other.campaign, name="elsewhere"))
+    alone = position_errors(*placed(fitted, case, other), moved).distance
+    found = corrected(PLAN, fitted, case, other)
+    assert rms(found.residual) < 0.7 * np.sqrt((alone**2).mean())
+
+
+@pytest.mark.parametrize("blocks", [False, True])
+def test_settings_are_tuned_on_the_training_poses_alone(made, blocks):
+    """Held-out poses that are nonsense change no setting."""
+    case, held_out, fitted = made
+    plan = Plan("ridge_harmonics", blocks, within_range=False, seed=1)
+    nonsense = replace(held_out.observations, position=held_out.observations.position + 1.0)
+    settings = [
+        corrected(plan, fitted, case, replace(held_out, observations=seen)).setting
+        for seen in (held_out.observations, nonsense)
+    ]
+    assert settings[0] == settings[1] is not None

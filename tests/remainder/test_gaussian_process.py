@@ -1,0 +1,44 @@
+"""A Gaussian process interpolates, and knows where it does not."""
+
+import numpy as np
+from made_remainders import NOISE_M, SMOOTH_M, made_inputs, smooth
+
+from elastocal.remainder import gaussian_process
+from elastocal.remainder.protocol import Inputs
+
+
+def fitted(count=150, seed=1):
+    inputs, residual = made_inputs(count, seed)
+    return next(iter(gaussian_process.fitted(inputs, residual, gaussian_process.SETTINGS, 1)))
+
+
+def test_what_is_smooth_is_predicted_within_the_noise_and_its_intervals_hold():
+    there, _ = made_inputs(400, seed=2, width=1.3)
+    found = fitted()(there)
+    off = found.mean - smooth(there.joint_angles)
+    assert np.sqrt((off**2).mean()) < NOISE_M
+    measured = off + np.random.default_rng(3).normal(0.0, NOISE_M, off.shape)
+    # 1,200 coordinates: the share inside has a standard error of 0.6 %.
+    assert 0.92 < (np.abs(measured) < 1.96 * found.std).mean() < 0.98
+
+
+def test_intervals_grow_outside_the_data_up_to_the_size_of_the_residuals():
+    near, far = (Inputs(np.full((1, 2), angle), np.zeros((1, 3)), np.zeros((1, 3, 3))) for angle in (0.0, 40.0))
+    predictor = fitted()
+    within, beyond = predictor(near), predictor(far)
+    assert (beyond.std > 5 * within.std).all()
+    # There it says the mean of the residuals, and that it may be wrong by all that they vary.
+    assert (beyond.std > 0.5 * SMOOTH_M).all() and (np.abs(beyond.mean) < SMOOTH_M).all()
+
+
+def test_inputs_that_stand_still_do_no_harm_and_a_seed_repeats_itself():
+    there, _ = made_inputs(20, seed=5)
+    np.testing.assert_array_equal(fitted()(there).mean, fitted()(there).mean)
+
+
+def test_noise_alone_is_not_followed():
+    inputs, residual = made_inputs(120, seed=7)
+    noise = np.random.default_rng(8).normal(0.0, 1e-4, residual.shape)
+    predictor = next(iter(gaussian_process.fitted(inputs, noise, gaussian_process.SETTINGS, 1)))
+    there, _ = made_inputs(200, seed=9)
+    assert np.sqrt((predictor(there).mean ** 2).mean()) < 4e-5

@@ -1,0 +1,175 @@
+"""The league: every method on every public data set, by the same folds.
+
+`snakemake -j2 league`; `league_small` does the same on the two smallest data sets. Needs data/campaigns/{data}/, which are imported;
+where ELASTOCAL_DATA names a folder, data sets of which it lacks a file are left out, and named. Writes results/league/{data}/ and
+reports/league/{league}/.
+"""
+
+from elastocal.campaigns.public_data import not_at_hand
+
+LEAGUE = config["league"]
+MISSING_DATA = {
+    name: file
+    for name in named_league(config)
+    if (file := not_at_hand(SOURCES[name].get("files", []), "data/public")) is not None
+}
+# Robots of each league with the data sets that are at hand.
+LEAGUES = {
+    league: {robot: there for robot, names in robots.items() if (there := [name for name in names if name not in MISSING_DATA])}
+    for league, robots in LEAGUE["data"].items()
+}
+
+
+def sessions_of(data):
+    """Other data sets of the same robot, in any league."""
+    robots = [names for league in LEAGUES.values() for names in league.values() if data in names]
+    return list(dict.fromkeys(name for names in robots for name in names if name != data))
+
+
+def rounds_of(league):
+    """Pairs of data set and split; sessions only where a robot has several data sets."""
+    names = [name for names in LEAGUES[league].values() for name in names]
+    return [(name, split) for name in names for split in ("random", "blocks", *(["session"] if sessions_of(name) else []))]
+
+
+def league_files(kind):
+    """Tables of a data set, and of those that test it where the split is by session."""
+
+    def files(wildcards):
+        others = sessions_of(wildcards.data) if wildcards.split == "session" else []
+        return expand(getattr(rules.deal_league_folds.output, kind), data=[wildcards.data, *others])
+
+    return files
+
+
+def diagnosis_file(kind):
+    """A file of the diagnoses of the folds, for a method that needs them."""
+
+    def file(wildcards):
+        needed = LEAGUE["methods"][wildcards.method]["physics"] == "diagnosis"
+        return getattr(rules.diagnose_league_folds.output, kind) if needed else []
+
+    return file
+
+
+def entry_keys(league):
+    return [(data, split, method) for data, split in rounds_of(league) for method in LEAGUE["methods"]]
+
+
+def of_rounds(pattern, keys):
+    """A file for each data set, split and, where there is one, method."""
+    names = ("data", "split", "method")
+    return [pattern.format(**dict(zip(names, key))) for key in keys]
+
+
+wildcard_constraints:
+    data="|".join(named_league(config)) or "none",
+    split="random|blocks|session",
+    method="|".join(LEAGUE["methods"]),
+    league="|".join(LEAGUE["data"]),
+
+
+rule deal_league_folds:
+    input:
+        files=lambda wildcards: files_of_campaign(wildcards.data),
+        sources=sources("deal_league_folds.py"),
+    output:
+        descriptions="results/league/{data}/campaign.json",
+        measurements="results/league/{data}/measurements.parquet",
+        folds="results/league/{data}/folds.parquet",
+    log:
+        "results/logs/deal_league_folds/{data}.log",
+    benchmark:
+        "results/timings/deal_league_folds/{data}.tsv"
+    params:
+        folder="data/campaigns/{data}",
+        robots="config/robots",
+        folds=LEAGUE["folds"],
+        seed=config["seed"],
+    script:
+        "../scripts/deal_league_folds.py"
+
+
+rule diagnose_league_folds:
+    input:
+        descriptions=rules.deal_league_folds.output.descriptions,
+        measurements=rules.deal_league_folds.output.measurements,
+        folds=rules.deal_league_folds.output.folds,
+        sources=sources("diagnose_league_folds.py"),
+    output:
+        facts="results/league/{data}/{split}/diagnoses.json",
+        fits="results/league/{data}/{split}/fits.parquet",
+        mechanisms="results/league/{data}/{split}/mechanisms.parquet",
+    log:
+        "results/logs/diagnose_league_folds/{data}/{split}.log",
+    benchmark:
+        "results/timings/diagnose_league_folds/{data}/{split}.tsv"
+    params:
+        seed=config["seed"],
+    script:
+        "../scripts/diagnose_league_folds.py"
+
+
+rule enter_league:
+    input:
+        descriptions=league_files("descriptions"),
+        measurements=league_files("measurements"),
+        folds=league_files("folds"),
+        facts=diagnosis_file("facts"),
+        fits=diagnosis_file("fits"),
+        sources=sources("enter_league.py"),
+    output:
+        entries="results/league/{data}/{split}/{method}.parquet",
+    log:
+        "results/logs/enter_league/{data}/{split}/{method}.log",
+    benchmark:
+        "results/timings/enter_league/{data}/{split}/{method}.tsv"
+    params:
+        method=lambda wildcards: LEAGUE["methods"][wildcards.method],
+        seed=config["seed"],
+    script:
+        "../scripts/enter_league.py"
+
+
+rule tabulate_league:
+    input:
+        entries=lambda wildcards: of_rounds(rules.enter_league.output.entries, entry_keys(wildcards.league)),
+        mechanisms=lambda wildcards: of_rounds(
+            rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
+        ),
+        published="config/league/published.csv",
+        sources=sources("tabulate_league.py"),
+    output:
+        league="reports/league/{league}/league.csv",
+        costs="reports/league/{league}/costs.csv",
+        mechanisms="reports/league/{league}/mechanisms.csv",
+        page="reports/league/{league}/league.md",
+        picture_pdf="reports/league/{league}/league.pdf",
+        picture_png="reports/league/{league}/league.png",
+        mechanisms_pdf="reports/league/{league}/mechanisms.pdf",
+        mechanisms_png="reports/league/{league}/mechanisms.png",
+    log:
+        "results/logs/tabulate_league/{league}.log",
+    benchmark:
+        "results/timings/tabulate_league/{league}.tsv"
+    params:
+        entered=lambda wildcards: entry_keys(wildcards.league),
+        rounds=lambda wildcards: rounds_of(wildcards.league),
+        timings="results/timings",
+        robots=lambda wildcards: LEAGUES[wildcards.league],
+        reference=LEAGUE["reference"],
+        methods=LEAGUE["methods"],
+        folds=LEAGUE["folds"],
+        seed=config["seed"],
+    script:
+        "../scripts/tabulate_league.py"
+
+
+rule league_small:
+    input:
+        "reports/league/small/league.csv",
+
+
+rule league:
+    input:
+        "reports/league/all/league.csv",
