@@ -42,7 +42,7 @@ rule simulate_campaign:
 
 rule import_campaign:
     input:
-        robots=expand("config/robots/{robot}.yaml", robot=MEASURED_ROBOTS),
+        robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=MEASURED_ROBOTS),
         sources=sources("import_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
@@ -74,7 +74,7 @@ rule read_campaign:
         "results/timings/read_campaign/{campaign}.tsv"
     params:
         folder=lambda wildcards: folder_of(wildcards.campaign),
-        robots="config/robots",
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/read_campaign.py"
 
