@@ -10,6 +10,7 @@ import pytest
 from support import refused
 from synthetic import displacements, made_states
 
+from elastocal.campaigns.importers.catalogue import Importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
@@ -78,6 +79,8 @@ def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
 
 def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(module, config_folder, tmp_path):
     importer = module("An importer")
+    assert set(Importer.__annotations__) <= set(vars(importer))
+    assert {len(file.sha256) for file in importer.FILES.values()} == {64}
     angles, positions = np.linspace(-90, 90, 12)[:, None] + np.arange(6), np.arange(36.0).reshape(12, 3)
     path = tmp_path / "values.csv"
     rows = [";".join(map(str, [*row, *place])) for row, place in zip(angles, positions, strict=True)]

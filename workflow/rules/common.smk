@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import elastocal
+from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, user_campaign
 from elastocal.study.configuration import check_study, rows_read
@@ -126,6 +127,12 @@ def files_of(wildcards):
     # An import has its robots among its inputs; a simulation does not have the robot that it declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []
     return files + expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=declared)
+
+
+def robots_of_import(wildcards):
+    """Files of the robots that an importer reads or names; importers are imported only where one is needed."""
+    source = importer(SOURCES[wildcards.campaign]["importer"], f"campaign {wildcards.campaign}")
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.ROBOTS)
 
 
 def loop_reports(campaigns):

@@ -6,7 +6,6 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-MEASURED_ROBOTS = ["fanuc_static", "fanuc_cpa", "fanuc_measured", "ur10", "ur5", "wam"]
 LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confounding"]
 LOOP_REPORTS = [
     "verdict.json",
@@ -42,7 +41,7 @@ rule simulate_campaign:
 
 rule import_campaign:
     input:
-        robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=MEASURED_ROBOTS),
+        robots=robots_of_import,
         sources=sources("import_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",

@@ -3,6 +3,7 @@
 import hashlib
 import logging
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -44,77 +45,14 @@ class PublicFile:
         return f"https://raw.githubusercontent.com/{self.repository}/{self.commit}/{self.path}"
 
 
-_UR10 = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
-_JACOBI = "pauljac7700/serial_robots_datasets", "759068d85a8b95183cd71ff96d9dfc5173bc57fc"
-FILES = {
-    "fanuc_static": PublicFile(
-        "Sarrasor/RoboticManipulators",
-        "4e05acfe0052b90da43e3074bbecb4bb89104301",
-        "data/calibration_dataset.mat",
-        "19face499435c165be81c02de841e0d8e0106686daaf63550d0bf02bbea8c8eb",
-        "fanuc_static/calibration_dataset.mat",
-        "MIT",
-    ),
-    "fanuc_cpa": PublicFile(
-        "RABKKK/LaserTrackerPoseData4KinIdent",
-        "e143dda2bf5280359912ed7618f2b63d7e262b58",
-        "N1N2N3Jval.csv",
-        "7d3d2a860cc79ce31162e2756618f32182aad418ebd26d822c1cfac0bb36385e",
-        "fanuc_cpa/N1N2N3Jval.csv",
-        "none stated: for the user's own use, not to be passed on",
-    ),
-    "ur10_ipa_a": PublicFile(
-        *_UR10,
-        "Series_A/measurements_grid.csv",
-        "84d5c81234cab58ebe88b4c73c582c26ad0e407f0de5350571c91f5ce6f28b76",
-        "ur10_ipa/Series_A/measurements_grid.csv",
-        "MIT",
-    ),
-    "ur10_ipa_b": PublicFile(
-        *_UR10,
-        "Series_B/measurements_joint_configurations.csv",
-        "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e",
-        "ur10_ipa/Series_B/measurements_joint_configurations.csv",
-        "MIT",
-    ),
-    "jacobi_ur5_grid": PublicFile(
-        *_JACOBI,
-        "UR5/3D_UR5_uncalibrated_grid_cleaned.csv",
-        "3de63c38b4338a1fb23437a9c6ecb7e0441a9e132fc055544619b8c580f767c0",
-        "jacobi_ur5/3D_UR5_uncalibrated_grid_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_ur5_random": PublicFile(
-        *_JACOBI,
-        "UR5/3D_UR5_uncalibrated_random_cleaned.csv",
-        "3cd7a4aae072f9757ce9bd156e7470cc8caa89d8af9164c07390953ae808095a",
-        "jacobi_ur5/3D_UR5_uncalibrated_random_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_wam_grid": PublicFile(
-        *_JACOBI,
-        "WAM/3D_WAM_uncalibrated_grid_cleaned.csv",
-        "f013c0ce152cffb5f529e747681457d359a9869c46fdbb4f4e1eefb8234835ad",
-        "jacobi_wam/3D_WAM_uncalibrated_grid_cleaned.csv",
-        "MIT",
-    ),
-    "jacobi_wam_random": PublicFile(
-        *_JACOBI,
-        "WAM/3D_WAM_uncalibrated_random_cleaned.csv",
-        "b9b6f5ee9f4e9fce0ed8a70d458b08b6af7f473afe98bb92ac2ff379d398e5e2",
-        "jacobi_wam/3D_WAM_uncalibrated_random_cleaned.csv",
-        "MIT",
-    ),
-}
-
-
-def fetch(name: str, folder: str | Path) -> Path:
+def fetch(name: str, files: Mapping[str, PublicFile], folder: str | Path) -> Path:
     """A file of public data with the contents that this project knows: from `FOLDER_VARIABLE`, else downloaded once.
 
     Parameters
     ----------
     name : str
-        A key of `FILES`.
+    files : dict of str to PublicFile
+        Those of the importer that reads it.
     folder : str or Path
         Keeps what is downloaded.
 
@@ -127,9 +65,9 @@ def fetch(name: str, folder: str | Path) -> Path:
     InputError
         An unknown name, a file of other contents, or no way to download it.
     """
-    if name not in FILES:
-        raise InputError("public data", "", repr(name), ", ".join(FILES))
-    file = FILES[name]
+    if name not in files:
+        raise InputError("public data", "", repr(name), ", ".join(files))
+    file = files[name]
     given = os.environ.get(FOLDER_VARIABLE)
     local = Path(given or "") / file.local
     if given and local.is_file():
