@@ -1,7 +1,7 @@
 """The study, every table and figure of the paper from seeds, and the loop on simulated campaigns: `snakemake -j2` makes both."""
 
 
-configfile: "config.yaml"
+configfile: f"{workflow.basedir}/config.yaml"
 
 
 include: "workflow/rules/common.smk"

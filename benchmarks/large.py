@@ -19,7 +19,7 @@ from common import ROOT, Row
 from elastocal.blind.cases import SIZES, cases_of, make_case
 from elastocal.blind.folders import write_dynamic_campaign
 from elastocal.campaigns.importers import ur10_ipa
-from elastocal.campaigns.public_data import FILES, FOLDER_VARIABLE
+from elastocal.campaigns.public_data import FOLDER_VARIABLE
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.defects import Defect, with_defects
 from elastocal.plant.physical_robot import specimen
@@ -80,7 +80,7 @@ def rows(work: Path) -> Iterator[Row]:
     yield from _proof(work)
     yield from _old_engine(work)
     if os.environ.get(FOLDER_VARIABLE):
-        source = os.path.join(os.environ[FOLDER_VARIABLE], FILES["ur10_ipa_a"].local)
+        source = os.path.join(os.environ[FOLDER_VARIABLE], ur10_ipa.FILES["ur10_ipa_a"].local)
         ur10_ipa.write_campaign(source, work / "series_a", "ur10_series_a")
         how = "UR10 Series A, 11,911 poses, from its folder to its verdict, linear algebra on two threads"
         yield from _limits("large ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)

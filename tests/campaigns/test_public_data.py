@@ -8,8 +8,7 @@ from functools import partial
 import pytest
 from support import refused
 
-from elastocal.campaigns import public_data
-from elastocal.campaigns.public_data import FILES, FOLDER_VARIABLE, PublicFile, fetch, not_at_hand
+from elastocal.campaigns.public_data import FOLDER_VARIABLE, PublicFile, fetch, not_at_hand
 
 CONTENTS = b"0 1 2\n"
 
@@ -21,12 +20,10 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 @pytest.fixture
 def registered(monkeypatch):
-    """One made-up file as the whole registry."""
+    """One made-up file, by the name "mine"."""
     monkeypatch.delenv(FOLDER_VARIABLE, raising=False)
     digest = hashlib.sha256(CONTENTS).hexdigest()
-    file = PublicFile("owner/name", "c0ffee", "data/values.csv", digest, "mine/values.csv", "MIT")
-    monkeypatch.setattr(public_data, "FILES", {"mine": file})
-    return file
+    return PublicFile("owner/name", "c0ffee", "data/values.csv", digest, "mine/values.csv", "MIT")
 
 
 @pytest.fixture
@@ -45,17 +42,15 @@ def served(registered, monkeypatch, tmp_path):
     server.server_close()
 
 
-def test_every_file_has_a_whole_digest_and_an_address_by_commit():
-    for file in FILES.values():
-        assert len(file.sha256) == 64 and len(file.commit) == 40
-        assert file.address == f"https://raw.githubusercontent.com/{file.repository}/{file.commit}/{file.path}"
+def test_the_address_is_by_commit(registered):
+    assert registered.address == "https://raw.githubusercontent.com/owner/name/c0ffee/data/values.csv"
 
 
 def test_file_of_the_given_folder_is_used_where_it_lies(registered, monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
-    assert fetch("mine", tmp_path / "cache") == tmp_path / "mine" / "values.csv"
+    assert fetch("mine", {"mine": registered}, tmp_path / "cache") == tmp_path / "mine" / "values.csv"
     assert not (tmp_path / "cache").exists()
 
 
@@ -64,46 +59,48 @@ def test_file_of_the_given_folder_with_other_contents_is_refused(registered, mon
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS + b"\n")
     with refused(tmp_path / "mine" / "values.csv", "", "SHA-256", registered.sha256, registered.address):
-        fetch("mine", tmp_path / "cache")
+        fetch("mine", {"mine": registered}, tmp_path / "cache")
 
 
-def test_file_that_the_given_folder_lacks_is_downloaded_once(served, monkeypatch, tmp_path):
+def test_file_that_the_given_folder_lacks_is_downloaded_once(registered, served, monkeypatch, tmp_path):
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     served.write_bytes(CONTENTS)
-    kept = fetch("mine", tmp_path / "cache")
+    kept = fetch("mine", {"mine": registered}, tmp_path / "cache")
     assert kept.parent == tmp_path / "cache" and kept.read_bytes() == CONTENTS
     served.unlink()
-    assert fetch("mine", tmp_path / "cache") == kept
+    assert fetch("mine", {"mine": registered}, tmp_path / "cache") == kept
 
 
-def test_download_of_other_contents_is_refused_and_not_kept(served, tmp_path):
+def test_download_of_other_contents_is_refused_and_not_kept(registered, served, tmp_path):
     served.write_bytes(b"something else")
     with refused(PublicFile.address, "", "other contents", "SHA-256"):
-        fetch("mine", tmp_path / "cache")
+        fetch("mine", {"mine": registered}, tmp_path / "cache")
     assert list((tmp_path / "cache").iterdir()) == []
 
 
-def test_download_that_fails_is_refused_and_tells_of_the_folder(served, tmp_path):
+def test_download_that_fails_is_refused_and_tells_of_the_folder(registered, served, tmp_path):
     with refused(PublicFile.address, "", "404", FOLDER_VARIABLE, "mine/values.csv"):
-        fetch("mine", tmp_path / "cache")
+        fetch("mine", {"mine": registered}, tmp_path / "cache")
 
 
 def test_unknown_name_is_refused(registered, tmp_path):
     with refused("public data", "", "'yours'", "mine"):
-        fetch("yours", tmp_path)
+        fetch("yours", {"mine": registered}, tmp_path)
 
 
 def test_what_is_missing_is_named_only_where_a_folder_stands_for_the_network(registered, monkeypatch, tmp_path):
-    assert not_at_hand(["mine"], tmp_path / "cache") is None
+    files = {"mine": registered}
+    assert not_at_hand(["mine"], files, tmp_path / "cache") is None
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
-    assert not_at_hand(["mine"], tmp_path / "cache") == "mine/values.csv"
+    assert not_at_hand(["mine"], files, tmp_path / "cache") == "mine/values.csv"
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "values.csv").write_bytes(CONTENTS)
-    assert not_at_hand(["mine"], tmp_path / "cache") is None
+    assert not_at_hand(["mine"], files, tmp_path / "cache") is None
 
 
-def test_what_was_downloaded_before_is_at_hand(served, monkeypatch, tmp_path):
+def test_what_was_downloaded_before_is_at_hand(registered, served, monkeypatch, tmp_path):
     served.write_bytes(CONTENTS)
-    fetch("mine", tmp_path / "cache")
+    files = {"mine": registered}
+    fetch("mine", files, tmp_path / "cache")
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path / "empty"))
-    assert not_at_hand(["mine"], tmp_path / "cache") is None
+    assert not_at_hand(["mine"], files, tmp_path / "cache") is None

@@ -43,6 +43,11 @@ FAULTY_SOURCES = {
     "value out of range": ({"poses": 3}, "poses", ["found 3", "8 or more"]),
     "unknown robot": ({"robot": "kukka"}, "robots", ["'kukka'", "'kuka'?"]),
     "unknown declared robot": ({"declared_robot": "fanuk"}, "robots", ["'fanuk'", "'fanuc'?"]),
+    "unknown importer": (
+        {**dict.fromkeys(SIMULATED), "source": "public", "importer": "mine", "files": ["a"]},
+        "importer",
+        ["'mine'", "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa"],
+    ),
     "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
 }
 

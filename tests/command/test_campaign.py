@@ -3,9 +3,10 @@
 from elastocal.command import campaign
 
 
-def test_results_and_robots_are_those_of_the_checkout(tmp_path, monkeypatch):
+def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(tmp_path, monkeypatch):
     asked = []
-    monkeypatch.setattr(campaign, "checkout", lambda: tmp_path)
+    monkeypatch.setattr(campaign, "pipeline", lambda: tmp_path / "installed")
+    monkeypatch.setattr(campaign, "workplace", lambda: tmp_path / "here")
     monkeypatch.setattr("elastocal.loop.calibrated_files.load_diagnosed", lambda *where: asked.append(where))
     campaign.diagnosed_campaign(tmp_path / "cell7")
-    assert asked == [(tmp_path / "cell7", tmp_path / "config" / "robots", tmp_path / "results" / "loop")]
+    assert asked == [(tmp_path / "cell7", tmp_path / "installed" / "config" / "robots", tmp_path / "here" / "results" / "loop")]

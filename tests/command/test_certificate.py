@@ -4,7 +4,6 @@ import pytest
 from certified import certified_checkout
 from typer.testing import CliRunner
 
-from elastocal.command import campaign, certificate
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -19,8 +18,7 @@ def top(tmp_path_factory):
 
 @pytest.fixture
 def run(top, monkeypatch):
-    monkeypatch.setattr(campaign, "checkout", lambda: top)
-    monkeypatch.setattr(certificate, "checkout", lambda: top)
+    monkeypatch.chdir(top)
 
     def called(*words):
         return CliRunner().invoke(app, ["certificate", *map(str, words)])

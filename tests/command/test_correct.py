@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from elastocal.application.calibrated import forward, nominal_forward
-from elastocal.command import campaign
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.loop.calibrated_files import load_diagnosed
@@ -25,6 +24,7 @@ def cell(tmp_path_factory):
     top = tmp_path_factory.mktemp("cell")
     (top / "config").mkdir()
     (top / "config" / "robots").symlink_to(ROBOTS)
+    (top / "Snakefile").touch()
     folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
     (top / "results" / "loop").mkdir()
     (results / "made").rename(top / "results" / "loop" / "made")
@@ -40,7 +40,7 @@ def path_file(folder: Path, angles: np.ndarray) -> Path:
 
 
 def run(monkeypatch, cell, path, *more):
-    monkeypatch.setattr(campaign, "checkout", lambda: cell[0])
+    monkeypatch.chdir(cell[0])
     output = path.with_name("targets.csv")
     return CliRunner().invoke(app, ["correct", str(cell[1]), str(path), "--output", str(output), *more]), output
 

@@ -12,20 +12,34 @@ from elastocal.command.main import app
 LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign cell7\n", "cell7: [bold] is missing\n"]
 
 
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    """Diagnose a campaign with a pipeline and in a workplace; what is called, and the exit code of that."""
+
+    def called(pipeline, code=0):
+        # In place of Python: shows its arguments and where it runs.
+        stand_in = tmp_path / "python"
+        stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\nexit {code}\n')
+        stand_in.chmod(0o755)
+        monkeypatch.setattr(diagnose.sys, "executable", str(stand_in))
+        monkeypatch.setattr(diagnose, "pipeline", lambda: pipeline)
+        monkeypatch.setattr(diagnose, "workplace", lambda: tmp_path)
+        return CliRunner().invoke(app, ["diagnose", str(tmp_path / "cell7"), "-j", "1"])
+
+    return called
+
+
 @pytest.mark.parametrize("code", [0, 3])
-def test_the_target_of_the_campaign_runs_in_the_checkout_and_its_exit_code_counts(tmp_path, monkeypatch, code):
-    (tmp_path / "Snakefile").write_text("")
-    (tmp_path / "workflow").mkdir()
-    # In place of Python: shows its arguments and where it runs.
-    stand_in = tmp_path / "python"
-    stand_in.write_text(f'#!/bin/sh\necho "$PWD" "$@"\nexit {code}\n')
-    stand_in.chmod(0o755)
-    monkeypatch.setattr(diagnose.sys, "executable", str(stand_in))
-    monkeypatch.setattr(diagnose, "checkout", lambda: tmp_path)
-    result = CliRunner().invoke(app, ["diagnose", str(tmp_path / "cell7"), "-j", "1"])
+def test_the_target_of_the_campaign_runs_in_the_checkout_and_its_exit_code_counts(tmp_path, run, code):
+    result = run(tmp_path, code)
     assert result.exit_code == code
-    said = f"{tmp_path} -m snakemake -j1 diagnose --config campaign={tmp_path}/cell7"
-    assert result.stderr.strip() == said
+    assert result.stderr.strip() == f"{tmp_path} -m snakemake -j1 diagnose --config campaign={tmp_path}/cell7"
+
+
+def test_without_a_checkout_the_installed_pipeline_runs_in_the_working_directory(tmp_path, run):
+    shown = run(tmp_path / "installed").stderr.strip()
+    assert shown.startswith(f"{tmp_path} -m snakemake -j1 diagnose --config campaign={tmp_path}/cell7")
+    assert shown.endswith(f" --snakefile {tmp_path}/installed/Snakefile")
 
 
 def shown(terminal):

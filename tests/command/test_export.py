@@ -10,7 +10,6 @@ from diagnosed_folders import diagnosed_folder
 from typer.testing import CliRunner
 
 from elastocal.campaigns.reading import read_robot
-from elastocal.command import campaign
 from elastocal.command.main import app
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
@@ -22,6 +21,7 @@ def cell(tmp_path_factory):
     top = tmp_path_factory.mktemp("cell")
     (top / "config").mkdir()
     (top / "config" / "robots").symlink_to(ROBOTS)
+    (top / "Snakefile").touch()
     folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
     (top / "results" / "loop").mkdir()
     (results / "made").rename(top / "results" / "loop" / "made")
@@ -29,7 +29,7 @@ def cell(tmp_path_factory):
 
 
 def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, cell):
-    monkeypatch.setattr(campaign, "checkout", lambda: cell[0])
+    monkeypatch.chdir(cell[0])
     result = CliRunner().invoke(app, ["export", str(cell[1]), "--output", str(tmp_path / "out"), "--date", "2026-11-23"])
     assert result.exit_code == 0, result.output
     robot = read_robot(tmp_path / "out" / "robot.yaml")

@@ -20,6 +20,7 @@ def certified_checkout(top, name="made", offset=3e-4):
     if not (top / "config").exists():
         (top / "config").mkdir()
         (top / "config" / "robots").symlink_to(ROBOTS)
+        (top / "Snakefile").touch()
     robot = analysed("kuka")
     folder = made_folder(top / name, robot, name, table=made_table(robot, name, offset_of_joint_3=offset))
     out = run_loop(folder, ROBOTS, top / "results" / "loop" / name, ANALYSIS)

@@ -28,7 +28,7 @@ PUBLISHED = pd.DataFrame([{"data": name} | FIGURE for name in ("one", "three")])
 @pytest.fixture(scope="module")
 def page():
     table = league_table(made_results(), {"A robot": ["one"], "Another": ["two"]}, "geometry", 1)
-    return league_page(table, COSTS, MECHANISMS, PUBLISHED, METHODS)
+    return league_page(table, COSTS, MECHANISMS, PUBLISHED, METHODS, {"four": "folder/four.csv"})
 
 
 def test_each_split_has_a_table_in_which_the_best_is_bold(page):
@@ -51,3 +51,7 @@ def test_improbable_mechanisms_and_figures_of_other_data_are_left_out(page):
 def test_only_methods_with_intervals_have_a_coverage(page):
     section = page.split("## Intervals")[1].split("## ")[0]
     assert "GP" in section and "ours" not in section
+
+
+def test_what_is_left_out_is_named_first(page):
+    assert page.startswith("Left out: four, as folder/four.csv is missing.")

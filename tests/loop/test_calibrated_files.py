@@ -66,5 +66,5 @@ def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(ma
 
 
 def test_a_campaign_that_was_never_diagnosed_is_refused(made, config_folder, tmp_path):
-    with refused(made[0].as_posix(), "", "no diagnosis of it", "elastocal diagnose"):
+    with refused(made[0].as_posix(), "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
         load_diagnosed(made[0], config_folder / "robots", tmp_path)

@@ -4,6 +4,8 @@ import gc
 import sys
 from pathlib import Path
 
+import elastocal
+from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.study.configuration import check_study, rows_read
@@ -15,15 +17,26 @@ sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 from import_closure import closure
 from outcome import outcome
 
+# In a checkout the package stands beside the rules; a wheel puts them apart.
+PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__).parents[1]
+
+
+def placed(file):
+    """A file of the workflow or the package by the name that rules have for it: in a checkout, which may move, without the folders above."""
+    return (file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file).as_posix()
+
+
+CONFIG = placed(ROOT / "config")
+
 # What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()
 
 try:
-    STUDY = check_study(config, "config")
-    SOURCES = campaign_sources(config, "config")
+    STUDY = check_study(config, CONFIG)
+    SOURCES = campaign_sources(config, CONFIG)
     # Name and folder of the user's own campaign, if there is one.
-    OWN = user_campaign(config, "config/robots")
+    OWN = user_campaign(config, f"{CONFIG}/robots")
 except InputError as error:
     sys.exit(str(error))
 
@@ -56,8 +69,8 @@ wildcard_constraints:
 def sources(script):
     """A script and the package modules that it runs: an edit of one reruns the jobs that depend on it, and no others."""
     path = ROOT / "workflow" / "scripts" / script
-    files = [path, *closure(path, ROOT / "src")]
-    return [file.relative_to(ROOT).as_posix() for file in files]
+    files = [path, *closure(path, PACKAGES)]
+    return [placed(file) for file in files]
 
 
 def robot_document(wildcards):
@@ -110,14 +123,20 @@ def files_of(wildcards):
 def files_of_campaign(campaign):
     """Files that a campaign is read from, those of the campaign that holds its test included."""
     if campaign in OWN:
-        return campaign_files(OWN[campaign], "config/robots")
+        return campaign_files(OWN[campaign], f"{CONFIG}/robots")
     source = SOURCES[campaign]
     other = source.get("holdout", {}).get("campaign")
     names = [campaign, *([Path(other).name] if other else [])]
     files = expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
     # An import has its robots among its inputs; a simulation does not have the robot that it declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []
-    return files + expand("config/robots/{robot}.yaml", robot=declared)
+    return files + expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=declared)
+
+
+def robots_of_import(wildcards):
+    """Files of the robots that an importer reads or names; importers are imported only where one is needed."""
+    source = importer(SOURCES[wildcards.campaign]["importer"], f"campaign {wildcards.campaign}")
+    return expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=source.ROBOTS)
 
 
 def loop_reports(campaigns):

@@ -8,16 +8,30 @@ reports/league/{league}/.
 from elastocal.campaigns.public_data import not_at_hand
 
 LEAGUE = config["league"]
-MISSING_DATA = {
-    name: file
-    for name in named_league(config)
-    if (file := not_at_hand(SOURCES[name].get("files", []), "data/public")) is not None
-}
+
+
+def missing_data(names):
+    """A file that is missing of each data set of which one is."""
+    sources = {name: SOURCES[name] for name in names if SOURCES[name]["source"] == "public"}
+    files = {
+        name: not_at_hand(source["files"], importer(source["importer"], name).FILES, "data/public")
+        for name, source in sources.items()
+    }
+    return {name: file for name, file in files.items() if file}
+
+
+MISSING_DATA = missing_data(named_league(config))
 # Robots of each league with the data sets that are at hand.
 LEAGUES = {
     league: {robot: there for robot, names in robots.items() if (there := [name for name in names if name not in MISSING_DATA])}
     for league, robots in LEAGUE["data"].items()
 }
+
+
+def missing_of(league):
+    """Data sets of a league that are left out, with the file that each lacks."""
+    named = {name for names in LEAGUE["data"][league].values() for name in names}
+    return {name: file for name, file in MISSING_DATA.items() if name in named}
 
 
 def sessions_of(data):
@@ -83,7 +97,7 @@ rule deal_league_folds:
         "results/timings/deal_league_folds/{data}.tsv"
     params:
         folder="data/campaigns/{data}",
-        robots="config/robots",
+        robots=f"{CONFIG}/robots",
         folds=LEAGUE["folds"],
         seed=config["seed"],
     script:
@@ -155,6 +169,7 @@ rule tabulate_league:
     params:
         entered=lambda wildcards: entry_keys(wildcards.league),
         rounds=lambda wildcards: rounds_of(wildcards.league),
+        missing=lambda wildcards: missing_of(wildcards.league),
         timings="results/timings",
         robots=lambda wildcards: LEAGUES[wildcards.league],
         reference=LEAGUE["reference"],

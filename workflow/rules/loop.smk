@@ -6,7 +6,6 @@ results/loop/{campaign}/, a table for each step, and reports/loop/{campaign}/. N
 
 SIMULATED = [name for name, source in SOURCES.items() if source["source"] == "simulated"]
 PUBLIC = [name for name in SOURCES if name not in SIMULATED]
-MEASURED_ROBOTS = ["fanuc_static", "fanuc_cpa", "fanuc_measured", "ur10", "ur5", "wam", "motoman_right_arm"]
 LOOP_FIGURES = ["before_after", "arrows", "residuals", "candidates", "confounding"]
 LOOP_REPORTS = [
     "verdict.json",
@@ -42,7 +41,7 @@ rule simulate_campaign:
 
 rule import_campaign:
     input:
-        robots=expand("config/robots/{robot}.yaml", robot=MEASURED_ROBOTS),
+        robots=robots_of_import,
         sources=sources("import_campaign.py"),
     output:
         document="data/campaigns/{campaign}/campaign.yaml",
@@ -74,7 +73,7 @@ rule read_campaign:
         "results/timings/read_campaign/{campaign}.tsv"
     params:
         folder=lambda wildcards: folder_of(wildcards.campaign),
-        robots="config/robots",
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/read_campaign.py"
 

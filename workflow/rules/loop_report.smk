@@ -96,7 +96,7 @@ rule compile_loop_report:
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),
-        pages=[f"src/elastocal/report/loop.{ending}" for ending in ("typ", "html", "js")],
+        pages=[placed(PACKAGES / f"elastocal/report/loop.{ending}") for ending in ("typ", "html", "js")],
         sources=sources("compile_loop_report.py"),
     output:
         report="reports/loop/{campaign}/report.pdf",

@@ -1,5 +1,6 @@
 """The league as tables and pictures: errors, costs, and which mechanisms real robots have."""
 
+import sys
 from pathlib import Path
 
 import pandas as pd
@@ -39,7 +40,9 @@ def tabulate_league(job: Job) -> None:
     write_csv(job.output.league, table)
     write_csv(job.output.costs, costs)
     write_csv(job.output.mechanisms, mechanisms)
-    write_text(job.output.page, league_page(table, costs, mechanisms, published, methods))
+    write_text(job.output.page, league_page(table, costs, mechanisms, published, methods, settings.missing))
+    for name, file in settings.missing.items():
+        print(f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA", file=sys.stderr)
     save(league_picture(table, methods), job.output.picture_pdf, job.output.picture_png)
     save(mechanism_picture(mechanisms), job.output.mechanisms_pdf, job.output.mechanisms_png)
 

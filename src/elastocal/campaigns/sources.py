@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.campaign import DOCUMENT
+from elastocal.campaigns.importers.catalogue import check_importer
 from elastocal.campaigns.reading import read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
@@ -41,8 +42,10 @@ def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str 
     found = {}
     for name in named_campaigns(config):
         document = named_document(folder, "campaigns", "campaign_source", name, source)
-        if document["source"] == "simulated":
-            path = document_path(folder, "campaigns", name)
+        path = document_path(folder, "campaigns", name)
+        if document["source"] == "public":
+            check_importer(document["importer"], path)
+        else:
             document["robot_document"] = named_document(folder, "robots", "robot", document["robot"], path)
             named_document(folder, "robots", "robot", document["declared_robot"], path)
         found[name] = document

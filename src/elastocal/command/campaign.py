@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.command.checkout import checkout
+from elastocal.command.pipeline import pipeline, workplace
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -31,8 +31,7 @@ def diagnosed_campaign(folder: Path) -> Diagnosed:
     """
     from elastocal.loop.calibrated_files import load_diagnosed
 
-    top = checkout()
-    return load_diagnosed(folder, top / "config" / "robots", top / "results" / "loop")
+    return load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
 
 
 def held_out_rms_m(name: str) -> float | None:
@@ -49,5 +48,5 @@ def held_out_rms_m(name: str) -> float | None:
     """
     from elastocal.io.json_files import read_json
 
-    path = checkout() / "reports" / "loop" / name / "verdict.json"
+    path = workplace() / "reports" / "loop" / name / "verdict.json"
     return read_json(path)["heldout"]["after"]["rms_m"] if path.is_file() else None

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign
-from elastocal.command.checkout import checkout
+from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.quantities import length_m
 from elastocal.errors import InputError
 
@@ -42,11 +42,11 @@ def certificate(
     from elastocal.report.certificate_words import certificate_facts
 
     console = Console(stderr=True)
-    stated = read_descriptions(folder, checkout() / "config" / "robots")[0].get("serial_number", "")
+    stated = read_descriptions(folder, pipeline() / "config" / "robots")[0].get("serial_number", "")
     limit = length_m("--tolerance", tolerance)
     found = diagnosed_campaign(folder)
     other = None if compare is None else diagnosed_campaign(compare)
-    reports = checkout() / "reports" / "loop" / found.name
+    reports = workplace() / "reports" / "loop" / found.name
     needed = [reports / name for name in ("verdict.json", "before_after.csv", "residuals.parquet")]
     for path in needed:
         if not path.is_file():
@@ -57,7 +57,7 @@ def certificate(
     steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2])
     wanted = Wanted(limit, risk, serial or stated, date or calendar.today().isoformat(), seed)
     with console.status("working"):
-        document, maps = certified(folder, checkout() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
+        document, maps = certified(folder, pipeline() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
         facts = certificate_facts(document)
         place = output or reports
         place.mkdir(parents=True, exist_ok=True)

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from elastocal.command.checkout import checkout
+from elastocal.command.pipeline import pipeline
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,7 +27,7 @@ def check(
     """Say what was read, what these measurements identify and test, and what is suspicious; exit code 1 if not diagnosable."""
     from elastocal.loop.overview import overview
 
-    facts = overview(folder, checkout() / "config" / "robots")
+    facts = overview(folder, pipeline() / "config" / "robots")
     if as_json:
         json.dump(facts, sys.stdout, indent=1)
         print()

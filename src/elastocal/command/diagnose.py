@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from elastocal.command.checkout import checkout
+from elastocal.command.pipeline import pipeline, workplace
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -27,9 +27,12 @@ def diagnose(
     cores: Annotated[int, typer.Option("--cores", "-j", min=1, help="Jobs at a time.")] = 2,
 ) -> None:
     """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
+    place, snakefile = workplace(), pipeline() / "Snakefile"
     words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={folder.resolve()}"]
+    # What is installed beside the package runs in the working directory.
+    words += [] if snakefile.parent == place else ["--snakefile", str(snakefile)]
     with subprocess.Popen(
-        [sys.executable, *words], cwd=checkout(), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        [sys.executable, *words], cwd=place, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as run:
         follow(run.stdout or (), Console(stderr=True))
     raise typer.Exit(run.returncode)

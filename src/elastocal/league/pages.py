@@ -29,7 +29,12 @@ _LEAST_PROBABLE = 0.05
 
 
 def league_page(
-    table: pd.DataFrame, costs: pd.DataFrame, mechanisms: pd.DataFrame, published: pd.DataFrame, methods: Mapping[str, Method]
+    table: pd.DataFrame,
+    costs: pd.DataFrame,
+    mechanisms: pd.DataFrame,
+    published: pd.DataFrame,
+    methods: Mapping[str, Method],
+    missing: Mapping[str, str],
 ) -> str:
     """Tables of the league as Markdown.
 
@@ -40,13 +45,15 @@ def league_page(
     published : pandas.DataFrame
         Figures of other people: ``data, rms_mm, what, source, why``.
     methods : dict of str to Method
+    missing : dict of str to str
+        Data sets that were left out, with the file that each lacks.
 
     Returns
     -------
     str
     """
     words = {name: method.words or name for name, method in methods.items()}
-    parts = []
+    parts = [f"Left out: {_words(name)}, as {file} is missing." for name, file in missing.items()]
     for split, title in _TITLES.items():
         mine = table[table["split"] == split]
         if len(mine):

@@ -79,7 +79,7 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str |
     if not all(
         (tables / file).is_file() for file in (DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS, STEPS_TABLE, CORRELATIONS_TABLE)
     ):
-        raise InputError(folder, "", "no diagnosis of it", again)
+        raise InputError(folder, "", f"no diagnosis of it in {results}", again)
     columns = [columns_of(part) for part in parts]
     kept = [
         read_table(tables / file, measurements(part.joint_angles.shape[1]))

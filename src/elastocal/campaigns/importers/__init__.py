@@ -1,4 +1,5 @@
 """Public measurements of real robots to campaigns, one module for each format.
 
-A module has `write_campaign(source, folder, name)`; it imports `elastocal.campaigns`.
+An importer has FILES, ROBOTS and `write_campaign`, see `catalogue.Importer`; a new module is a new one. The modules without
+FILES are what importers share.
 """

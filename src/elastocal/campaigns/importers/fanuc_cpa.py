@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -14,7 +15,18 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+FILES = {
+    "fanuc_cpa": PublicFile(
+        "RABKKK/LaserTrackerPoseData4KinIdent",
+        "e143dda2bf5280359912ed7618f2b63d7e262b58",
+        "N1N2N3Jval.csv",
+        "7d3d2a860cc79ce31162e2756618f32182aad418ebd26d822c1cfac0bb36385e",
+        "fanuc_cpa/N1N2N3Jval.csv",
+        "none stated: for the user's own use, not to be passed on",
+    ),
+}
 ROBOT, TARGETS = "fanuc_cpa", ("D", "E", "F")
+ROBOTS = (ROBOT,)
 # Three reflectors in mm, six zeros, six angles of the controller in degrees.
 _COLUMNS, _ANGLES = 21, slice(15, 21)
 # This source has no repeats; those of fanuc_static scatter so, pooled over its poses, reflectors and coordinates.

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Its file has no reported_joints: the sessions count their angles differently, so the campaign holds the chain's own.
 ROBOT = "fanuc_measured"
+FILES = fanuc_static.FILES | fanuc_cpa.FILES
+ROBOTS = (ROBOT, *fanuc_static.ROBOTS, *fanuc_cpa.ROBOTS)
 
 
 def write_campaign(

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.io
 
 from elastocal.campaigns.importers.reflectors import write_reflectors
+from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -15,7 +16,18 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+FILES = {
+    "fanuc_static": PublicFile(
+        "Sarrasor/RoboticManipulators",
+        "4e05acfe0052b90da43e3074bbecb4bb89104301",
+        "data/calibration_dataset.mat",
+        "19face499435c165be81c02de841e0d8e0106686daaf63550d0bf02bbea8c8eb",
+        "fanuc_static/calibration_dataset.mat",
+        "MIT",
+    ),
+}
 ROBOT, TARGETS = "fanuc_static", ("A", "B", "C")
+ROBOTS = (ROBOT,)
 
 
 def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:

@@ -13,6 +13,7 @@ import numpy as np
 from elastocal.campaigns.importers.csv_columns import read_columns, table
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
@@ -21,9 +22,41 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+_SOURCE = "pauljac7700/serial_robots_datasets", "759068d85a8b95183cd71ff96d9dfc5173bc57fc"
+FILES = {
+    "jacobi_ur5_grid": PublicFile(
+        *_SOURCE,
+        "UR5/3D_UR5_uncalibrated_grid_cleaned.csv",
+        "3de63c38b4338a1fb23437a9c6ecb7e0441a9e132fc055544619b8c580f767c0",
+        "jacobi_ur5/3D_UR5_uncalibrated_grid_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_ur5_random": PublicFile(
+        *_SOURCE,
+        "UR5/3D_UR5_uncalibrated_random_cleaned.csv",
+        "3cd7a4aae072f9757ce9bd156e7470cc8caa89d8af9164c07390953ae808095a",
+        "jacobi_ur5/3D_UR5_uncalibrated_random_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_wam_grid": PublicFile(
+        *_SOURCE,
+        "WAM/3D_WAM_uncalibrated_grid_cleaned.csv",
+        "f013c0ce152cffb5f529e747681457d359a9869c46fdbb4f4e1eefb8234835ad",
+        "jacobi_wam/3D_WAM_uncalibrated_grid_cleaned.csv",
+        "MIT",
+    ),
+    "jacobi_wam_random": PublicFile(
+        *_SOURCE,
+        "WAM/3D_WAM_uncalibrated_random_cleaned.csv",
+        "b9b6f5ee9f4e9fce0ed8a70d458b08b6af7f473afe98bb92ac2ff379d398e5e2",
+        "jacobi_wam/3D_WAM_uncalibrated_random_cleaned.csv",
+        "MIT",
+    ),
+}
 TARGET = "SMR"
 # Robots of the source by their number of joints.
-ROBOTS = {6: "ur5", 7: "wam"}
+ROBOT_OF_JOINTS = {6: "ur5", 7: "wam"}
+ROBOTS = tuple(ROBOT_OF_JOINTS.values())
 # The tracker's maker: 15 um + 6 um/m; its distance is not stated. The least that a measurement scatters: what the joints add
 # is the error common to a pose, which is estimated.
 NOISE = {"position_m": 1.5e-5}
@@ -54,9 +87,9 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     cells = read_columns(path, ",", (*COMMANDED, *DIFFERENCE), kind)
     joints = sum(name.startswith("joint_") for name in cells)
     names = [f"joint_{number + 1}" for number in range(joints)]
-    if joints not in ROBOTS or not set(names) <= set(cells):
+    if joints not in ROBOT_OF_JOINTS or not set(names) <= set(cells):
         found = ", ".join(name for name in cells if name.startswith("joint_")) or "no column joint_1"
-        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOTS))}")
+        raise InputError(path, "header", found, f"joint_1 to joint_{' or joint_'.join(map(str, ROBOT_OF_JOINTS))}")
     angles, commanded, difference = (table(path, cells, columns) for columns in (names, COMMANDED, DIFFERENCE))
     return np.radians(angles), 1e-3 * (commanded + difference)
 
@@ -92,5 +125,5 @@ def write_campaign(
     table |= {f"q{j + 1}": column for j, column in enumerate(angles.T)}
     table |= {axis: position[:, i] for i, axis in enumerate("xyz")}
     joints = angles.shape[1]
-    document = unloaded_document(name, ROBOTS[joints], "position", [TARGET], holdout, noise, f"{joints}DoF")
+    document = unloaded_document(name, ROBOT_OF_JOINTS[joints], "position", [TARGET], holdout, noise, f"{joints}DoF")
     write_folder(folder, document, table, joints)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.io
 
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 from elastocal.errors import InputError
 
@@ -19,7 +20,28 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+_SOURCE = "ctu-vras/multirobot-calibration", "a20f0454732bc36f1d980ff08c3d30536b8b1b19"
+_FOLDER = "UserData/Robots/Motoman/Dataset/leica_dataset"
+# The toolbox that holds these files says so in its sources; it has no licence file.
+_LICENCE = "LGPL-3.0-or-later"
+FILES = {
+    "motoman_workspace": PublicFile(
+        *_SOURCE,
+        f"{_FOLDER}/updated_leica_dataset.mat",
+        "a4e62319d0d9ba35590032648ccd260ee7c8261b0d73eea97995da7f3e68f3ca",
+        "motoman_leica/updated_leica_dataset.mat",
+        _LICENCE,
+    ),
+    "motoman_grid": PublicFile(
+        *_SOURCE,
+        f"{_FOLDER}/leica_right_hand_6x6x6_dataset.mat",
+        "170ef4301d0ca949e5e1bc39d6a6c8d0f722f47c0afaf5215e4b6b36637bee4f",
+        "motoman_leica/leica_right_hand_6x6x6_dataset.mat",
+        _LICENCE,
+    ),
+}
 ROBOT, TARGET = "motoman_right_arm", "reflector"
+ROBOTS = (ROBOT,)
 # One coordinate, pooled over the four series of 18 to 20 repeats at one posture each without contact (leica_rep_table1, table2,
 # wall1, wall2 of the source): robot and tracker together.
 NOISE = {"position_m": 1.2e-5}

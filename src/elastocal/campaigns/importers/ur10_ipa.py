@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.importers.csv_columns import numbers, read_columns, table
 from elastocal.campaigns.importers.repeats import pose_and_repeat
 from elastocal.campaigns.importers.unloaded import unloaded_document
+from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
 
 if TYPE_CHECKING:
@@ -18,7 +19,25 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+_SOURCE = "christianlandgraf/ipa-robot-accuracy", "507fba69bdaf6c43c2faf306e70a7e37c5e39b89"
+FILES = {
+    "ur10_ipa_a": PublicFile(
+        *_SOURCE,
+        "Series_A/measurements_grid.csv",
+        "84d5c81234cab58ebe88b4c73c582c26ad0e407f0de5350571c91f5ce6f28b76",
+        "ur10_ipa/Series_A/measurements_grid.csv",
+        "MIT",
+    ),
+    "ur10_ipa_b": PublicFile(
+        *_SOURCE,
+        "Series_B/measurements_joint_configurations.csv",
+        "12b69a4e6ff7be68e67d3f70245a3ab7bb6ec3a2c63bc5eae002b15a1f863d7e",
+        "ur10_ipa/Series_B/measurements_joint_configurations.csv",
+        "MIT",
+    ),
+}
 ROBOT, TARGET = "ur10", "TMac"
+ROBOTS = (ROBOT,)
 # One measurement of one coordinate. Positions: the 300 pairs of poses of Series A within 2 mrad of each other, by their median
 # and less what the chain explains of their distance. Orientations: the 255 repeats of Series B, by their median.
 NOISE = {"position_m": 2.1e-5, "orientation_rad": 3.0e-5}

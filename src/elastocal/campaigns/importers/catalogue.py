@@ -1,0 +1,97 @@
+"""All importers that are there: each module of this package that has FILES."""
+
+from __future__ import annotations
+
+import pkgutil
+from importlib import import_module
+from typing import TYPE_CHECKING, Protocol, cast
+
+import elastocal.campaigns.importers
+from elastocal.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from elastocal.campaigns.public_data import PublicFile
+
+
+class Importer(Protocol):
+    """A module of this package that makes campaigns of a public source.
+
+    Attributes
+    ----------
+    FILES : dict of str to PublicFile
+        Of the source, by the names that a campaign of config/campaigns has for them.
+    ROBOTS : tuple of str
+        Robots of config/robots that its campaigns name or that it reads.
+    write_campaign : callable
+        ``write_campaign(*paths, folder, name=..., holdout=...)``, with the paths of the files that the campaign names.
+    """
+
+    FILES: Mapping[str, PublicFile]
+    ROBOTS: tuple[str, ...]
+    write_campaign: Callable[..., None]
+
+
+def importer(name: str, source: str | Path) -> Importer:
+    """An importer by its name.
+
+    Parameters
+    ----------
+    name : str
+        Of its module.
+    source : str or Path
+        File that names it, for the message.
+
+    Returns
+    -------
+    module
+
+    Raises
+    ------
+    InputError
+        There is none of this name.
+    """
+    if name not in _modules() or not hasattr(module := _module(name), "FILES"):
+        raise _unknown(name, source)
+    return cast("Importer", module)
+
+
+def check_importer(name: str, source: str | Path) -> None:
+    """Refuse a name that no module has, without the time that it takes to import one.
+
+    Parameters
+    ----------
+    name : str
+    source : str or Path
+
+    Raises
+    ------
+    InputError
+    """
+    if name not in _modules():
+        raise _unknown(name, source)
+
+
+def importers() -> dict[str, Importer]:
+    """All of them by their names.
+
+    Returns
+    -------
+    dict of str to module
+    """
+    modules = {name: _module(name) for name in _modules()}
+    return {name: cast("Importer", module) for name, module in modules.items() if hasattr(module, "FILES")}
+
+
+def _modules() -> list[str]:
+    return sorted(module.name for module in pkgutil.iter_modules(elastocal.campaigns.importers.__path__))
+
+
+def _module(name: str) -> object:
+    return import_module(f"elastocal.campaigns.importers.{name}")
+
+
+def _unknown(name: str, source: str | Path) -> InputError:
+    return InputError(source, "importer", repr(name), ", ".join(importers()))

@@ -1,0 +1,106 @@
+"""What CONTRIBUTING.md shows works as it stands there: a robot, a strategy, an effect and an importer, one file each."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import refused
+from synthetic import displacements, made_states
+
+from elastocal.campaigns.importers.catalogue import Importer
+from elastocal.campaigns.reading import read_campaign, read_robot
+from elastocal.effects import catalogue
+from elastocal.effects.conditions import conditions_of
+from elastocal.io.documents import check_document, read_document
+from elastocal.mechanics.sites import sites_of
+from elastocal.study.strategies import check_strategy, strategy_from_document
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+
+
+def example(heading):
+    """The one block of code below a heading."""
+    section = TEXT.split(f"\n## {heading}")[1].split("\n## ")[0]
+    (block,) = re.findall(r"^```\w+\n(.*?)^```$", section, re.MULTILINE | re.DOTALL)
+    return block
+
+
+@pytest.fixture
+def module(tmp_path, monkeypatch):
+    """Import a block as a module of its own."""
+
+    def imported(heading):
+        path = tmp_path / "shown.py"
+        path.write_text(example(heading), encoding="utf-8")
+        spec = importlib.util.spec_from_file_location("shown", path)
+        found = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, "shown", found)
+        spec.loader.exec_module(found)
+        return found
+
+    return imported
+
+
+def test_the_robot_is_the_file_that_it_is_said_to_be_without_what_its_comment_is_about(config_folder, tmp_path):
+    path = tmp_path / "ur10.yaml"
+    path.write_text(example("A robot"), encoding="utf-8")
+    shown, whole = read_document(path), read_document(config_folder / "robots" / "ur10.yaml")
+    assert shown == {key: value for key, value in whole.items() if key not in ("compliance_urad_per_Nm", "payload_kg")}
+    robot = read_robot(path)
+    assert robot.joints == 6 and not robot.compliance_known
+
+
+def test_the_strategy_is_one_that_the_papers_robots_can_carry_out_and_none_of_theirs(tmp_path, robot, strategies):
+    path = tmp_path / "mine.yaml"
+    path.write_text(example("A strategy"), encoding="utf-8")
+    document = read_document(path)
+    check_document(document, "strategy", path)
+    strategy = strategy_from_document(document)
+    assert strategy.name not in {known.name for known in strategies.values()}
+    check_strategy(strategy, robot.chain, path)
+
+
+def test_the_effect_is_whole_and_displaces_what_its_formula_says(module, kuka):
+    effect = module("An effect")
+    assert effect.NAME not in catalogue.effects()
+    assert {"NAME", "FAMILY", "WORDS", "MOVES_ROBOT", "candidates"} <= set(vars(effect))
+    sites, states = sites_of(kuka), made_states(6, 5)
+    found = effect.candidates(sites)
+    assert [candidate.key for candidate in found] == [f"hoses@{joint}" for joint in range(1, 7)]
+    conditions = conditions_of(sites, kuka.compliance, states)
+    (moved,) = displacements(found[2], conditions)
+    np.testing.assert_array_equal(moved[:, 2], states.joint_angles[:, 2] ** 3)
+    assert not np.delete(moved, 2, axis=1).any()
+
+
+def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(module, config_folder, tmp_path):
+    importer = module("An importer")
+    assert set(Importer.__annotations__) <= set(vars(importer))
+    assert {len(file.sha256) for file in importer.FILES.values()} == {64}
+    angles, positions = np.linspace(-90, 90, 12)[:, None] + np.arange(6), np.arange(36.0).reshape(12, 3)
+    path = tmp_path / "values.csv"
+    rows = [";".join(map(str, [*row, *place])) for row, place in zip(angles, positions, strict=True)]
+    path.write_text("\n".join(["J1;J2;J3;J4;J5;J6;X;Y;Z", *rows]) + "\n", encoding="utf-8")
+    importer.write_campaign(path, tmp_path / "mine", "mine")
+    measurements = read_campaign(tmp_path / "mine", config_folder / "robots").measurements
+    np.testing.assert_allclose(np.degrees(measurements.joint_angles), angles, atol=1e-9)
+    np.testing.assert_allclose(1e3 * measurements.position, positions, atol=1e-9)
+    path.write_text("J1;J2\n1;2\n", encoding="utf-8")
+    with refused(path, "header", "a table of owner/repository"):
+        importer.write_campaign(path, tmp_path / "other", "other")
+
+
+@pytest.mark.parametrize("page", ["CONTRIBUTING.md", "config/README.md", "SECURITY.md", "CODE_OF_CONDUCT.md"])
+def test_files_that_a_page_names_are_there(page):
+    place, text = (ROOT / page).parent, (ROOT / page).read_text(encoding="utf-8")
+    linked = {link for link in re.findall(r"\]\(([^)#]+)\)", text) if "://" not in link}
+    named = set(re.findall(r"`((?:src/elastocal|config|tests|workflow|schemas|campaigns|effects)/[\w/.]+)`", text)) - {
+        "src/elastocal/a/b.py",
+        "tests/a/test_b.py",
+    }
+    assert [name for name in linked if not (place / name).exists()] == []
+    assert [name for name in named if not any((top / name).exists() for top in (ROOT, ROOT / "src" / "elastocal"))] == []

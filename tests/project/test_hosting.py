@@ -1,0 +1,66 @@
+"""Files for public hosting: of the form that their readers ask for, and of the targets and tools of this repository."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).resolve().parents[2]
+# Schemas that come with check-jsonschema, so that nothing is downloaded.
+CHECKED = {
+    "citation-file-format": ["CITATION.cff"],
+    "github-workflows": [".github/workflows/ci.yml"],
+    "github-issue-forms": [f".github/ISSUE_TEMPLATE/{name}.yml" for name in ("fault", "verdict", "proposal")],
+    "github-issue-config": [".github/ISSUE_TEMPLATE/config.yml"],
+}
+
+
+def loaded(name):
+    return yaml.safe_load((ROOT / name).read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("schema", CHECKED)
+def test_a_file_is_of_its_schema(schema):
+    words = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", f"vendor.{schema}", *CHECKED[schema]]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_every_form_is_checked():
+    forms = {path.relative_to(ROOT).as_posix() for path in (ROOT / ".github").rglob("*.yml")}
+    assert forms == {name for names in CHECKED.values() for name in names if name.startswith(".github/")}
+
+
+def make_targets(text):
+    return re.findall(r"^make ([a-z]+)", text, re.MULTILINE)
+
+
+def test_public_ci_makes_the_targets_of_ours_in_their_order():
+    steps = loaded(".github/workflows/ci.yml")["jobs"]["check"]["steps"]
+    public = make_targets("\n".join(step["run"] for step in steps if "run" in step))
+    assert public == make_targets((ROOT / ".ci" / "run").read_text(encoding="utf-8")) == ["lint", "paper", "test"]
+
+
+def test_hooks_are_commands_of_make_lint_in_the_environment_or_check_a_file_against_its_schema():
+    (repo,) = loaded(".pre-commit-config.yaml")["repos"]
+    assert repo["repo"] == "local"
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8").replace("$(BIN)", ".venv/bin")
+    linted = set(re.findall(r"^\t(\.venv/bin/\S+)", makefile.split("\nlint:")[1].split("\n\n")[0], re.MULTILINE))
+    for hook in repo["hooks"]:
+        tool = hook["entry"].split()[0]
+        assert hook["language"] == "system"
+        assert tool in linted or tool == ".venv/bin/check-jsonschema", hook["id"]
+        assert (Path(sys.executable).parent / Path(tool).name).is_file(), hook["id"]
+
+
+def test_the_workflow_catalogue_finds_what_it_looks_for():
+    """Among all workflows: README names Snakemake and the workflow, the Snakefile is at the top, with rules in its folder."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8").lower()
+    assert "snakemake" in readme and "workflow" in readme
+    assert (ROOT / "Snakefile").is_file() and list((ROOT / "workflow" / "rules").glob("*.smk"))
+    usage = loaded(".snakemake-workflow-catalog.yml")["usage"]
+    assert set(usage) == {"mandatory-flags", "software-stack-deployment", "report"}
+    assert (ROOT / "config" / "README.md").is_file()

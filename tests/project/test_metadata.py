@@ -1,0 +1,97 @@
+"""What the project says of itself, in every file the same: name, version, licence, authors, what it is to be cited with."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+import yaml
+
+import elastocal
+
+ROOT = Path(__file__).resolve().parents[2]
+AUTHORS = "the elastocal developers"
+
+
+def text(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def project():
+    return tomllib.loads(text("pyproject.toml"))["project"]
+
+
+@pytest.fixture(scope="module")
+def citation():
+    return yaml.safe_load(text("CITATION.cff"))
+
+
+@pytest.fixture(scope="module")
+def codemeta():
+    return json.loads(text("codemeta.json"))
+
+
+def test_every_file_has_the_version_of_the_package(citation, codemeta):
+    assert citation["version"] == codemeta["version"] == elastocal.__version__
+    assert f"({elastocal.__version__})" in text("CHANGELOG.md") or f"## {elastocal.__version__} " in text("CHANGELOG.md")
+
+
+def test_authors_are_the_developers_everywhere(project, citation, codemeta):
+    assert project["authors"] == [{"name": AUTHORS}]
+    assert citation["authors"] == [{"name": AUTHORS}]
+    assert [author["name"] for author in codemeta["author"]] == [AUTHORS]
+    assert f"name: {AUTHORS}" in text("paper.md")
+
+
+def test_the_licence_is_the_same_everywhere(project, citation, codemeta):
+    assert project["license"] == citation["license"] == codemeta["license"].rpartition("/")[2] == "MIT"
+    assert text("LICENSE").startswith("MIT License\n") and f" {AUTHORS}\n" in text("LICENSE")
+
+
+def test_codemeta_describes_the_package_and_the_paper_that_the_citation_refers_to(project, citation, codemeta):
+    assert (codemeta["name"], codemeta["description"]) == (project["name"], project["description"])
+    assert codemeta["keywords"] == citation["keywords"]
+    assert codemeta["runtimePlatform"] == f"Python {project['requires-python'].replace('>=', '>= ')}"
+    assert codemeta["referencePublication"]["name"] == citation["references"][0]["title"]
+
+
+def test_no_file_names_a_repository_that_is_not_known_yet(project, citation, codemeta):
+    """These keys are optional; whoever publishes the repository adds its address to all three."""
+    assert "urls" not in project
+    assert not {"repository-code", "url"} & set(citation)
+    assert not {"codeRepository", "issueTracker", "url"} & set(codemeta)
+
+
+SECTIONS = (
+    "Summary",
+    "Statement of need",
+    "State of the field",
+    "Software design",
+    "Research impact statement",
+    "AI usage disclosure",
+    "Acknowledgements",
+    "References",
+)
+# As the journal asks.
+FEWEST_WORDS, MOST_WORDS = 750, 1750
+
+
+def test_the_paper_has_the_sections_and_the_length_that_the_journal_asks_for():
+    _, front, body = text("paper.md").split("---\n", 2)
+    assert {"title", "tags", "authors", "affiliations", "date", "bibliography"} <= set(yaml.safe_load(front))
+    assert tuple(re.findall(r"^# (.*)$", body, re.MULTILINE)) == SECTIONS
+    assert FEWEST_WORDS <= len(re.sub(r"<!--.*?-->", "", body, flags=re.DOTALL).split()) <= MOST_WORDS
+
+
+def test_the_paper_cites_what_its_bibliography_has():
+    cited = set(re.findall(r"@([\w:-]+)", text("paper.md").split("---\n", 2)[2]))
+    assert cited == set(re.findall(r"^@\w+\{([\w:-]+),$", text("paper.bib"), re.MULTILINE))
+
+
+def test_every_figure_of_the_paper_is_one_of_a_page():
+    found = re.findall(r"<!-- (README\.md|docs/\w+\.md): (.*?) -->", text("paper.md"))
+    assert len(found) >= 4
+    for page, words in found:
+        assert words in text(page), (page, words)

@@ -1,0 +1,117 @@
+"""The wheel has all that the package and its pipeline need, and its command runs where there is no checkout."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+from made_folders import made_folder
+
+import elastocal
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCES = ("pyproject.toml", "README.md", "LICENSE", "Snakefile", "config.yaml", "config", "profiles", "src", "workflow")
+# Of the checkout alone: it checks, rehearses and explains.
+LEFT_OUT = ("workflow/lint.py", "workflow/examples/", "workflow/searches/", "config/README.md")
+OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
+IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory):
+    """Built of a copy of the sources, as the build leaves folders behind; without a network."""
+    place = tmp_path_factory.mktemp("wheel")
+    for name in SOURCES:
+        source = ROOT / name
+        shutil.copytree(source, place / name, ignore=IGNORED) if source.is_dir() else shutil.copy2(source, place / name)
+    pip = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
+    alone = ["--no-deps", "--no-build-isolation", "--no-index"]
+    done = subprocess.run([*pip, "wheel", *alone, ".", "-w", "dist"], cwd=place, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (found,) = (place / "dist").iterdir()
+    return found
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory):
+    """An environment with the wheel; the libraries are those of these tests."""
+    place = tmp_path_factory.mktemp("installed")
+    venv.create(place, symlinks=True)
+    packages = Path(sysconfig.get_path("purelib", "venv", {"base": place}))
+    (packages / "libraries.pth").write_text(sysconfig.get_path("purelib"))
+    pip = [sys.executable, "-m", "pip", "--python", str(place), "-q", "--disable-pip-version-check"]
+    done = subprocess.run([*pip, "install", "--no-deps", "--no-index", str(wheel)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return place
+
+
+@pytest.fixture
+def run(installed, tmp_path):
+    """Call a program of that environment in a folder that is no checkout."""
+
+    def called(program, *words):
+        command = [str(installed / "bin" / program), *map(str, words)]
+        return subprocess.run(command, cwd=tmp_path, env=OUTSIDE, capture_output=True, text=True)
+
+    return called
+
+
+def files_of(folder):
+    found = (path for path in (ROOT / folder).rglob("*") if path.is_file())
+    return {path.relative_to(ROOT).as_posix() for path in found if not {"__pycache__"} & set(path.parts)}
+
+
+def test_the_wheel_holds_every_file_of_the_package_and_of_its_pipeline(wheel):
+    packages = {name.removeprefix("src/") for name in files_of("src") if ".egg-info/" not in name}
+    pipeline = {"Snakefile", "config.yaml"} | files_of("config") | files_of("profiles") | files_of("workflow")
+    pipeline = {name for name in pipeline if not name.startswith(LEFT_OUT)}
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if not name.endswith("/")}
+    held = {name.rpartition(".data/data/share/elastocal/")[2] for name in names if ".dist-info/" not in name}
+    assert held == packages | pipeline
+
+
+def test_the_wheel_says_whose_it_is_and_which(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith(".dist-info/METADATA"))
+        metadata = archive.read(name).decode()
+        assert any(name.endswith(".dist-info/licenses/LICENSE") for name in archive.namelist())
+    assert f"\nVersion: {elastocal.__version__}\n" in metadata
+    assert "\nAuthor: the elastocal developers\n" in metadata
+    assert "\nLicense-Expression: MIT\n" in metadata
+
+
+def test_the_version_stands_in_one_place():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert "version" not in project["project"]
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "elastocal.__version__"}
+
+
+def test_a_campaign_is_begun_and_checked_where_there_is_no_checkout(run, tmp_path):
+    begun = run("elastocal", "init", "cell", "--robot", ROOT / "config" / "robots" / "ur5.yaml")
+    assert begun.returncode == 0, begun.stderr
+    assert sorted(path.name for path in (tmp_path / "cell").iterdir()) == ["campaign.yaml", "measurements.csv", "robot.yaml"]
+    checked = run("elastocal", "check", "cell")
+    assert checked.returncode == 1
+    assert checked.stderr.startswith("cell/measurements.csv: found no row of data"), checked.stderr
+    assert len(checked.stderr.splitlines()) == 1
+
+
+def test_the_installed_pipeline_reads_a_campaign_in_the_working_directory(installed, run, tmp_path, kuka):
+    """A robot of config/robots; the first step runs, and what the others read is looked for: a diagnosis takes too long."""
+    made_folder(tmp_path / "cell", kuka)
+    snakefile = installed / "share" / "elastocal" / "Snakefile"
+    for target in (["results/loop/made/campaign.json"], ["diagnose", "-n"]):
+        words = ["-m", "snakemake", *target, "--snakefile", snakefile, "-j1", "--config", f"campaign={tmp_path / 'cell'}"]
+        done = run("python", *words)
+        assert done.returncode == 0, done.stderr[-2000:]
+    assert (tmp_path / "results" / "loop" / "made" / "training.parquet").is_file()
+    assert "reports/loop/made/report.html" in done.stdout
+    assert "/site-packages/elastocal/report/loop.typ" in done.stdout
+    assert f"{ROOT}/src" not in done.stdout
