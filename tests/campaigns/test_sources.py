@@ -4,13 +4,14 @@ import pytest
 import yaml
 from support import refused
 
-from elastocal.campaigns.sources import campaign_sources, user_campaign
+from elastocal.campaigns.sources import campaign_sources, named_campaigns, named_league, user_campaign
 from elastocal.io.documents import read_document
 
 
 def test_campaigns_of_the_repository_pass(config, config_folder):
     sources = campaign_sources(config, config_folder)
-    assert list(sources) == [*config["loop"]["campaigns"], *config["loop"]["measured"]]
+    assert list(sources) == named_campaigns(config)
+    assert list(sources)[: len(config["loop"]["campaigns"])] == config["loop"]["campaigns"]
     for name, document in sources.items():
         assert document["source"] == ("simulated" if name in config["loop"]["campaigns"] else "public")
         assert ("robot_document" in document) == (document["source"] == "simulated")
@@ -20,7 +21,14 @@ def test_campaigns_of_the_repository_pass(config, config_folder):
 
 
 def of_one_campaign(config, name="mine"):
-    return config | {"loop": config["loop"] | {"campaigns": [name], "measured": []}}
+    nobody = config["league"] | {"data": {"all": {}}}
+    return config | {"loop": config["loop"] | {"campaigns": [name], "measured": []}, "league": nobody}
+
+
+def test_a_data_set_of_two_leagues_is_named_once(config):
+    names = named_league(config)
+    assert len(set(names)) == len(names) and set(names) <= set(named_campaigns(config))
+    assert {"fanuc_cpa", "fanuc_static"} <= set(names)
 
 
 SIMULATED = {
@@ -46,7 +54,7 @@ FAULTY_SOURCES = {
     "unknown importer": (
         {**dict.fromkeys(SIMULATED), "source": "public", "importer": "mine", "files": ["a"]},
         "importer",
-        ["'mine'", "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa"],
+        ["'mine'", "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa"],
     ),
     "unknown source": ({"source": "made up"}, "source", ["'made up'", "simulated"]),
 }

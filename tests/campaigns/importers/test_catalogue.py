@@ -40,7 +40,7 @@ def test_a_new_module_is_a_new_importer(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["nobody", "repeats"])
 def test_a_name_of_none_is_refused_with_those_that_there_are(name):
     """What importers share is no importer."""
-    with refused("mine.yaml", "importer", repr(name), "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, ur10_ipa"):
+    with refused("mine.yaml", "importer", repr(name), "fanuc_cpa, fanuc_joint, fanuc_static, jacobi, motoman, ur10_ipa"):
         importer(name, "mine.yaml")
 
 
