@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import pytest
 from made_loop_facts import CAMPAIGNS, facts_of
-from made_loop_tables import residual_table
+from made_loop_tables import candidate_table, residual_table
 
 from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
@@ -16,10 +16,14 @@ CHROMIUM = shutil.which("chromium")
 # Three-dimensional drawing without a graphics card.
 IN_SOFTWARE = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 
+# Red, green and blue of what the page and a plot are drawn on.
+PAPER_OF_PAGE = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
+PAPER_OF_PLOT = "getComputedStyle(document.querySelector('#scatter .main-svg')).backgroundColor.match(/\\d+/g).map(Number)"
+
 
 def page_of(kuka, name="named", **changed):
     verdict = CAMPAIGNS[name] | changed
-    return loop_page(facts_of(verdict), verdict, residual_table(), kuka)
+    return loop_page(facts_of(verdict), verdict, residual_table(), candidate_table(), kuka)
 
 
 def data_in(path):
@@ -61,6 +65,16 @@ def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(
     assert len(data["position"]) == 11 and page["shown_sentence"] == f"11 of {count} measurements are shown, evenly spread."
 
 
+def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
+    table = candidate_table()
+    page, _ = page_of(kuka)
+    assert len(page["candidates"]) == 15
+    factors = [float(row["factor"].replace("\u2212", "-")) for row in page["candidates"]]
+    expected = np.sort(table["log_bayes_factor"][np.isfinite(table["log_bayes_factor"])])[::-1][:15]
+    np.testing.assert_allclose(factors, expected, atol=0.051)
+    assert [row["chosen"] for row in page["candidates"]].count("yes") == table["chosen"].sum()
+
+
 def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):
     page, data = page_of(kuka, "fault of the data", probabilities=None)
     write_loop_page(tmp_path / "report.html", page, data)
@@ -85,20 +99,22 @@ def test_the_page_names_nothing_that_a_browser_would_fetch(written):
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Debian's chromium is not installed")
-@pytest.mark.parametrize("width", [1280, 390])
-def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(written, width):
+@pytest.mark.parametrize(("width", "scheme"), [(1280, "light"), (390, "dark")])
+def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(written, width, scheme):
     from playwright.sync_api import sync_playwright
 
     faults, requests = [], []
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=IN_SOFTWARE)
-        page = browser.new_page(viewport={"width": width, "height": 844})
+        page = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
         page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
         page.goto(written.as_uri())
         page.wait_for_selector("body[data-ready=yes]", timeout=60_000)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+        papers = [page.evaluate(script) for script in (PAPER_OF_PAGE, PAPER_OF_PLOT)]
+        assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
 
         def drawn(plot):
             return page.evaluate(f"JSON.stringify(document.getElementById('{plot}').data)")

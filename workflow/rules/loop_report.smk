@@ -93,6 +93,7 @@ rule compile_loop_report:
         residuals=rules.judge_campaign.output.residuals,
         experiment="reports/loop/{campaign}/next_experiment.csv",
         diagnosis=rules.diagnose_campaign.output.diagnosis,
+        candidates=rules.diagnose_campaign.output.candidates,
         steps=rules.diagnose_campaign.output.steps,
         descriptions=rules.read_campaign.output.descriptions,
         figures=expand("reports/loop/{{campaign}}/figures/{figure}.pdf", figure=LOOP_FIGURES),

@@ -1,11 +1,21 @@
 "use strict";
 // Draws the page of a campaign from the JSON that stands in it; colours and dashes tell before from after without colour, too.
 const data = JSON.parse(document.getElementById("data").textContent);
-const BEFORE = { name: "before", color: "#d55e00", dash: "solid", symbol: "circle-open" };
-const AFTER = { name: "after", color: "#0072b2", dash: "dash", symbol: "cross" };
+const BEFORE = { name: "before", dash: "solid", symbol: "circle-open" };
+const AFTER = { name: "after", dash: "dash", symbol: "cross" };
 const SETTINGS = { responsive: true, displaylogo: false, displayModeBar: false };
 const find = (id) => document.getElementById(id);
 const chosen = (value) => [BEFORE, AFTER].filter((step) => value === "both" || value === step.name);
+
+// Colours are those of the page, which has a light and a dark set.
+const ink = {};
+function takeColours() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of ["paper", "ink", "grid", "robot", "before", "after"]) ink[name] = style.getPropertyValue(`--${name}`).trim();
+  BEFORE.color = ink.before;
+  AFTER.color = ink.after;
+}
+const sheet = () => ({ paper_bgcolor: ink.paper, plot_bgcolor: ink.paper, font: { color: ink.ink } });
 
 // The robot in space.
 const eye = { x: 0.95, y: -0.95, z: 0.45 };
@@ -32,16 +42,16 @@ function robot() {
   const [x, y, z] = [0, 1, 2].map((k) => data.outlines[find("pose").value].map((corner) => corner[k]));
   return {
     type: "scatter3d", mode: "lines+markers", name: "robot", x, y, z, hoverinfo: "name",
-    line: { color: "#444444", width: 12 }, marker: { color: "#444444", size: 4 },
+    line: { color: ink.robot, width: 12 }, marker: { color: ink.robot, size: 4 },
   };
 }
 
 function drawRobot() {
   find("factor-out").textContent = Number(factor().toPrecision(2)).toLocaleString("en");
   find("pose-out").textContent = data.poses[find("pose").value];
-  const axis = { zeroline: false, gridcolor: "#d9d9d9", title: { font: { size: 12 } } };
+  const axis = { zeroline: false, gridcolor: ink.grid, title: { font: { size: 12 } } };
   const layout = {
-    margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", legend: { orientation: "h", y: 0 },
+    ...sheet(), margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", legend: { orientation: "h", y: 0 },
     scene: {
       aspectmode: "data", camera: { eye: { ...eye } }, xaxis: { ...axis, title: { text: "x (m)" } },
       yaxis: { ...axis, title: { text: "y (m)" } }, zaxis: { ...axis, title: { text: "z (m)" } },
@@ -85,7 +95,8 @@ function drawCauses() {
     type: "bar", orientation: "h", x: rows.map((row) => 100 * row.probability), y: rows.map((row) => wrapped(row.name)),
     text: rows.map((row) => row.words), textposition: "auto", marker: { color: AFTER.color }, hoverinfo: "skip",
   }], {
-    margin: { l: 10, r: 10, t: 10, b: 40 }, xaxis: { title: { text: "posterior probability (%)" }, range: [0, 105] },
+    ...sheet(), margin: { l: 10, r: 10, t: 10, b: 40 },
+    xaxis: { title: { text: "posterior probability (%)" }, range: [0, 105], gridcolor: ink.grid },
     yaxis: { automargin: true, tickfont: { size: 12 } },
   }, SETTINGS);
 }
@@ -113,9 +124,11 @@ function drawScatter() {
       });
     }
   }
+  const axis = { gridcolor: ink.grid, zerolinecolor: ink.ink };
   Plotly.react("scatter", traces, {
-    margin: { l: 60, r: 10, t: 10, b: 45 }, legend: { orientation: "h", y: 1.12 },
-    xaxis: { title: { text: `${against.name} (${against.unit})` } }, yaxis: { title: { text: `residual, ${words} (µm)` } },
+    ...sheet(), margin: { l: 60, r: 10, t: 10, b: 45 }, legend: { orientation: "h", y: 1.12 },
+    xaxis: { ...axis, title: { text: `${against.name} (${against.unit})` } },
+    yaxis: { ...axis, title: { text: `residual, ${words} (µm)` } },
   }, SETTINGS);
   find("scatter-words").textContent = `Root mean square, ${words}: ${sums.join(", ")}.`;
 }
@@ -127,7 +140,12 @@ find("pose").value = 0;
 find("factor").value = 50;
 for (const id of ["which", "factor", "pose"]) find(id).addEventListener("input", drawRobot);
 for (const id of ["component", "against", "step"]) find(id).addEventListener("input", drawScatter);
-if (data.outlines.length) drawRobot();
-drawCauses();
-drawScatter();
+function drawAll() {
+  takeColours();
+  if (data.outlines.length) drawRobot();
+  drawCauses();
+  drawScatter();
+}
+window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawAll);
+drawAll();
 document.body.dataset.ready = "yes";

@@ -14,10 +14,10 @@ from jinja2 import Environment
 from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
-from elastocal.diagnosis.words import hypotheses_words
+from elastocal.diagnosis.words import candidate_words, hypotheses_words
 from elastocal.io.atomic_writes import write_text
 from elastocal.mechanics.kinematics import corners
-from elastocal.report.wording import MICRO, capital, grouped, probability_words
+from elastocal.report.wording import MICRO, capital, grouped, minus, probability_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,13 +29,30 @@ if TYPE_CHECKING:
 _MOST_SHOWN = 4000
 # Poses in which the robot can be drawn.
 _POSES = 40
+# Candidates that a page lists.
+_LEADING = 15
 # Arrows of the middle length are this share of the width of what they are drawn in.
 _ARROW = 0.03
-_FACTS = ("campaign", "robot", "made", "verdict", "sentences", "held_out_sentence", "probabilities", "now", "warnings")
+_FACTS = (
+    "campaign",
+    "robot",
+    "made",
+    "verdict",
+    "sentences",
+    "held_out_sentence",
+    "probabilities",
+    "now",
+    "warnings",
+    "remainder",
+)
 
 
 def loop_page(
-    facts: Mapping[str, Any], verdict: Mapping[str, Any], table: Mapping[str, np.ndarray], robot: Robot
+    facts: Mapping[str, Any],
+    verdict: Mapping[str, Any],
+    table: Mapping[str, np.ndarray],
+    candidates: Mapping[str, np.ndarray],
+    robot: Robot,
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """What the page of a campaign says, and what it draws.
 
@@ -47,6 +64,8 @@ def loop_page(
         Contents of verdict.json.
     table : dict of str to ndarray (N,)
         Columns of the residuals.
+    candidates : dict of str to ndarray (K,)
+        Columns of the candidates table.
     robot : Robot
         As declared.
 
@@ -82,7 +101,7 @@ def loop_page(
         "hypotheses": hypotheses,
     }
     page = {name: facts[name] for name in _FACTS}
-    page |= {"hypotheses": hypotheses, "effects": facts["effects"]}
+    page |= {"hypotheses": hypotheses, "candidates": _candidates(candidates), "effects": facts["effects"]}
     page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
     page["shown_sentence"] = (
         "" if len(shown) == count else f"{grouped(len(shown))} of {grouped(count)} measurements are shown, evenly spread."
@@ -106,6 +125,22 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = Environment(autoescape=True).from_string(template)
     write_text(path, text.render(page=page, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs())))
+
+
+def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
+    """The leading candidates, worded."""
+    factors = table["log_bayes_factor"]
+    order = np.argsort(-np.nan_to_num(factors, nan=-np.inf), kind="stable")[:_LEADING]
+    return [
+        {
+            "name": capital(candidate_words(str(table["candidate"][row]))),
+            "factor": minus(f"{factors[row]:.1f}"),
+            "words": probability_words(table["probability"][row]),
+            "chosen": "yes" if table["chosen"][row] else "",
+        }
+        for row in order
+        if np.isfinite(factors[row])
+    ]
 
 
 def _spread(count: int, most: int) -> np.ndarray:
