@@ -178,7 +178,7 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
     if spring.effect == "joint_compliance":
         values, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
-        sprung = (with_springs(around, values + row, corrections) for row in np.diag(steps))
+        sprung: Iterator[Conditions] = (with_springs(around, values + row, corrections) for row in np.diag(steps))
     else:
         sprung = _with_each_correction(around, coordinates, steps)
     for law, step, changed in zip(laws, steps, sprung, strict=True):
