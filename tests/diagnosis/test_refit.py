@@ -7,7 +7,7 @@ import pytest
 from planted import planted
 
 from elastocal.diagnosis.linearize import linearized
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.refit import Selected, fit_with_sizes, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import Model, posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
@@ -51,6 +51,16 @@ def test_priors_arrive_in_the_fit(found):
     precision = np.array([0.0 if p.prior_std is None else p.prior_std**-2 for _, p in final.parameters])
     expected = np.linalg.inv(left.T @ left + np.diag(precision))
     np.testing.assert_allclose(np.diag(final.covariance), np.diag(expected), rtol=1e-2)
+
+
+def test_a_later_fit_starts_from_the_shapes_that_one_before_has_found(kuka):
+    campaign = planted(kuka, {"thermal_growth[time]": [2e-5]}, seed=4)
+    candidate = campaign.candidates["thermal_growth[time]"]
+    tried = Selected(((candidate, np.array([candidate.shapes[0].start])),), 1.0)
+    found = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, tried)
+    ((same, shapes),) = with_shapes_of(tried, found).effects
+    assert same is candidate and shapes[0] != candidate.shapes[0].start
+    assert shapes[0] == found.values_of(candidate.key)[1][0]
 
 
 def test_the_fit_finds_what_was_planted_and_converges(found):

@@ -23,6 +23,7 @@ import elastocal.effects
 from elastocal.campaigns.campaign import Target
 from elastocal.effects import catalogue
 from elastocal.effects.catalogue import candidates_on, declared_candidates
+from elastocal.effects.conditions import with_total
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.mechanics.kinematics import poses
@@ -255,6 +256,19 @@ def test_odd_effects_turn_their_sign_with_the_load(fanuc):
         odd = "load" in candidate.needs and candidate.effect != "force_bias"
         expected = (-1 if odd else 1) * displacements(candidate, one, *start)
         np.testing.assert_allclose(displacements(candidate, opposite, *start), expected, rtol=1e-12, err_msg=candidate.key)
+
+
+def test_laws_go_with_the_loads_of_no_other_coordinates_than_they_displace(chain):
+    """What errors of masses do by way of an effect is asked for on these coordinates alone."""
+    around = conditions_on(chain, made_states(chain.coordinates, 6, seed=12))
+    for candidate in candidates_on(around.sites).values():
+        start = [shape.start for shape in candidate.shapes]
+        laws = candidate.displacement(around, *start)
+        displaced = sorted({coordinate for law in laws for coordinate in law})
+        elsewhere = 2.0 * around.total + 1.0
+        elsewhere[:, displaced] = around.total[:, displaced]
+        again = displacements(candidate, with_total(around, elsewhere), *start)
+        np.testing.assert_array_equal(again, displacements(candidate, around, *start), err_msg=candidate.key)
 
 
 @pytest.mark.parametrize("family", ["elastic", "gearbox", "load"])

@@ -157,6 +157,21 @@ def test_torques_of_masses_are_slopes_of_the_gravity(fanuc):
     np.testing.assert_allclose(made[..., :6], around.mass_torques * around.compliance, rtol=1e-14)
 
 
+@pytest.mark.parametrize("name", ["fanuc", *ODD_CHAINS])
+@pytest.mark.parametrize("some", [slice(None), slice(2, None, 3), slice(1, 2)])
+def test_growth_of_gravity_with_each_correction_is_its_slope_on_the_coordinates_asked_for(fanuc, name, some):
+    robot = weighed(fanuc if name == "fanuc" else robot_of(ODD_CHAINS[name]))
+    around = conditions_on(robot, made_states(robot.joints, 5, seed=8))
+    coordinates = np.arange(around.sites.chain.coordinates)[some]
+    found = list(around.gravity_of_corrections(coordinates))
+    assert len(found) == len(around.mass_corrections) >= 4
+    for number, grown in enumerate(found):
+        step = np.zeros(len(around.mass_corrections))
+        step[number] = 0.5
+        change = (with_springs(around, around.compliance, step).gravity - around.gravity)[:, coordinates] / 0.5
+        np.testing.assert_allclose(grown, change.T, rtol=0, atol=1e-10)
+
+
 def test_priors_are_those_of_the_robot_file(fanuc):
     robot = replace(fanuc, masses=(Mass(2, 200.0, (0.3, 0.0, 0.4), 0.1), Mass(3, 50.0, (0.0, 0.0, 0.01), 0.2)))
     found = candidate(sites_of(robot)).parameters

@@ -8,7 +8,7 @@ import statsmodels.api as sm
 from fitted_models import bent, gantry_model, gantry_states, linear_law, model_of, seen_off, waves
 from scipy.optimize import minimize
 from scipy.stats import chi2
-from synthetic import NOISE, made_estimate, made_states, seen_exactly, with_noise
+from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
 
 from elastocal.campaigns.campaign import Target
 from elastocal.effects.protocol import Candidate, Parameter, Shape
@@ -19,6 +19,7 @@ from elastocal.fitting.noise import Noise
 from elastocal.fitting.parameters import stepped
 from elastocal.fitting.prediction import residuals
 from elastocal.fitting.robust import robustly
+from elastocal.mechanics.robot import Mass
 
 
 def robust_objective(found):
@@ -47,7 +48,7 @@ def test_outliers_get_little_weight_and_do_little_harm(fanuc):
     assert np.abs(pulled[-1]) > 3 * shift
 
 
-@pytest.mark.parametrize(("seed", "lag"), [(3, 1500.0), (24, 900.0), (25, 1500.0), (11, 20000.0)])
+@pytest.mark.parametrize(("seed", "lag"), [(3, 1500.0), (24, 900.0), (25, 1500.0)])
 def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, lag, monkeypatch):
     model, seen = bent(fanuc, seed, lag)
     found = fit(model, seen, NOISE)
@@ -56,6 +57,38 @@ def test_steps_that_do_not_help_are_halved_until_the_fit_converges(fanuc, seed, 
     whole = fit(model, seen, NOISE)
     assert not whole.converged
     assert robust_objective(found) < robust_objective(whole) - 0.01
+
+
+# Heavy links whose masses are known to a tenth: errors of the masses and links that bend under them explain much alike, and
+# both at once enter as a product.
+MASSES = (Mass(1, 250.0, (0.1, 0, 0), 0.1), Mass(2, 310.0, (0.5, 0, 0), 0.1), Mass(3, 155.0, (0.1, 0, 0.1), 0.1))
+SHARP = replace(NOISE, position_m=6e-6)
+
+
+@pytest.mark.parametrize(("count", "seed"), [(60, 4), (120, 3), (120, 4)])
+def test_steps_follow_the_bent_valley_of_a_product_of_parameters(fanuc, count, seed, monkeypatch):
+    robot = replace(fanuc, masses=(*MASSES, Mass(4, 78.0, (0.3, 0, 0), 0.1)))
+    target = Target("A", "6DoF", (0.0, 0.0, 0.0))
+    offsets = [candidate_on(robot, f"joint_offset@{joint}") for joint in (2, 3)]
+    bare = made_model(robot, (target,), fitted_frames=False, compliance=fanuc.compliance, effects=offsets)
+    bends = candidate_on(robot, "link_elasticity@1+2+3+6[one section]")
+    bends = replace(bends, parameters=tuple(replace(parameter, prior_std=3e-8) for parameter in bends.parameters))
+    model = bare.with_effects([bends])
+    true = made_estimate(model, seed=seed)
+    true = replace(true, coefficients=(*true.coefficients[:-1], np.array([3e-8, 3e-8])))
+    states = made_states(6, count, seed, force=0.0, span=1.5)
+    seen = with_noise(seen_exactly(model, true, states), np.random.default_rng(seed), SHARP.position_m)
+    # Where the masses have taken what the links do.
+    start = fit(bare, seen, SHARP).estimate.with_effects([bends])
+    expected = fit(model, seen, SHARP, start)
+    monkeypatch.setattr("elastocal.fitting.robust._STEPS", 3)
+    found = fit(model, seen, SHARP, start)
+    assert expected.converged
+    number = [parameter.name for _, parameter in expected.parameters].index("bending_1_over_EI")
+    bending, after = expected.estimate.coefficients[-1][0], found.estimate.coefficients[-1][0]
+    deviation = np.sqrt(expected.covariance[number, number])
+    assert bending > 10 * deviation
+    assert abs(after - bending) < 0.2 * deviation
 
 
 def test_fit_that_converged_is_at_a_minimum_of_its_objective(fanuc):

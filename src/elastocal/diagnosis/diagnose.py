@@ -13,7 +13,7 @@ from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
-from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected
+from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
@@ -171,7 +171,7 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
             break
         before = named
     if named:
-        final = fit_with_sizes(declared, case.observations, noise, chosen, about)
+        final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
     else:
         final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
@@ -181,7 +181,8 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
 def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> list[Step]:
     """One step for each mechanism, that which explains most first, each with those before it; of many, the rest together."""
     model = found.posterior.models[found.conclusion.best.model]
-    chosen, explained = selected(found.linearized, model), squares_explained(found.linearized.problem, model)
+    chosen = with_shapes_of(selected(found.linearized, model), final)
+    explained = squares_explained(found.linearized.problem, model)
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]

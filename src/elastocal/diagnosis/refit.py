@@ -65,6 +65,23 @@ def selected(linearized: Linearized, model: Model) -> Selected:
     return Selected(tuple(effects), linearized.declared_size)
 
 
+def with_shapes_of(chosen: Selected, fitted: Fit) -> Selected:
+    """A selected model with the values of shapes that a fit of it found.
+
+    Parameters
+    ----------
+    chosen : Selected
+    fitted : Fit
+        That has all its effects.
+
+    Returns
+    -------
+    Selected
+    """
+    effects = tuple((candidate, fitted.values_of(candidate.key)[1]) for candidate, _ in chosen.effects)
+    return replace(chosen, effects=effects)
+
+
 def fit_with_sizes(
     declared: Fit, observations: Observations, noise: Noise, chosen: Selected, near: Fit | None = None, **options: float
 ) -> Fit:

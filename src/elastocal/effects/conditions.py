@@ -20,6 +20,7 @@ from elastocal.mechanics.motion import Motion, motion
 from elastocal.mechanics.sites import Sites
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from typing import Protocol
 
     class States(Protocol):
@@ -114,9 +115,29 @@ class Conditions:
             on_each += self._falling[1][i] * (self._behind @ first[:, i])
         return self.motion.by_coordinate(on_each).T
 
-    def gravity_of_correction(self, number: int) -> np.ndarray:
-        """By how much `gravity` grows with one of the `mass_corrections`, per unit, ndarray (S, C)."""
-        return self._weighing(*self._correction(number), slice(None))
+    def gravity_of_corrections(self, coordinates: Sequence[int]) -> Iterator[np.ndarray]:
+        """By how much `gravity` on some coordinates, in rising order, grows with each of the `mass_corrections`, per unit.
+
+        Yields
+        ------
+        ndarray (number of the coordinates, S)
+        """
+        moved = self.motion
+        chosen = np.flatnonzero(np.isin(moved.coordinate, coordinates))
+        place, row = moved.place[chosen], np.searchsorted(coordinates, moved.coordinate[chosen])
+        falling, turning = self._falling[0][chosen], [each[chosen] for each in self._falling[1]]
+        for number in range(len(self.mass_corrections)):
+            after, first_moment, mass = self._correction(number)
+            on_each = sum(turning[i] * first_moment[i] for i in range(3))
+            if mass:
+                on_each += mass * falling
+            on_each[place >= after] = 0.0
+            if len(chosen) == len(coordinates):
+                yield on_each
+            else:
+                on_coordinates = np.zeros((len(coordinates), on_each.shape[1]))
+                np.add.at(on_coordinates, row, on_each)
+                yield on_coordinates
 
     @cached_property
     def total(self) -> np.ndarray:
@@ -147,13 +168,10 @@ class Conditions:
             return after, rotation[:, kind - 1], 0.0
         return after, self._body_position[body] + np.tensordot(self.sites.masses[body].centre_m, rotation, (0, 1)), 1.0
 
-    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0, transforms: slice | None = None) -> np.ndarray:
-        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n).
-
-        Or the generalized force on the coordinates of other moving transforms.
-        """
+    def _weighing(self, after: int, first_moment: np.ndarray, mass: float = 1.0) -> np.ndarray:
+        """Torque on each joint of a mass and its first moment (3, S) behind so many transforms, ndarray (S, n)."""
         moved = self.motion
-        chosen = transforms or slice(np.searchsorted(moved.coordinate, self.sites.joints))
+        chosen = slice(np.searchsorted(moved.coordinate, self.sites.joints))
         falling, turning = self._falling
         on_each = mass * falling[chosen] + sum(turning[i][chosen] * first_moment[i] for i in range(3))
         return moved.by_coordinate(on_each * (moved.place[chosen] < after)[:, None]).T
@@ -315,11 +333,13 @@ def with_springs(conditions: Conditions, compliance: np.ndarray, mass_correction
     for name in ("load", "gravity", "total", "mass_torques", "_falling", "_behind", "end_jacobian", "weight"):
         if name in vars(conditions) and (same or name not in ("gravity", "total")):
             vars(changed)[name] = vars(conditions)[name]
-    off = mass_corrections - conditions.mass_corrections
-    if np.count_nonzero(off) == 1 and "gravity" in vars(conditions):
-        # Gravity is linear in the masses.
-        number = int(np.flatnonzero(off)[0])
-        vars(changed)["gravity"] = conditions.gravity + off[number] * conditions.gravity_of_correction(number)
+    return changed
+
+
+def with_total(conditions: Conditions, total: np.ndarray) -> Conditions:
+    """The same states under another `Conditions.total` load, ndarray (S, C), whatever makes it."""
+    changed = replace(conditions)
+    vars(changed).update(vars(conditions) | {"total": total})
     return changed
 
 

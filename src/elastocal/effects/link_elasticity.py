@@ -14,6 +14,7 @@ References
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,13 +50,18 @@ def candidates(sites: Sites) -> list[Candidate]:
 
 
 def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
+    # A fit asks for the same taper under one load after the other.
+    compliances = lru_cache(maxsize=4)(lambda taper: [_end_compliance(sites, link, taper) for link in links])
+
     def displacement(conditions: Conditions, taper: float) -> Displacements:
         bent: dict[int, np.ndarray] = {}
         twisted: dict[int, np.ndarray] = {}
-        for link in links:
-            bending, torsion = _deflection(sites, link, conditions.total, taper)
-            bent |= bending
-            twisted |= torsion
+        load = conditions.total.T
+        for link, (bending, torsion) in zip(links, compliances(float(taper)), strict=True):
+            coordinates = sites.link_end[link]
+            wrench = load[list(coordinates)]
+            bent |= zip(coordinates, bending @ wrench, strict=True)
+            twisted |= zip(coordinates[3:], torsion @ wrench[3:], strict=True)
         return [bent, twisted]
 
     joints = tuple(k for k in links if k)
@@ -64,23 +70,17 @@ def _candidate(sites: Sites, links: tuple[int, ...], detail: str) -> Candidate:
     )
 
 
-def _deflection(sites: Sites, link: int, load: np.ndarray, taper: float) -> tuple[dict[int, np.ndarray], dict[int, np.ndarray]]:
-    """Displacement of the far end of a link for a unit of 1/EI and of 1/GJ."""
+def _end_compliance(sites: Sites, link: int, taper: float) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement of the far end of a link by its wrench for a unit of 1/EI, (6, 6), and its turn by the moment for 1/GJ."""
     shift_by_force, by_either, turn_by_moment = _flexibilities(taper)
-    coordinates = sites.link_end[link]
     length = np.linalg.norm(sites.link_vectors_m[link])
     along = sites.link_vectors_m[link] / length
     lengthwise = np.outer(along, along)
     across, turned = np.eye(3) - lengthwise, np.cross(np.eye(3), along).T * by_either * length**2
-    # Linear in force and moment: one product for all states.
     bending = np.block(
         [[shift_by_force * length**3 * across, turned @ across], [-turned @ across, turn_by_moment * length * across]]
     )
-    wrench = load.T[list(coordinates)]
-    return (
-        dict(zip(coordinates, bending @ wrench, strict=True)),
-        dict(zip(coordinates[3:], turn_by_moment * length * lengthwise @ wrench[3:], strict=True)),
-    )
+    return bending, turn_by_moment * length * lengthwise
 
 
 def _flexibilities(taper: float) -> list[float]:

@@ -140,7 +140,8 @@ class Candidate:
         In which the displacement is linear.
     displacement : callable
         ``displacement(conditions, *shapes)`` gives for each parameter a dict from a coordinate of the sites to its
-        displacement per unit of the parameter, ndarray (S,).
+        displacement per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it
+        displaces, of no others.
     needs : frozenset of str
         What must be there, see `conditions.offered`: "load", "external load", "approach", "time", "temperature".
     shapes : tuple of Shape

@@ -1,7 +1,7 @@
 """What the data identify: least squares over that alone, all else held at its value and named."""
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotrf
 
 # Correlation beyond which a parameter is not identifiable because of a shape.
 _BOUND_TO_SHAPE = 0.5
@@ -92,7 +92,7 @@ def solve_normal(
 def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) -> np.ndarray:
     """Which parameters the data distinguish from zero at their plausible size: first given those before them, then given all.
 
-    Forward selection in the order given, by the pivots of a sequential Cholesky decomposition, then backward elimination.
+    Forward selection in the order given, by the pivots of a Cholesky decomposition, then backward elimination.
 
     Parameters
     ----------
@@ -107,17 +107,9 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
     -------
     ndarray of bool (P,)
     """
-    kept: list[int] = []
-    factor = np.zeros_like(gram)
-    for number in range(len(gram)):
-        if frozen[number]:
-            continue
-        row = solve_triangular(factor[: len(kept), : len(kept)], gram[kept, number], lower=True) if kept else np.zeros(0)
-        left_over = gram[number, number] - row @ row
-        # Rounding of the squares counts as nothing.
-        if left_over > max(1.0, 1e-11 * gram[number, number]):
-            factor[len(kept), : len(kept)], factor[len(kept), len(kept)] = row, np.sqrt(left_over)
-            kept.append(number)
+    kept = np.flatnonzero(~frozen).tolist()
+    while (first := _first_without_information(gram[np.ix_(kept, kept)])) is not None:
+        kept.pop(first)
     # Parameters that came later may have taken from what identified their predecessors.
     while kept:
         covariance = np.linalg.inv(gram[np.ix_(kept, kept)])
@@ -131,3 +123,18 @@ def identifiable(gram: np.ndarray, frozen: np.ndarray, nonlinear: np.ndarray) ->
     mask = np.zeros(len(gram), bool)
     mask[kept] = True
     return mask
+
+
+def _first_without_information(gram: np.ndarray) -> int | None:
+    """The first of some parameters that those before it leave not enough information on; None where there is none."""
+    if not len(gram):
+        return None
+    # Where a pivot is not positive, LAPACK says which (from 1), and has those before it.
+    factor, number = dpotrf(gram, lower=1)
+    known = number - 1 if number else len(gram)
+    left_over = np.diag(factor)[:known] ** 2
+    # Rounding of the squares counts as nothing.
+    lacking = left_over <= np.maximum(1.0, 1e-11 * np.diag(gram)[:known])
+    if lacking.any():
+        return int(np.argmax(lacking))
+    return known if number else None

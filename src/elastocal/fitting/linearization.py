@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects import declared_weight
-from elastocal.effects.conditions import Conditions, with_springs
-from elastocal.fitting.displacement import displace, displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
+from elastocal.effects.conditions import Conditions, with_springs, with_total
+from elastocal.fitting.displacement import displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
 from elastocal.mechanics.motion import motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.model import Estimate, Model
@@ -173,23 +173,40 @@ def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Co
     others = [found for found in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True) if through(found[0])]
     if not others:
         return laws
-
-    def of_others(springs: Conditions) -> np.ndarray:
-        displaced = np.zeros_like(around.load)
-        for other in others:
-            displace(displaced, *other, springs)
-        return displaced
-
-    values, present = joint_compliances(model, estimate), of_others(around)
-    corrections = mass_corrections(model, estimate)
-    for number, parameter in enumerate(spring.parameters):
-        step = np.zeros(len(laws))
-        step[number] = _SPRING_STEP * parameter.plausible
-        moved = (values + step, corrections) if spring.effect == "joint_compliance" else (values, corrections + step)
-        change = (of_others(with_springs(around, *moved)) - present) / step[number]
-        for coordinate in np.flatnonzero(change.any(axis=0)).tolist():
-            laws[number][coordinate] = laws[number].get(coordinate, 0.0) + change[:, coordinate]
+    present = _displaced_by(others, around)
+    coordinates = sorted(present)
+    steps = np.array([_SPRING_STEP * parameter.plausible for parameter in spring.parameters])
+    if spring.effect == "joint_compliance":
+        values, corrections = joint_compliances(model, estimate), mass_corrections(model, estimate)
+        sprung: Iterator[Conditions] = (with_springs(around, values + row, corrections) for row in np.diag(steps))
+    else:
+        sprung = _with_each_correction(around, coordinates, steps)
+    for law, step, changed in zip(laws, steps, sprung, strict=True):
+        moved = _displaced_by(others, changed)
+        for coordinate in coordinates:
+            change = (moved[coordinate] - present[coordinate]) / step
+            if change.any():
+                law[coordinate] = law.get(coordinate, 0.0) + change
     return laws
+
+
+def _with_each_correction(around: Conditions, coordinates: list[int], steps: np.ndarray) -> Iterator[Conditions]:
+    """Conditions with one error of a mass after the other changed by a step, as loads on some coordinates have it."""
+    total = around.total.T.copy()
+    present = total[coordinates]
+    for step, per_unit in zip(steps, around.gravity_of_corrections(coordinates), strict=True):
+        total[coordinates] = present + step * per_unit
+        yield with_total(around, total.T)
+
+
+def _displaced_by(effects: Iterable[tuple[Candidate, np.ndarray, np.ndarray]], around: Conditions) -> dict[int, np.ndarray]:
+    """What some effects do together to each coordinate that they displace."""
+    displaced: dict[int, np.ndarray] = {}
+    for effect, values, shapes in effects:
+        for value, law in zip(values, effect.displacement(around, *shapes), strict=True):
+            for coordinate, per_unit in law.items():
+                displaced[coordinate] = displaced.get(coordinate, 0.0) + value * per_unit
+    return displaced
 
 
 def _through_compliance(effect: Candidate) -> bool:

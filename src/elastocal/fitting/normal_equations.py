@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -56,10 +57,16 @@ class Parts:
             self.around = [at_states(around, states) for states, _ in self.slices]
         self.coordinates: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.whiteners: dict[int, Whitening | Scaling] = {}
-        # Of so many states that conditions are not kept neither is this.
-        shape = len(observations), observations.rows, model.sites.joints
-        self.jacobian = None if around is None else np.zeros(shape)
+        # Of so many states that conditions are not kept neither are these.
+        self.jacobians: dict[int, np.ndarray] | None = None if around is None else {}
         self.line: Linearization | None = None
+
+    def copy(self) -> Parts:
+        """The same, which goes its own way from here."""
+        other = copy(self)
+        other.around, other.coordinates, other.whiteners = self.around.copy(), self.coordinates.copy(), self.whiteners.copy()
+        other.jacobians = None if self.jacobians is None else self.jacobians.copy()
+        return other
 
     def linearize(self, estimate: Estimate) -> None:
         """Go to an estimate."""
@@ -77,8 +84,8 @@ class Parts:
         self.origin = self.estimate
         if self.line is not None:
             self.around = [self.line.conditions]
-            self.jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
-            self.whiteners = {0: whitening(self.observations, self.jacobian, self.noise)}
+            jacobian = self.line.coordinate_jacobian[..., : self.model.sites.joints]
+            self.jacobians, self.whiteners = {0: jacobian}, {0: whitening(self.observations, jacobian, self.noise)}
         elif not self.whiteners:
             for number, part in enumerate(self.parts):
                 if self.noise.pose_rad or self.noise.joint_rad.any():
@@ -139,7 +146,8 @@ class Parts:
             residual = self.residual
             around = kept_conditions(model, estimate, self.observations)
         whitener = joined([*self.whiteners.values()], [seen.start for _, seen in self.slices])
-        return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, self.jacobian, around, converged)
+        jacobian = None if self.jacobians is None else np.concatenate([*self.jacobians.values()])
+        return Fit(model, estimate, self.noise, held, covariance, weights, whitener, residual, jacobian, around, converged)
 
     def _around(self, number: int, estimate: Estimate | None = None) -> Conditions:
         kept = self.around[number]
@@ -162,8 +170,8 @@ class Parts:
         else:
             self.around[number] = line.conditions
         jacobian = line.coordinate_jacobian[..., : self.model.sites.joints]
-        if self.jacobian is not None:
-            self.jacobian[self.slices[number][1]] = jacobian
+        if self.jacobians is not None:
+            self.jacobians[number] = jacobian
         self.whiteners[number] = whitening(part, jacobian, self.noise)
         return line
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
 
+    Solved = tuple[np.ndarray, np.ndarray, np.ndarray]
+
 _STEPS = 30
 # A step that does not help is halved so often at most: one of a 64th that does not help points the wrong way, or along a kink.
 _HALVINGS = 6
@@ -49,8 +51,10 @@ def robustly(
     which would carry an outlier into the measurements beside it, and the estimate solves the weighted equations [3]_. A
     whitening belongs to the axes in which a step begins: residuals after the step are turned into these, or a fit would turn
     frame and robot together on and on. Against curvature a step is backtracked until weighted squares and priors fall by
-    Armijo's condition [4]_. The first step gives all observations one weight, unless the start comes of reweighted steps
-    already.
+    Armijo's condition [4]_. Where that hinders the first trial, what is linear given the laws that other parameters load, and
+    given their shapes, is solved for again there, as in variable projection [5]_: that is the acceleration by which a path
+    follows a bent valley [6]_, in which steps are then halved. The first step gives all observations one weight, unless the
+    start comes of reweighted steps already.
 
     Parameters
     ----------
@@ -79,6 +83,10 @@ def robustly(
     .. [3] Preisser, J. S. and Qaqish, B. F., Robust regression for clustered data with application to binary responses,
        Biometrics 55, 1999.
     .. [4] Nocedal, J. and Wright, S. J., Numerical Optimization, section 3.1, Springer, 2006.
+    .. [5] Golub, G. H. and Pereyra, V., The differentiation of pseudo-inverses and nonlinear least squares problems whose
+       variables separate, SIAM Journal on Numerical Analysis 10, 1973.
+    .. [6] Transtrum, M. K. and Sethna, J. P., Improvements to the Levenberg-Marquardt algorithm for nonlinear least-squares
+       minimization, arXiv 1201.5885, 2012.
     """
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
@@ -94,6 +102,22 @@ def robustly(
         """Half the weighted squares of the residual and of what has a prior."""
         return 0.5 * (squares + penalty @ parameter_values(model, estimate) ** 2)
 
+    # Given what goes with the loads that other parameters make, and shapes, the residual is nearly linear in all others.
+    through = {effect.key for effect in model.effects if effect.effect == "joint_compliance" or "load" in effect.needs}
+    bending = nonlinear | np.array([owner in through for owner, _ in parameters(model, estimate)], bool)
+
+    def solved(gram: np.ndarray, along: np.ndarray, present: np.ndarray, frozen: bool | np.ndarray) -> Solved:
+        """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within the ranges of the shapes."""
+        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, nonlinear)
+        # A shape that would leave its range goes to the end of it, and the others as they do then.
+        leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
+        if leaving.any():
+            ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
+            rest = along - gram[:, leaving] @ (ends / plausible[leaving])
+            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, nonlinear)[0]
+            step[leaving] = ends
+        return step, covariance, held
+
     converged, scale, last, stuck = False, 1.0, np.zeros(len(plausible)), False
     measurements = Parts(model, observations, noise, around, plausible)
     measurements.linearize(estimate)
@@ -106,14 +130,7 @@ def robustly(
             weights = norm.weights(distance / scale)
         gram, along = measurements.normal_equations(weights)
         present = parameter_values(model, estimate)
-        step, covariance, held = solve_normal(gram, along, plausible, frozen, penalty, present, nonlinear)
-        # A shape that would leave its range goes to the end of it, and the others as they do then.
-        leaving = (present + step < bounds[:, 0]) | (present + step > bounds[:, 1])
-        if leaving.any():
-            ends = np.clip(present + step, *bounds.T)[leaving] - present[leaving]
-            rest = along - gram[:, leaving] @ (ends / plausible[leaving])
-            step = solve_normal(gram, rest, plausible, frozen | leaving, penalty, present, nonlinear)[0]
-            step[leaving] = ends
+        step, covariance, held = solved(gram, along, present, frozen)
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
         small = settled * (scale * deviation) + (deviation == 0)
@@ -123,19 +140,28 @@ def robustly(
             break
         # Weights and whitening follow the estimate. Where they throw it to and fro, half the way lies between (relaxation of a
         # fixed-point iteration): a step that takes back more than half of the last one is halved.
-        first = int(gram @ (step / plausible + last / 2) @ last < 0)
+        with_priors = gram + np.diag(penalty * plausible**2)
+        first = int(with_priors @ (step / plausible + last / 2) @ last < 0)
         last = step / plausible
         # Twice the fall that a parabola promises.
         slope = along @ (step / plausible) - penalty @ (present * step)
-        before, origin = objective(estimate, measurements.squares(weights)), estimate
+        before, origin, acceleration = objective(estimate, measurements.squares(weights)), estimate, np.zeros(len(step))
         for halving in range(first, _HALVINGS + 1):
-            estimate = stepped(model, origin, 0.5**halving * step)
+            share = 0.5**halving
+            estimate = stepped(model, origin, share * step + share**2 * acceleration)
             measurements.linearize(estimate)
             after = objective(estimate, measurements.squares(weights))
-            least = _LEAST_FALL * 0.5**halving * slope - _ROUNDING * max(before, 1.0)
+            least = _LEAST_FALL * share * slope - _ROUNDING * max(before, 1.0)
             if after > before - least and halving == first:
                 # What it fell from was under the loads of the step before.
                 before = objective(origin, measurements.squares(weights, origin))
+                if after > before - least and bending.any():
+                    there = measurements.copy().normal_equations(weights)
+                    rest = solved(*there, parameter_values(model, estimate), frozen | bending)[0]
+                    acceleration = rest / share**2
+                    estimate = stepped(model, origin, share * step + share**2 * acceleration)
+                    measurements.linearize(estimate)
+                    after = objective(estimate, measurements.squares(weights))
             if after <= before - least:
                 break
         else:
