@@ -188,3 +188,21 @@ rule league_small:
 rule league:
     input:
         "reports/league/all/league.csv",
+
+
+rule league_pictures:
+    """Pictures and tables of docs/, from a finished league."""
+    input:
+        league="reports/league/all/league.png",
+        mechanisms="reports/league/all/mechanisms.png",
+        page="reports/league/all/league.md",
+    output:
+        league="docs/league.png",
+        mechanisms="docs/mechanisms.png",
+        page="docs/league_tables.md",
+    log:
+        "results/logs/league_pictures.log",
+    benchmark:
+        "results/timings/league_pictures.tsv"
+    shell:
+        "(cp {input.league} {output.league}; cp {input.mechanisms} {output.mechanisms}; cp {input.page} {output.page}) 2> {log}"
