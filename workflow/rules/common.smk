@@ -36,7 +36,7 @@ try:
     STUDY = check_study(config, CONFIG)
     SOURCES = campaign_sources(config, CONFIG)
     # Name and folder of the user's own campaign, if there is one.
-    OWN = user_campaign(config, f"{CONFIG}/robots")
+    OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")
 except InputError as error:
     sys.exit(str(error))
 
