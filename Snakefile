@@ -1,6 +1,9 @@
 """The study, every table and figure of the paper from seeds, and the loop on simulated campaigns: `snakemake -j2` makes both."""
 
 
+include: "workflow/rules/begin.smk"
+
+
 configfile: f"{workflow.basedir}/config.yaml"
 
 

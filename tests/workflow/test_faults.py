@@ -42,6 +42,18 @@ FAULTS = {
         lambda study: study.configure({"noise_um": [200, -50]}),
         ["config.yaml: noise_um[1]: ", "found -50", "allowed: 0 or more"],
     ),
+    "configuration that is no YAML": (
+        lambda study: study.append("config.yaml", "tables: [\n"),
+        ["config.yaml: line ", "allowed: YAML"],
+    ),
+    "key twice": (
+        lambda study: study.append("config.yaml", "seed: 2\n"),
+        ["config.yaml: line ", "'seed' again", "allowed: each key once (first in line 1)"],
+    ),
+    "no configuration": (
+        lambda study: study.path("config.yaml").unlink(),
+        ["config.yaml: found No such file", "allowed: a readable file"],
+    ),
     "chain that does not parse": (
         lambda study: study.replace(KUKA, "Rz(q1)", "Rz q1"),
         [f"{KUKA}: chain: ", "'Rz'", "allowed: Tx(length)"],
@@ -52,7 +64,7 @@ FAULTS = {
     ),
     "strategy with an unknown point": (
         _unknown_point,
-        ["config/strategies/3+6DoF-comb.yaml: stages[1].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
+        ["config/strategies/3+6DoF-comb.yaml: stages[0].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
     ),
     "data set too short to solve": (
         lambda study: study.configure(
@@ -84,6 +96,26 @@ def test_nothing_starts_and_one_line_says_why(fault, unstarted):
     assert lines[0].startswith(said[0])
     assert all(part in lines[0] for part in said)
     assert unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("-j1", "--config", "evaluation={studies: one}"),
+            "config.yaml with --config evaluation: evaluation.studies: found 'one'",
+        ),
+        (("-j1", "diagnose"), "diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER"),
+    ],
+)
+def test_a_faulty_command_ends_with_one_line_that_says_why(arguments, said, unstarted):
+    ended = unstarted.snakemake(*arguments)
+    assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(said)
+    assert "Traceback" not in ended.stderr and unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
+
+
+def test_numbers_inside_of_a_mapping_may_come_from_the_command_line(unstarted):
+    unstarted.planned("--config", "evaluation={bootstrap_replicates: 20}")
 
 
 def _truncate(path):

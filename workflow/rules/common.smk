@@ -8,8 +8,8 @@ import elastocal
 from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
-from elastocal.study.configuration import check_study, rows_read
 from elastocal.errors import InputError
+from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
@@ -32,8 +32,14 @@ CONFIG = placed(ROOT / "config")
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()
 
+# What --config says; Snakemake takes numbers inside of a mapping for texts.
+CHANGES = [entry for entry in workflow.config_settings.config_args or () if not entry.startswith("campaign=")]
+
 try:
-    STUDY = check_study(config, CONFIG)
+    config.update(with_overrides(config, CHANGES))
+    STUDY = check_study(
+        config, CONFIG, " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)])
+    )
     SOURCES = campaign_sources(config, CONFIG)
     # Name and folder of the user's own campaign, if there is one.
     OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")

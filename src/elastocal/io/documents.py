@@ -133,19 +133,41 @@ def read_document(path: str | Path) -> Any:
         if status.st_size > LARGEST_BYTES:
             raise InputError(path, "", f"{status.st_size} bytes", f"at most {LARGEST_BYTES} bytes of YAML")
         text = Path(path).read_text("utf-8")
-        if text.lstrip("\ufeff \r\n\t").startswith("<"):
-            raise InputError(path, "", "XML", _NOT_XML)
-        _check_events(text)
-        return yaml.load(text, Loader=_Loader)
     except OSError as error:
         raise InputError(path, "", error.strerror or str(error), "a readable file") from None
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    return parsed(text, path)
+
+
+def parsed(text: str, source: str | Path) -> Any:
+    """Contents of a YAML text.
+
+    Parameters
+    ----------
+    text : str
+    source : str or Path
+        Named in errors.
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    InputError
+        No YAML, such as a URDF, or YAML that is unclear or out of bounds; the line is named.
+    """
+    if text.lstrip("\ufeff \r\n\t").startswith("<"):
+        raise InputError(source, "", "XML", _NOT_XML)
+    try:
+        _check_events(text)
+        return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         where = "" if line is None else f"line {line + 1}"
         found = (getattr(error, "problem", None) or str(error)).removeprefix("but ").removeprefix("found ")
-        raise InputError(path, where, found, getattr(error, "allowed", "YAML")) from None
+        raise InputError(source, where, found, getattr(error, "allowed", "YAML")) from None
 
 
 def _check_events(text: str) -> None:
