@@ -149,6 +149,12 @@ def loop_reports(campaigns):
     return expand("reports/loop/{campaign}/{file}", campaign=campaigns, file=LOOP_REPORTS)
 
 
+def reports_of_own(wildcards):
+    if not OWN:
+        sys.exit("diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER")
+    return loop_reports(OWN)
+
+
 def folds_of_one(campaigns):
     """Campaigns that hold out the folds of the same measurements, by the importer of these."""
     folds = {}

@@ -146,12 +146,6 @@ rule summarize_campaigns:
         "../scripts/summarize_campaigns.py"
 
 
-def reports_of_own(wildcards):
-    if not OWN:
-        sys.exit("diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER")
-    return loop_reports(OWN)
-
-
 rule diagnose:
     input:
         reports_of_own,
