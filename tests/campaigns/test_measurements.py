@@ -210,6 +210,13 @@ def test_a_column_of_parquet_holds_numbers_or_text(cell, cell_of, found):
         read_campaign(cell.folder, cell.robots)
 
 
+def test_names_of_targets_in_parquet_are_text(cell):
+    cell.table["target"] = [b"A"] * len(cell.table["target"])
+    cell.write("parquet")
+    with refused(cell.folder / "measurements.parquet", "column target", "binary", "text"):
+        read_campaign(cell.folder, cell.robots)
+
+
 def test_one_file_of_measurements_must_be_there(cell):
     cell.write()
     cell.write("parquet")

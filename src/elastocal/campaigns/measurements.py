@@ -242,7 +242,7 @@ def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
 def _cells(path: str, name: str, column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
     """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
     kind = column.type
-    if pa.types.is_dictionary(kind):
+    if pa.types.is_dictionary(kind) and pa.types.is_string(kind.value_type):
         whole = column.unify_dictionaries().combine_chunks()
         words = [*map(sys.intern, whole.dictionary.to_pylist()), None]
         return [words[code] for code in whole.indices.fill_null(len(words) - 1).to_pylist()]

@@ -90,7 +90,7 @@ for _kind in ("int", "float"):
 def _each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[jsonschema.ValidationError]:
     """The rule uniqueItems in linear time: jsonschema compares each pair where numbers and lists are mixed."""
     if wanted and isinstance(instance, list):
-        entries = [json.dumps(entry, sort_keys=True, default=str) for entry in instance]
+        entries = [json.dumps(entry, default=str) for entry in instance]
         if len(set(entries)) < len(entries):
             yield jsonschema.ValidationError("an entry twice")
 
