@@ -3,13 +3,21 @@ PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
 
-.PHONY: paper test mutants lint bench pictures lock clean
+.PHONY: paper test fuzz soak mutants lint bench pictures lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
+
+# The tests of tests/fuzz with 90 times as many inputs, and others each time: 5 minutes.
+fuzz: .venv/ready-for-tests
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q tests/fuzz --hypothesis-profile=long
+
+# Forty kills at random moments, full disks, read-only folders, wrong clocks, two runs at once.
+soak: .venv/ready-for-tests
+	OMP_NUM_THREADS=1 $(BIN)/python tests/faults/soak.py $(SOAK)
 
 # How many small faults in the code the tests notice: a random sample, see tests/mutation/sample.py.
 mutants: .venv/ready-for-tests

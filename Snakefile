@@ -1,6 +1,9 @@
 """The study, every table and figure of the paper from seeds, and the loop on simulated campaigns: `snakemake -j2` makes both."""
 
 
+include: "workflow/rules/begin.smk"
+
+
 configfile: f"{workflow.basedir}/config.yaml"
 
 
@@ -23,6 +26,9 @@ include: "workflow/rules/planning.smk"
 include: "workflow/rules/league.smk"
 
 
+watch_sources()
+
+
 onsuccess:
     for line in outcome(file for job in workflow.dag.jobs for file in job.output):
         logger.info(line)
@@ -37,6 +43,7 @@ rule study:
         rules.tabulate_assumptions.output,
         expand("reports/tables/{table}.csv", table=["ladder", "designs", "observability"]),
         expand("reports/figures/{figure}.{format}", figure=FIGURES, format=["pdf", "png"]),
+        lambda wildcards: files_behind(rules.study.input),
 
 
 rule extended_study:
@@ -48,6 +55,7 @@ rule loop:
     input:
         loop_reports(config["loop"]["campaigns"]),
         "reports/loop/campaigns.csv",
+        lambda wildcards: files_behind(rules.loop.input),
 
 
 rule all:

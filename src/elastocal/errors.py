@@ -8,8 +8,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
+# A terminal shows a message as a whole: files may hold values of any length.
+LONGEST_MESSAGE = 500
+_LONGEST_SOURCE, _LONGEST_KEY, _LONGEST_FOUND = 160, 100, 120
+
+
 class InputError(ValueError):
-    """Something that a user gave cannot be used; the message is one line.
+    """Something that a user gave cannot be used; the message is one line of `LONGEST_MESSAGE` characters at most.
 
     Parameters
     ----------
@@ -25,5 +30,18 @@ class InputError(ValueError):
 
     def __init__(self, source: str | Path, key: str, found: str, allowed: str) -> None:
         self.source, self.key, self.found, self.allowed = str(source), key, found, allowed
-        where = f"{source}: {key}" if key else f"{source}"
-        super().__init__(" ".join(f"{where}: found {found}; allowed: {allowed}".split()))
+        name = _printed(self.source)
+        where = name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
+        where += f": {_shortened(_printed(key), _LONGEST_KEY)}" if key else ""
+        message = f"{where}: found {_shortened(_printed(found), _LONGEST_FOUND)}; allowed: "
+        super().__init__(message + _shortened(_printed(allowed), LONGEST_MESSAGE - len(message)))
+
+
+def _printed(text: str) -> str:
+    """A text on one line, control characters as their escapes: what a file holds must not steer a terminal."""
+    line = " ".join(text.split())
+    return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+
+
+def _shortened(text: str, longest: int) -> str:
+    return text if len(text) <= longest else f"{text[: longest - 1]}…"

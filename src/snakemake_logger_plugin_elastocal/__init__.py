@@ -34,6 +34,7 @@ _NO_NEWS = (
     "Provided cores",
     "Rules claiming more threads",
 )
+_LOCKED = "Directory cannot be locked"
 _FAILED = "At least one job did not complete successfully."
 
 
@@ -71,6 +72,9 @@ class LogHandler(LogHandlerBase):
             return [f"failed: {record.rule_name}"]
         if event == LogEvent.ERROR and self._failed and _FAILED in record.getMessage():
             return [_reason(rule, logs) for rule, logs in self._failed]
+        if _LOCKED in record.getMessage():
+            # Locks of runs that were killed are taken away before (workflow/rules/one_run.py).
+            return ["snakemake: found another run at work on the same files; allowed: the same command once that one has ended"]
         if event == LogEvent.ERROR and "CalledProcessError" in record.getMessage():
             # The output of the job itself stands above, and why it failed below.
             return []

@@ -1,5 +1,7 @@
 """Files of measurements: both kinds hold the same, and every fault of a file, a column or a cell is refused in one line."""
 
+import struct
+
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -38,11 +40,12 @@ def test_blank_rows_and_blanks_around_cells_are_passed_over_and_counted(cell):
         (7, "time_s", "-Infinity", ["'-Infinity'", "finite"]),
         (2, "pose", "1.5", ["'1.5'", "integer"]),
         (2, "repeat", "3000000000", ["'3000000000'", "integer"]),
+        (2, "q1", "1_0", ["'1_0'", "a number"]),
     ],
 )
 def test_faulty_cell_is_refused_by_row_and_column(cell, row, column, entry, words):
     cell.spoil(row, column, entry)
-    with refused(cell.measurements, f"row {row}, column {column}", *words):
+    with refused(cell.measurements, f"row {row}, column {column} (line {row + 1}):", *words):
         cell.read()
 
 
@@ -78,6 +81,56 @@ def test_column_that_is_there_twice_is_refused(cell):
         read_campaign(cell.folder, cell.robots)
 
 
+def test_lines_before_the_header_are_passed_over_and_counted(cell):
+    whole = cell.read().measurements
+    path = cell.folder / "measurements.csv"
+    path.write_text('# tracker "A, 20 °C\n\n  # poses\n' + path.read_text(encoding="utf-8"), encoding="utf-8")
+    assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
+    path.write_text(path.read_text(encoding="utf-8").replace("\n0,0,0,A", "\n0,0,no,A"), encoding="utf-8")
+    with refused(cell.measurements, "row 1, column repeat (line 5)", "'no'"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_a_file_is_read_alike_in_pieces_of_any_size(cell, monkeypatch):
+    whole = cell.read().measurements
+    monkeypatch.setattr("elastocal.campaigns.measurements._ROWS_AT_A_TIME", 7)
+    assert_same(read_campaign(cell.folder, cell.robots).measurements, whole)
+    cell.spoil(20, "x", "1,0")
+    with refused(cell.measurements, "row 20, column x (line 21)", "'1,0'"):
+        cell.read()
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_more_measurements_than_fit_into_memory_are_refused(cell, kind, monkeypatch):
+    cell.write(kind)
+    rows = len(cell.table["pose"])
+    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows)
+    assert len(read_campaign(cell.folder, cell.robots).measurements) == rows
+    monkeypatch.setattr("elastocal.campaigns.measurements.MOST_MEASUREMENTS", rows - 1)
+    with refused(f"{cell.folder}/measurements.{kind}", "", "rows of data", f"at most {rows - 1}"):
+        read_campaign(cell.folder, cell.robots)
+    monkeypatch.setattr("elastocal.campaigns.measurements._MOST_BYTES", 100)
+    with refused(f"{cell.folder}/measurements.{kind}", "", "bytes", "at most 100"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_rows_are_in_memory_as_numbers(cell, monkeypatch):
+    """40 times the rows take not 40 times the memory of their texts (60 bytes a cell)."""
+    import tracemalloc
+
+    from elastocal.campaigns import measurements
+
+    monkeypatch.setattr(measurements, "_ROWS_AT_A_TIME", 500)
+    cell.table = {name: cells * 250 for name, cells in cell.table.items()}
+    cell.write()
+    tracemalloc.start()
+    table = measurements.read_measurements(cell.folder, 3, "pose")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    cells = len(table.rows) * len(table.columns)
+    assert cells == 20_000 * 24 and peak < 25 * cells
+
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_other_separators_are_refused(cell, separator):
     cell.write(separator=separator)
@@ -92,7 +145,11 @@ def test_other_separators_are_refused(cell, separator):
         (b"pose,load\n", "", ["no row of data"]),
         (b"pose,load\n0,0\n0,0,0\n", "row 2", ["3 cells", "2, one for each column"]),
         (b'pose,load\n0,"0\n', "", ["comma-separated"]),
-        (b"pose,load\n0,\xff\n", "byte 12", ["not UTF-8"]),
+        (b"pose,load\n" + b"0,0\n" * 5000 + b"0,\xff\n", "line 5002", ["not UTF-8"]),
+        (b"pose,load\n0,0\n" + b"0" * 20_000 + b",0\n", "line 3", ["10000 characters or more"]),
+        (b"pose,load\n0,0\n\n0,0,0\n", "row 3 (line 4)", ["3 cells"]),
+        (b"," * 9000, "header", ["column '' twice"]),
+        (b"# only\n\n", "", ["an empty file"]),
     ],
 )
 def test_file_that_is_no_table_is_refused(cell, text, key, words):
@@ -125,6 +182,38 @@ def test_parquet_whose_text_is_no_utf8_is_refused(cell):
     path = cell.folder / "measurements.parquet"
     pq.write_table(pa.table(cell.table | {"target": broken}), path)
     with refused(path.as_posix(), "", "no readable Parquet file"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_one_altered_byte_of_parquet_with_checksums_is_found(cell):
+    cell.write()
+    path = cell.folder / "measurements.parquet"
+    pq.write_table(pa.table(cell.table), path, write_page_checksum=True, compression="none", use_dictionary=False)
+    (cell.folder / "measurements.csv").unlink()
+    read_campaign(cell.folder, cell.robots)
+    content = bytearray(path.read_bytes())
+    place = content.index(struct.pack("<d", cell.table["x"][10]))
+    content[place] ^= 1
+    path.write_bytes(content)
+    with refused(path.as_posix(), "", "no readable Parquet file"):
+        read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize(
+    ("cell_of", "found"),
+    [(lambda n: [[0.0]] * n, "list"), (lambda n: [b"1"] * n, "binary"), (lambda n: [True] * n, "bool")],
+)
+def test_a_column_of_parquet_holds_numbers_or_text(cell, cell_of, found):
+    cell.table["x"] = cell_of(len(cell.table["x"]))
+    cell.write("parquet")
+    with refused(cell.folder / "measurements.parquet", "column x", found, "numbers"):
+        read_campaign(cell.folder, cell.robots)
+
+
+def test_names_of_targets_in_parquet_are_text(cell):
+    cell.table["target"] = [b"A"] * len(cell.table["target"])
+    cell.write("parquet")
+    with refused(cell.folder / "measurements.parquet", "column target", "binary", "text"):
         read_campaign(cell.folder, cell.robots)
 
 

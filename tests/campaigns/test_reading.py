@@ -278,3 +278,27 @@ def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_no
     assert robot.masses == () and not robot.compliance_known
     cell.arm["compliance_urad_per_Nm"] = [1, 2, 3]
     assert cell.read().robot.masses and cell.read().robot.compliance_known
+
+
+@pytest.mark.parametrize("name", ["/etc/passwd", "../secret", "../../etc/passwd", "a\0b", "x" * 5000, "link.yaml"])
+def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name):
+    """The folder of robots is not outside."""
+    cell.write()
+    secret = cell.folder.parent / "secret"
+    secret.write_text("password: 1\n")
+    (cell.folder / "link.yaml").symlink_to(secret)
+    cell.document["robot"] = name
+    with refused(cell.source, "robot", "a file in this folder"):
+        cell.read()
+    cell.document["robot"] = "../robots/planar.yaml"
+    cell.read()
+
+
+@pytest.mark.parametrize("file", ["campaign.yaml", "measurements.csv"])
+def test_links_out_of_the_folder_are_refused_without_a_look_at_them(cell, file):
+    cell.write()
+    path = cell.folder / file
+    path.rename(cell.folder.parent / "elsewhere")
+    path.symlink_to(cell.folder.parent / "elsewhere")
+    with refused(path, "", "a link out of the campaign's folder"):
+        read_campaign(cell.folder, cell.robots)

@@ -1,9 +1,13 @@
 """Campaigns that a configuration names, and the user's own, are checked before any job starts; a fault is one line."""
 
+import json
+import shutil
+
 import pytest
 import yaml
 from support import refused
 
+from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_campaigns, named_league, user_campaign
 from elastocal.io.documents import read_document
 
@@ -103,15 +107,16 @@ def users_folder(tmp_path, **changes):
     folder = tmp_path / "cell"
     folder.mkdir()
     (folder / "campaign.yaml").write_text(yaml.safe_dump(document | changes))
+    (folder / "link.yaml").symlink_to("/etc/passwd")
     return folder.as_posix()
 
 
 def test_a_users_own_campaign_is_known_by_its_name(config, config_folder, tmp_path):
     folder = users_folder(tmp_path)
     for given in (folder, folder + "/"):
-        assert user_campaign(config | {"campaign": given}, config_folder / "robots") == {"cell7": folder}
-    assert user_campaign(config, config_folder / "robots") == {}
-    assert user_campaign(config | {"campaign": ""}, config_folder / "robots") == {}
+        assert user_campaign(config | {"campaign": given}, config_folder / "robots", tmp_path) == {"cell7": folder}
+    assert user_campaign(config, config_folder / "robots", tmp_path) == {}
+    assert user_campaign(config | {"campaign": ""}, config_folder / "robots", tmp_path) == {}
 
 
 OWN_FAULTS = {
@@ -124,6 +129,13 @@ OWN_FAULTS = {
     ),
     "name of a measured campaign": ({"campaign": "ur10_series_a"}, "campaign", ["ur10_series_a", "no campaign of"]),
     "no name": ({"campaign": ""}, "campaign", ["''"]),
+    "name that no file can have": ({"campaign": "x" * 81}, "campaign", ["80 or fewer"]),
+    "name that looks endless": ({"campaign": "ab" * 20}, "campaign", ["repetition"]),
+    "another campaign that is not there": ({"holdout": {"campaign": "../other"}}, "holdout.campaign", ["'../other'", "beside"]),
+    "itself for the test": ({"holdout": {"campaign": "."}}, "holdout.campaign", ["'.', the campaign itself"]),
+    "itself by a detour": ({"holdout": {"campaign": "../cell"}}, "holdout.campaign", ["the campaign itself"]),
+    "robot from elsewhere": ({"robot": "/etc/passwd"}, "robot", ["'/etc/passwd'", "a file in this folder"]),
+    "robot through a link": ({"robot": "link.yaml"}, "robot", ["'link.yaml'", "a file in this folder"]),
     "unknown robot": ({"robot": "kukka"}, "robot", ["'kukka'", "'kuka'?"]),
     "wrong key": ({"target": {}}, "target", ["unknown key", "'targets'?"]),
 }
@@ -134,9 +146,43 @@ def test_fault_in_a_users_own_campaign_is_one_line_that_names_its_file(fault, co
     changes, key, words = OWN_FAULTS[fault]
     folder = users_folder(tmp_path, **changes)
     with refused(f"{folder}/campaign.yaml", key, *words):
-        user_campaign(config | {"campaign": folder}, config_folder / "robots")
+        user_campaign(config | {"campaign": folder}, config_folder / "robots", tmp_path)
 
 
 def test_a_users_folder_that_is_not_there_is_one_line(config, config_folder, tmp_path):
     with refused(f"{tmp_path.as_posix()}/none/campaign.yaml", ""):
-        user_campaign(config | {"campaign": f"{tmp_path.as_posix()}/none"}, config_folder / "robots")
+        user_campaign(config | {"campaign": f"{tmp_path.as_posix()}/none"}, config_folder / "robots", tmp_path)
+
+
+def test_two_campaigns_of_one_name_are_refused_while_both_are_there(config, config_folder, tmp_path):
+    """The second would overwrite the reports of the first."""
+    folder, results = users_folder(tmp_path), tmp_path / "results"
+    (results / "cell7").mkdir(parents=True)
+
+    def own():
+        return user_campaign(config | {"campaign": folder}, config_folder / "robots", results)
+
+    def earlier(source):
+        (results / "cell7/campaign.json").write_text(json.dumps({"source": source}), encoding="utf-8")
+
+    other = tmp_path / "other"
+    other.mkdir()
+    earlier(f"{other}/campaign.yaml")
+    with refused(f"{folder}/campaign.yaml", "campaign", "'cell7', whose results are of", str(other), f"{results}/cell7"):
+        own()
+    # The same folder by another path, one that is gone, and results that do not say: nothing is overwritten.
+    for source in (f"{other}/../cell/campaign.yaml", f"{tmp_path}/gone/campaign.yaml", 7):
+        earlier(source)
+        assert own() == {"cell7": folder}
+
+
+def test_two_campaigns_that_test_each_other_come_with_the_files_of_both(config, config_folder, tmp_path):
+    folder = users_folder(tmp_path, holdout={"campaign": "../other"})
+    shutil.copytree(folder, tmp_path / "other", symlinks=True)
+    (tmp_path / "other/campaign.yaml").write_text(
+        (tmp_path / "cell/campaign.yaml").read_text().replace("../other", "../cell").replace("cell7", "cell8")
+    )
+    robots = config_folder / "robots"
+    assert user_campaign(config | {"campaign": folder}, robots, tmp_path) == {"cell7": folder}
+    expected = [f"{folder}/campaign.yaml", f"{robots}/kuka.yaml", f"{folder}/../other/campaign.yaml", f"{robots}/kuka.yaml"]
+    assert campaign_files(folder, robots) == expected

@@ -46,4 +46,4 @@ def test_a_sheet_that_is_not_filled_in_is_refused_with_its_row(tmp_path):
     table["x"][3] = ""
     result = run(made_folder(tmp_path / "made", analysed("kuka"), table={k: np.asarray(v) for k, v in table.items()}))
     assert isinstance(result.exception, InputError)
-    assert "row 4, column x: found nothing" in str(result.exception)
+    assert "row 4, column x (line 5): found nothing" in str(result.exception)

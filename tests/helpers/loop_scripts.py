@@ -25,6 +25,10 @@ class Files:
         """Those of the report."""
         return [(self.folder / f"{figure}.pdf").as_posix() for figure in FIGURES]
 
+    def __iter__(self):
+        # Files elsewhere than in a study's folders have no checksums.
+        return iter(())
+
     def __getattr__(self, name):
         return (self.folder / f"{name}{SUFFIXES.get(name, '.parquet')}").as_posix()
 

@@ -1,11 +1,23 @@
 """YAML documents: read, and refused in one line that names file, key and what is allowed."""
 
+import os
+import time
+
 import pytest
 import yaml
 from support import changed, refused
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, one_line, read_document, read_schema
+from elastocal.io.documents import (
+    DEEPEST,
+    LARGEST_BYTES,
+    MOST_VALUES,
+    check_document,
+    named_document,
+    one_line,
+    read_document,
+    read_schema,
+)
 
 ROBOT = {
     "name": "one joint",
@@ -156,3 +168,110 @@ def test_a_value_on_one_line_reads_back(value):
 def test_a_date_stays_the_text_that_it_is(tmp_path):
     (tmp_path / "a.yaml").write_text("measured_on: 2026-11-20\nat: 2026-11-20 10:00:00\n", encoding="utf-8")
     assert read_document(tmp_path / "a.yaml") == {"measured_on": "2026-11-20", "at": "2026-11-20 10:00:00"}
+
+
+def _read(tmp_path, text):
+    path = tmp_path / "a.yaml"
+    path.write_text(text, encoding="utf-8")
+    return read_document(path)
+
+
+# Each name stands for nine of the one before.
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join([f'*{before}'] * 9)}]\n" for before, name in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "words"),
+    [
+        (BOMB, "line 6", ["more values", str(MOST_VALUES), "aliases"]),
+        ("a: &a [*a]\n", "line 1", ["alias *a", "not complete"]),
+        ("[" * 100_000, "line 1", ["in each other", f"{DEEPEST} deep"]),
+        ("- " * 50_000, "line 1", ["in each other"]),
+        (f"a0: &a0 [x]\n{''.join(f'a{n}: &a{n} [*a{n - 1}]' + chr(10) for n in range(1, 30))}", "line 20", ["in each other"]),
+        ("#" * (LARGEST_BYTES + 1), "", [f"{LARGEST_BYTES + 1} bytes", f"at most {LARGEST_BYTES}"]),
+        ("x: 1\na: !!python/object/apply:os.system [true]\n", "line 2", ["tag", "without tags"]),
+        ("a: 1\n---\nb: 2\n", "line 2", ["found another document"]),
+        ("x: 1\na: @x\n", "line 2", ["found character that cannot start"]),
+        ("campaign: a\nrobot: b\ncampaign: c\n", "line 3", ["'campaign' again", "first in line 1"]),
+        ("a: {b: 1, b: 2}\n", "line 1", ["'b' again"]),
+        ("a: 1\nseed: 1_0\n", "line 2", ["found 1_0", "decimal"]),
+        ("seed: 010\n", "line 1", ["found 010", "in quotes"]),
+        ("at: 1:30\n", "line 1", ["found 1:30"]),
+        (f"seed: {'9' * 5000}\n", "line 1", ["999", "18 digits"]),
+    ],
+)
+def test_what_is_no_plain_document_is_refused_at_once(tmp_path, text, where, words):
+    begin = time.monotonic()
+    with refused(f"{tmp_path / 'a.yaml'}: {where}", where, *words):
+        _read(tmp_path, text)
+    assert time.monotonic() - begin < 5
+
+
+def test_aliases_that_stay_small_are_read(tmp_path):
+    """PyYAML writes them by itself where one object stands in two places."""
+    entry = [0.1, 0.2]
+    assert _read(tmp_path, yaml.safe_dump({"a": entry, "b": entry})) == {"a": entry, "b": entry}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("0", 0),
+        ("-12", -12),
+        ("+3", 3),
+        (".5", 0.5),
+        ("6.0e-5", 6e-5),
+        ("007.5", 7.5),
+        ("'010'", "010"),
+        ("-.inf", -float("inf")),
+    ],
+)
+def test_decimal_numbers_are_read(tmp_path, text, value):
+    found = _read(tmp_path, f"a: {text}")["a"]
+    assert found == value and type(found) is type(value)
+
+
+@pytest.mark.parametrize(("text", "written"), [("6e-5", "6.0e-5"), ("6E5", "6.0e+5"), ("-1.5e5", "-1.5e+5")])
+def test_numbers_that_yaml_takes_for_text_come_with_the_way_to_write_them(tmp_path, text, written):
+    document = _read(tmp_path, f"name: x\nchain: x\nlengths_m: {{l: {text}}}\n")
+    with refused("a.yaml", "lengths_m.l", repr(text), written):
+        check_document(document, "robot", "a.yaml")
+    assert isinstance(_read(tmp_path, f"a: {written}")["a"], float)
+
+
+def test_a_pipe_is_no_document(tmp_path):
+    os.mkfifo(tmp_path / "a.yaml")
+    with refused(tmp_path / "a.yaml", "", "no regular file"):
+        read_document(tmp_path / "a.yaml")
+
+
+@pytest.mark.parametrize(
+    ("holdout", "words"),
+    [
+        ({"fraction": 1}, ["found 1", "less than 1 (share"]),
+        ({"poses": [1, [0, 2], [0, 2]]}, ["each entry once"]),
+        ({}, ["1 or more keys"]),
+    ],
+)
+def test_bounds_are_said_in_words(holdout, words):
+    document = {
+        "campaign": "a",
+        "robot": "r",
+        "measured": "pose",
+        "frame": "base",
+        "targets": {"E": {"point": "E", "offset_m": "unknown"}},
+    }
+    check_document(document | {"holdout": {"poses": [1, [0, 1], 0]}}, "campaign", "a.yaml")
+    with refused("a.yaml", "holdout", *words):
+        check_document(document | {"holdout": holdout}, "campaign", "a.yaml")
+
+
+@pytest.mark.parametrize("name", ["../robots/one", "one.yaml", "", ".", "x" * 5000])
+def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "one.yaml").write_text(yaml.safe_dump(ROBOT), encoding="utf-8")
+    assert named_document(tmp_path, "robots", "robot", "one", "config.yaml") == ROBOT
+    with refused("config.yaml", "robots", "one"):
+        named_document(tmp_path, "robots", "robot", name, "config.yaml")

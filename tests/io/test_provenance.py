@@ -23,3 +23,7 @@ def test_digest_does_not_depend_on_the_order_of_keys_or_on_tuples():
 def test_another_setting_has_another_digest():
     digests = {provenance(SETTINGS | {"seed": seed})["configuration_sha256"] for seed in (1, 2, 3)}
     assert len(digests) == 3 and provenance(SETTINGS)["configuration_sha256"] in digests
+
+
+def test_the_digest_of_the_sources_is_no_setting():
+    assert provenance({"seed": 1, "sources_sha256": "abc"}) == provenance({"seed": 1})

@@ -5,7 +5,7 @@ from copy import deepcopy
 import pytest
 from support import changed, refused
 
-from elastocal.study.configuration import check_study, rows_read
+from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 
 def test_the_repository_passes(config, config_folder):
@@ -26,6 +26,11 @@ FAULTS = {
     "unknown strategy": (("strategies", 0), "6DOF", "strategies", ["'6DOF'", "'6DoF'?", "3+6DoF-comb"]),
     "unknown robot": (("robots", 0), "kukka", "robots", ["'kukka'", "'kuka'?", "fanuc"]),
     "quite unknown robot": (("robots", 0), "zzz", "robots", ["'zzz'", "fanuc, ", "kuka, "]),
+    "robot by a path": (("robots", 0), "../robots/kuka", "robots", ["'../robots/kuka'", "a file of"]),
+    "more data sets than fit anywhere": (("data_sets",), 1_000_000_000, "data_sets", ["1000000000", "1000000 or less"]),
+    "noise beyond all robots": (("noise_um", 1), 1e20, "noise_um[1]", ["1e+20", "100000 or less"]),
+    "noise of one name": (("noise_um",), [200, 200.00000001], "noise_um", ["200 and 200.00000001", "6 digits"]),
+    "number without a point": (("noise_um", 1), "5e1", "noise_um[1]", ["'5e1'", "5.0e+1"]),
     "robot twice": (("robots",), ["kuka", "kuka"], "robots", ["each entry once"]),
     "no robot": (("robots",), [], "robots", ["1 or more entries"]),
     "negative noise": (("noise_um", 1), -50, "noise_um[1]", ["-50", "0 or more", "µm"]),
@@ -117,8 +122,8 @@ FAULTY_FILES = {
     "empty": ("robots/arm.yaml", "", "", ["None", "object"]),
     "missing key": ("robots/arm.yaml", "name: arm\n", "chain", ["nothing", "chain notation"]),
     "typo": ("strategies/plain.yaml", "name: plain\nstage: []\n", "stage", ["unknown key", "'stages'?"]),
-    "unknown point": ("strategies/plain.yaml", "name: x\nstages: [{points: [C], joints: [1]}]\n", "stages[1].points", ["A, B"]),
-    "joint left out": ("strategies/plain.yaml", "name: x\nstages: [{points: [B], joints: [1]}]\n", "stages[1]", ["joint 2"]),
+    "unknown point": ("strategies/plain.yaml", "name: x\nstages: [{points: [C], joints: [1]}]\n", "stages[0].points", ["A, B"]),
+    "joint left out": ("strategies/plain.yaml", "name: x\nstages: [{points: [B], joints: [1]}]\n", "stages[0]", ["joint 2"]),
     "list too long": (
         "robots/arm.yaml",
         "name: arm\nchain: Rz(q1) [A]\njoint_limits_deg: [[-1, 1]]\ncompliance_urad_per_Nm: [1, 2]\n",
@@ -146,3 +151,28 @@ def test_fault_in_a_named_file_is_one_line_that_names_that_file(other_config, ot
     (other_folder / name).write_text(text)
     with refused((other_folder / name).as_posix(), key, *words):
         check_study(other_config, other_folder, "study.yaml")
+
+
+def test_two_strategies_of_one_name_are_refused(other_config, other_folder):
+    twin = (other_folder / "strategies/plain.yaml").read_text(encoding="utf-8")
+    (other_folder / "strategies/twin.yaml").write_text(twin, encoding="utf-8")
+    both = other_config | {"strategies": [*other_config["strategies"], "twin"]}
+    with refused(other_folder / "strategies/twin.yaml", "name", "as of plain", "a name of its own"):
+        check_study(both, other_folder)
+
+
+def test_what_the_command_line_changes_is_read_as_in_the_file(config, config_folder):
+    changed = with_overrides(
+        config, ["seed=7", "evaluation={studies: 3, lengths: [5, 20]}", "switched={R4_tool_axes: {offset_frame: base}}"]
+    )
+    assert changed["seed"] == 7 and config["seed"] == 1
+    assert changed["evaluation"] == config["evaluation"] | {"studies": 3, "lengths": [5, 20]}
+    assert changed["switched"] == config["switched"] | {"R4_tool_axes": {"offset_frame": "base"}}
+    check_study(changed, config_folder, "config.yaml")
+    assert with_overrides(config, []) == config
+
+
+def test_what_the_command_line_spoils_is_said_to_come_from_there(config):
+    for text in ("[1", "1_0", "!!int 3"):
+        with refused("--config evaluation", "line"):
+            with_overrides(config, [f"evaluation={text}"])

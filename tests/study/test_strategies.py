@@ -70,15 +70,15 @@ def stages(*changes):
 
 
 FAULTS = {
-    "unknown point": (stages({"points": ["C"]}, {}), "stages[1].points", ["'C'", "A, B"]),
-    "unknown point later": (stages({}, {"points": ["A", "end"]}), "stages[2].points", ["'end'", "A, B"]),
-    "joint that the robot has not": (stages({}, {"joints": [3, 4]}), "stages[2].joints", ["joint 4", "move B: 1, 2, 3"]),
-    "joint behind the point": (stages({"joints": [1, 2, 3]}, {}), "stages[1].joints", ["joint 3", "move A: 1, 2"]),
-    "joint in neither list": (stages({"joints": [1]}, {}), "stages[1]", ["joint 2", "in joints or held"]),
-    "nothing held": (stages({}, {"held": []}), "stages[2]", ["joint 1, 2", "1, 2, 3 in joints or held"]),
-    "held before it is known": (stages({"joints": [1], "held": [2]}, {}), "stages[1].held", ["joint 2", "none"]),
-    "held that is no joint": (stages({}, {"held": [1, 2, 7]}), "stages[2].held", ["joint 7", "earlier stages: 1, 2"]),
-    "held and identified": (stages({}, {"joints": [2, 3]}), "stages[2].held", ["joint 2", "earlier stages"]),
+    "unknown point": (stages({"points": ["C"]}, {}), "stages[0].points", ["'C'", "A, B"]),
+    "unknown point later": (stages({}, {"points": ["A", "end"]}), "stages[1].points", ["'end'", "A, B"]),
+    "joint that the robot has not": (stages({}, {"joints": [3, 4]}), "stages[1].joints", ["joint 4", "move B: 1, 2, 3"]),
+    "joint behind the point": (stages({"joints": [1, 2, 3]}, {}), "stages[0].joints", ["joint 3", "move A: 1, 2"]),
+    "joint in neither list": (stages({"joints": [1]}, {}), "stages[0]", ["joint 2", "in joints or held"]),
+    "nothing held": (stages({}, {"held": []}), "stages[1]", ["joint 1, 2", "1, 2, 3 in joints or held"]),
+    "held before it is known": (stages({"joints": [1], "held": [2]}, {}), "stages[0].held", ["joint 2", "none"]),
+    "held that is no joint": (stages({}, {"held": [1, 2, 7]}), "stages[1].held", ["joint 7", "earlier stages: 1, 2"]),
+    "held and identified": (stages({}, {"joints": [2, 3]}), "stages[1].held", ["joint 2", "earlier stages"]),
     "joint that no stage identifies": (STAGED[:1], "stages", ["joint 3", "every joint"]),
 }
 

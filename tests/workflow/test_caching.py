@@ -165,6 +165,13 @@ def test_an_edit_of_the_bounds_reruns_the_bounds(finished):
     assert finished.planned() == jobs("bound", ROBOTS) | PER_DATA_SET | asked | REPORT
 
 
+def test_an_edit_that_is_older_than_the_results_counts_too(finished):
+    """As from an archive, a copy that keeps dates, or a clock that was set back."""
+    finished.append("workflow/scripts/draw_scores.py", "# an edit\n")
+    os.utime(finished.path("workflow/scripts/draw_scores.py"), (1e9, 1e9))
+    assert finished.planned() == {("draw_scores",), ("compile_report",), ("all",)}
+
+
 def test_an_edit_of_the_strategy_figures_reruns_figures(finished):
     finished.append("src/elastocal/figures/strategies.py", "# an edit\n")
     figures = {

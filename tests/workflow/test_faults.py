@@ -1,5 +1,6 @@
 """Bad input ends with one line that names the file, the key and what is allowed, and leaves nothing that looks finished."""
 
+import fcntl
 import subprocess
 import time
 
@@ -42,6 +43,18 @@ FAULTS = {
         lambda study: study.configure({"noise_um": [200, -50]}),
         ["config.yaml: noise_um[1]: ", "found -50", "allowed: 0 or more"],
     ),
+    "configuration that is no YAML": (
+        lambda study: study.append("config.yaml", "tables: [\n"),
+        ["config.yaml: line ", "allowed: YAML"],
+    ),
+    "key twice": (
+        lambda study: study.append("config.yaml", "seed: 2\n"),
+        ["config.yaml: line ", "'seed' again", "allowed: each key once (first in line 1)"],
+    ),
+    "no configuration": (
+        lambda study: study.path("config.yaml").unlink(),
+        ["config.yaml: found No such file", "allowed: a readable file"],
+    ),
     "chain that does not parse": (
         lambda study: study.replace(KUKA, "Rz(q1)", "Rz q1"),
         [f"{KUKA}: chain: ", "'Rz'", "allowed: Tx(length)"],
@@ -52,7 +65,7 @@ FAULTS = {
     ),
     "strategy with an unknown point": (
         _unknown_point,
-        ["config/strategies/3+6DoF-comb.yaml: stages[1].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
+        ["config/strategies/3+6DoF-comb.yaml: stages[0].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
     ),
     "data set too short to solve": (
         lambda study: study.configure(
@@ -86,6 +99,26 @@ def test_nothing_starts_and_one_line_says_why(fault, unstarted):
     assert unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
 
 
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (
+            ("-j1", "--config", "evaluation={studies: one}"),
+            "config.yaml with --config evaluation: evaluation.studies: found 'one'",
+        ),
+        (("-j1", "diagnose"), "diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER"),
+    ],
+)
+def test_a_faulty_command_ends_with_one_line_that_says_why(arguments, said, unstarted):
+    ended = unstarted.snakemake(*arguments)
+    assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(said)
+    assert "Traceback" not in ended.stderr and unstarted.files("data/**/*", "results/**/*", "reports/**/*") == []
+
+
+def test_numbers_inside_of_a_mapping_may_come_from_the_command_line(unstarted):
+    unstarted.planned("--config", "evaluation={bootstrap_replicates: 20}")
+
+
 def _truncate(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 
@@ -106,22 +139,46 @@ def _edit_one_value(path):
         writer.add_key_value_metadata(metadata)
 
 
-@pytest.mark.parametrize(
-    ("spoil", "said"), [(_truncate, "no readable Parquet file"), (_edit_one_value, "values that were edited")]
-)
-def test_spoilt_data_end_the_job_that_reads_them(spoil, said, finished):
+@pytest.mark.parametrize("spoil", [_truncate, _edit_one_value])
+def test_spoilt_data_end_the_job_that_reads_them(spoil, finished):
     spoil(finished.path(MEASURED))
     ended = finished.snakemake("-j1", IDENTIFIED)
     assert ended.returncode != 0
     log = finished.path("results/logs/identify/kuka/200um/6DoF.log").read_text(encoding="utf-8").splitlines()
     assert len(log) == 1
     assert log[0].startswith(f"{MEASURED}: ")
-    assert said in log[0]
+    assert "found other contents than were written" in log[0]
     assert "allowed: the file as the pipeline wrote it" in log[0]
     assert ended.stderr.splitlines()[-1] == log[0]
     assert "Traceback" not in ended.stderr
     assert not finished.path(IDENTIFIED).exists()
     assert finished.files("results/identified/**/*.partial") == []
+
+
+def test_a_file_between_that_was_deleted_is_made_again(finished):
+    """Although all that was made from it is there."""
+    finished.path(MEASURED).unlink()
+    assert ("measure", "kuka", "200") in finished.planned()
+
+
+def test_an_edited_table_is_no_new_input(finished):
+    table = finished.path("reports/tables/table4.csv")
+    written = table.read_text(encoding="utf-8")
+    table.write_text(written.replace("1", "2", 1), encoding="utf-8")
+    ended = finished.snakemake("-j1", "reports/tables/table4.tex")
+    assert ended.returncode != 0
+    assert ended.stderr.splitlines()[-1].startswith("reports/tables/table4.csv: found other contents than were written")
+
+
+def test_two_runs_of_the_same_files_are_refused_in_one_line(unstarted):
+    (unstarted.path(".snakemake/locks")).mkdir(parents=True)
+    unstarted.path(".snakemake/locks/0.output.lock").write_text(f"{MEASURED}\n", encoding="utf-8")
+    with open(unstarted.path(".snakemake/runs.lock"), "a") as other:
+        fcntl.flock(other, fcntl.LOCK_SH)
+        ended = unstarted.snakemake("-j1", MEASURED)
+    assert ended.returncode != 0
+    last = ended.stderr.splitlines()[-1]
+    assert last == "snakemake: found another run at work on the same files; allowed: the same command once that one has ended"
 
 
 def test_a_killed_job_leaves_no_file_under_the_final_name(finished):

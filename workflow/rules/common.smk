@@ -1,20 +1,28 @@
 """What all rules share: the checked configuration, the names that paths are made of, and the sources behind each script."""
 
 import gc
+import hashlib
+import re
 import sys
+from functools import cache
 from pathlib import Path
 
 import elastocal
+from snakemake.iocontainers import Wildcards
+
 from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
-from elastocal.study.configuration import check_study, rows_read
 from elastocal.errors import InputError
+from elastocal.io.checksums import checksum
+from elastocal.io.provenance import SOURCES_DIGEST
+from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 
 from import_closure import closure
+from one_run import begin
 from outcome import outcome
 
 # In a checkout the package stands beside the rules; a wheel puts them apart.
@@ -32,11 +40,20 @@ CONFIG = placed(ROOT / "config")
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()
 
+# What --config says; Snakemake takes numbers inside of a mapping for texts.
+CHANGES = [entry for entry in workflow.config_settings.config_args or () if not entry.startswith("campaign=")]
+
 try:
-    STUDY = check_study(config, CONFIG)
+    config.update(with_overrides(config, CHANGES))
+    STUDY = check_study(
+        config, CONFIG, " with --config ".join(["config.yaml", *(entry.partition("=")[0] for entry in CHANGES)])
+    )
     SOURCES = campaign_sources(config, CONFIG)
     # Name and folder of the user's own campaign, if there is one.
-    OWN = user_campaign(config, f"{CONFIG}/robots")
+    OWN = user_campaign(config, f"{CONFIG}/robots", "results/loop")
+    # Not of the jobs of this run, and not where nothing is written.
+    if workflow.is_main_process and not workflow.dryrun:
+        RUN = begin(Path(".snakemake"), ["data", "results", "reports"])
 except InputError as error:
     sys.exit(str(error))
 
@@ -52,6 +69,8 @@ STUDY_SIZE = {
     "tests": config["test_configurations"],
     "noise": 1e-6 * config["tables"]["noise_um"],
 }
+# Files that jobs make.
+MADE = re.compile("(data|results|reports)/")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -71,6 +90,41 @@ def sources(script):
     path = ROOT / "workflow" / "scripts" / script
     files = [path, *closure(path, PACKAGES)]
     return [placed(file) for file in files]
+
+
+def digest_of(files):
+    """One digest of all that some files hold."""
+    return hashlib.sha256(" ".join(map(checksum_of, files)).encode()).hexdigest()[:16]
+
+
+@cache
+def checksum_of(file):
+    return checksum(file)
+
+
+def watch_sources():
+    """Edited sources rerun their jobs whatever the date of the file: Snakemake looks at contents only where a date is new."""
+    for each in workflow.rules:
+        if "sources" in each.input.keys():
+            named = [file for file in each.input if isinstance(file, str) and not MADE.match(file)]
+            each.set_params(**{SOURCES_DIGEST: digest_of(file for file in named if Path(file).is_file())})
+
+
+def files_behind(targets):
+    """All files that the jobs behind some targets write: one that was deleted is made again although later ones are there."""
+    found, left = set(), [target for target in targets if isinstance(target, str)]
+    while left:
+        path = left.pop()
+        if path in found or not MADE.match(path):
+            continue
+        maker = next((each for each in workflow.rules if each.is_producer(path)), None)
+        if maker is None:
+            # Of the user, who keeps it in a folder of the pipeline.
+            continue
+        wildcards = Wildcards(fromdict=maker.get_wildcards(path))
+        found.update(map(str, maker.expand_output(wildcards)[0]))
+        left += map(str, maker.expand_input(wildcards)[0])
+    return sorted(found)
 
 
 def robot_document(wildcards):
@@ -141,6 +195,12 @@ def robots_of_import(wildcards):
 
 def loop_reports(campaigns):
     return expand("reports/loop/{campaign}/{file}", campaign=campaigns, file=LOOP_REPORTS)
+
+
+def reports_of_own(wildcards):
+    if not OWN:
+        sys.exit("diagnose: found no campaign; allowed: snakemake -j2 diagnose --config campaign=FOLDER")
+    return files_behind(loop_reports(OWN))
 
 
 def folds_of_one(campaigns):

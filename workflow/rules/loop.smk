@@ -74,6 +74,7 @@ rule read_campaign:
     params:
         folder=lambda wildcards: folder_of(wildcards.campaign),
         robots=f"{CONFIG}/robots",
+        files_sha256=lambda wildcards: digest_of(files_of(wildcards)) if wildcards.campaign in OWN else None,
     script:
         "../scripts/read_campaign.py"
 
@@ -148,10 +149,11 @@ rule summarize_campaigns:
 
 rule diagnose:
     input:
-        loop_reports(OWN),
+        reports_of_own,
 
 
 rule measured:
     input:
         loop_reports(config["loop"]["measured"]),
         "reports/loop/measured.csv",
+        lambda wildcards: files_behind(rules.measured.input),

@@ -1,11 +1,18 @@
-"""What every script does around its one call: a log, and one line where the input is at fault."""
+"""What every script does around its one call: a log, checked inputs, and one line where the input is at fault."""
 
+import fcntl
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any, Protocol
 
 from elastocal.errors import InputError
+from elastocal.io.checksums import check_checksums, record_checksums
+
+# Shared by the jobs under way: a run that begins after another one was killed waits for the jobs that this one left behind.
+JOBS_LOCK = Path(".snakemake/jobs.lock")
 
 
 class Job(Protocol):
@@ -19,14 +26,48 @@ class Job(Protocol):
 
 
 def run(step: Callable[[Job], None], snakemake: Job) -> None:
-    """Call ``step(snakemake)``; an `InputError` ends the job with its one line, on the terminal and in the log."""
-    with open(snakemake.log[0], "w", encoding="utf-8") as log:
-        try:
+    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line."""
+    log = Path(snakemake.log[0])
+    _write(log, "")
+    try:
+        with _under_way():
+            check_checksums(snakemake.input)
             step(snakemake)
-        except InputError as error:
-            print(error, file=log)
-            sys.exit(str(error))
-        except Exception:
-            traceback.print_exc(file=log)
-            raise
-        print("done", file=log)
+            record_checksums(snakemake.output)
+    except InputError as error:
+        _write(log, f"{error}\n")
+        sys.exit(str(error))
+    except (OSError, MemoryError) as error:
+        line = fault_of_machine(error, next(iter(snakemake.output), "disk"))
+        _write(log, f"{traceback.format_exc()}{line}\n")
+        sys.exit(line)
+    except BaseException:
+        _write(log, traceback.format_exc())
+        raise
+    _write(log, "done\n")
+
+
+def fault_of_machine(error: OSError | MemoryError, output: str) -> str:
+    """One line on a full disk, a folder that cannot be written to, memory that is used up and the like."""
+    if isinstance(error, MemoryError):
+        return str(InputError("memory", "", "none left", "more memory, or fewer jobs at a time (snakemake -j1)"))
+    # What pyarrow writes comes without a name.
+    place, found = str(error.filename or output), error.strerror or str(error)
+    return str(InputError(place, "", found, "a disk with space where this user may write; the same command goes on then"))
+
+
+@contextmanager
+def _under_way() -> Iterator[None]:
+    if not JOBS_LOCK.parent.is_dir():
+        yield
+        return
+    # The system gives the lock back whatever ends the process.
+    with open(JOBS_LOCK, "a") as lock:
+        fcntl.flock(lock, fcntl.LOCK_SH)
+        yield
+
+
+def _write(log: Path, text: str) -> None:
+    """The terminal has the line too, so a log that cannot be written is no fault of its own."""
+    with suppress(OSError):
+        log.write_text(text, encoding="utf-8")

@@ -9,6 +9,7 @@ import numpy as np
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.campaigns.places import is_file_in
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -64,18 +65,46 @@ def holdout_from(described: dict[str, Any], folder: Path, source: str) -> dict[s
     Raises
     ------
     InputError
-        No way or more than one, a seed where nothing is drawn, or another campaign that is not there.
+        No way or more than one, a seed where nothing is drawn, or as `other_folder`.
     """
     ways = [way for way in HOLDOUTS if way in described]
     drawn = ways in (["fraction"], ["blocks"])
     if len(ways) != 1 or ("seed" in described and not drawn):
         allowed = "one of {fraction, seed}, {blocks, seed}, {session}, {poses} or {campaign}"
         raise InputError(source, "holdout", f"{', '.join(described)} together" if len(described) > 1 else "seed alone", allowed)
-    if "campaign" in described and not (folder / described["campaign"] / DOCUMENT).is_file():
-        raise InputError(
-            source, "holdout.campaign", repr(described["campaign"]), f"a folder with a {DOCUMENT}, relative to this one"
-        )
+    if "campaign" in described:
+        other_folder(described["campaign"], folder, source)
     return {"seed": 1} | described if drawn else dict(described)
+
+
+def other_folder(named: str, folder: Path, source: str) -> Path:
+    """Folder of the campaign that tests another one.
+
+    Parameters
+    ----------
+    named : str
+        As ``holdout.campaign`` names it.
+    folder : Path
+        Of the campaign that it tests.
+    source : str
+        Named in errors.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        No campaign there, the same campaign, or a folder elsewhere than beside or below the tested one's.
+    """
+    other = folder / named
+    allowed = f"a folder beside this one with a {DOCUMENT}, such as ../other"
+    if not is_file_in(other / DOCUMENT, folder.resolve().parent):
+        raise InputError(source, "holdout.campaign", repr(named), allowed)
+    if other.samefile(folder):
+        raise InputError(source, "holdout.campaign", f"{named!r}, the campaign itself", allowed)
+    return other
 
 
 def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source: str) -> np.ndarray:

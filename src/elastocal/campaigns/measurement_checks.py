@@ -111,7 +111,7 @@ def _check_duplicates(measurements: Measurements, table: MeasurementFile, target
         of_session = f"session {session}, " if "session" in table.columns else ""
         found = f"{of_session}pose {pose}, load {load}, repeat {repeat}, target {targets[target].name} again"
         earlier = table.rows[first[group[index]]]
-        raise table.fault(f"row {table.rows[index]}", found, f"each once (first in row {earlier})")
+        raise table.cell_fault(index, "", found, f"each once (first in row {earlier})")
 
 
 def _check_loads(measurements: Measurements, table: MeasurementFile) -> None:

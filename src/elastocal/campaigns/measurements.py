@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import difflib
+import sys
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +18,19 @@ from elastocal.io.storage import Column
 from elastocal.mechanics.components import WRENCH
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Mapping, Sequence
-    from typing import Any
+    from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+    from typing import Any, TextIO
+
+    # Of each column the cells: numbers as an array, where all of them are numbers.
+    Columns = dict[str, Sequence[Any] | np.ndarray]
+
+# A diagnosis of a million measurements takes ten minutes and 2 GB (docs, benchmarks); a tracker's stream is averaged before.
+MOST_MEASUREMENTS = 2_000_000
+# Forty columns of twenty digits are 1,000 characters.
+_LONGEST_LINE, _MOST_BYTES = 10_000, 1000 * MOST_MEASUREMENTS
+# Rows whose texts are in memory at a time; their numbers take a tenth of that.
+_ROWS_AT_A_TIME = 20_000
+_COMMENT = "#"
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
 
@@ -69,17 +82,20 @@ def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFi
     Raises
     ------
     InputError
-        No file or two, a file that cannot be read, a column that is missing, unknown or there twice, a row of another length.
+        No file or two, a file that cannot be read, a column that is missing, unknown or there twice, a row of another length,
+        more than `MOST_MEASUREMENTS` rows.
     """
     there = [path for path in (folder / CSV, folder / PARQUET) if path.is_file()]
     if len(there) != 1:
         found = "both" if there else "neither"
         raise InputError(folder.as_posix(), "", f"{found} {CSV} {'and' if there else 'nor'} {PARQUET}", "one of them")
     path = there[0].as_posix()
-    columns, rows = (_read_csv if there[0].name == CSV else _read_parquet)(path)
+    if (size := there[0].stat().st_size) > _MOST_BYTES:
+        raise InputError(path, "", f"{size} bytes", f"at most {_MOST_BYTES}, which hold {MOST_MEASUREMENTS} measurements")
+    columns, rows, lines = (_read_csv if there[0].name == CSV else _read_parquet)(path, joints)
     if len(rows) == 0:
         raise InputError(path, "", "no row of data", "one row for each measurement of one target")
-    return MeasurementFile(path, columns, rows, joints, measured)
+    return MeasurementFile(path, columns, rows, lines, joints, measured)
 
 
 def check_column_names(names: Collection[str], joints: int, path: str) -> None:
@@ -121,50 +137,133 @@ def write_measurements(path: str, table: Mapping[str, Sequence[Any] | np.ndarray
     (_write_csv if Path(path).name.startswith(CSV) else _write_parquet)(path, columns, table)
 
 
-def _read_csv(path: str) -> tuple[dict[str, tuple[str, ...]], np.ndarray]:
+def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
+    """Columns, and of each row that is not blank its number and its line; a few thousand rows at a time."""
+    texts = {name for name, column in file_columns(joints).items() if column.type == "string"}
+    # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what `_lines` refuses with the line.
+    with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
+        source = _lines(file, path)
+        before, first = next(((number, line) for number, line in enumerate(source) if not _passed_over(line)), (0, ""))
+        header = [cell.strip() for cell in next(_split([first], path, before), (0, [""]))[1]]
+        if not first:
+            raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
+        if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
+            raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
+        _check_header(path, header)
+        check_column_names(header, joints, path)
+        chunks: list[list[Any]] = [[] for _ in header]
+        rows: list[int] = []
+        lines: list[int] = []
+        numbered = enumerate(_split(source, path, before + 1), 1)
+        while block := list(islice(numbered, _ROWS_AT_A_TIME)):
+            kept = [(row, line, cells) for row, (line, cells) in block if any(cell.strip() for cell in cells)]
+            for row, line, cells in kept:
+                if len(cells) != len(header):
+                    allowed = f"{len(header)}, one for each column of the header"
+                    raise InputError(path, f"row {row} (line {line})", f"{len(cells)} cells", allowed)
+            rows += [row for row, _, _ in kept]
+            lines += [line for _, line, _ in kept]
+            if len(rows) > MOST_MEASUREMENTS:
+                raise _too_many(path, "more")
+            for name, chunk, column in zip(header, chunks, zip(*(cells for _, _, cells in kept), strict=True), strict=False):
+                chunk.append([sys.intern(cell.strip()) for cell in column] if name in texts else _numbers(column))
+    columns = {name: _joined(chunk) for name, chunk in zip(header, chunks, strict=True)}
+    return columns, np.array(rows, np.int32), np.array(lines, np.int32)
+
+
+def _lines(file: TextIO, path: str) -> Iterator[str]:
+    """Lines of a file, of bounded length each."""
+    for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), ""), 1):
+        if len(line) == _LONGEST_LINE:
+            raise InputError(path, f"line {number}", f"{_LONGEST_LINE} characters or more", "one measurement in a line")
+        if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
+            raise InputError(path, f"line {number}", "text that is not UTF-8", "a UTF-8 file")
+        yield line
+
+
+def _passed_over(line: str) -> bool:
+    """Whether a line before the header is blank or a comment."""
+    return not line.strip() or line.lstrip().startswith(_COMMENT)
+
+
+def _split(lines: Iterable[str], path: str, before: int) -> Iterator[tuple[int, list[str]]]:
+    """Line in the file and cells of each row; `before` lines of the file are left out."""
+    reader = csv.reader(lines, skipinitialspace=True, strict=True)
     try:
-        # A byte order mark is what spreadsheets write.
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = list(csv.reader(file, skipinitialspace=True, strict=True))
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+        for cells in reader:
+            yield before + reader.line_num, cells
     except csv.Error as error:
-        raise InputError(path, "", str(error), "comma-separated values") from None
-    if not lines:
-        raise InputError(path, "", "an empty file", "a header and one row for each measurement of one target")
-    header = [cell.strip() for cell in lines[0]]
-    if len(header) == 1 and any(separator in header[0] for separator in ";\t"):
-        raise InputError(path, "header", repr(header[0][:40]), "columns separated by commas, decimals by a point")
-    _check_header(path, header)
-    kept = [(number, cells) for number, cells in enumerate(lines[1:], 1) if any(cell.strip() for cell in cells)]
-    for number, cells in kept:
-        if len(cells) != len(header):
-            raise InputError(path, f"row {number}", f"{len(cells)} cells", f"{len(header)}, one for each column of the header")
-    columns = dict(zip(header, zip(*(cells for _, cells in kept), strict=True), strict=True)) if kept else {}
-    return columns, np.array([number for number, _ in kept], np.int32)
+        raise InputError(path, f"line {before + reader.line_num}", str(error), "comma-separated values") from None
 
 
-def _read_parquet(path: str) -> tuple[dict[str, Sequence[Any] | np.ndarray], np.ndarray]:
+def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
+    """Cells as numbers where all of them are, else as they stand in the file."""
+    try:
+        values = _as_numbers(cells)
+    except ValueError:
+        return list(cells)
+    return values if np.isfinite(values).all() else list(cells)
+
+
+def _as_numbers(cells: Sequence[Any] | np.ndarray) -> np.ndarray:
+    """ndarray of float (N,); a ValueError or TypeError where a cell is none. Python takes 1_0 for 10."""
+    if not isinstance(cells, np.ndarray) and any(isinstance(cell, str) and "_" in cell for cell in cells):
+        raise ValueError
+    return np.array(cells, float)
+
+
+def _joined(chunks: Sequence[Any]) -> Sequence[Any] | np.ndarray:
+    if chunks and all(isinstance(chunk, np.ndarray) for chunk in chunks):
+        return np.concatenate(chunks)
+    return [cell for chunk in chunks for cell in chunk]
+
+
+def _read_parquet(path: str, joints: int) -> tuple[Columns, np.ndarray, None]:
+    texts = [name for name, column in file_columns(joints).items() if column.type == "string"]
     try:
         # pyarrow's own complaint of a column that is there twice is a list of all columns.
-        _check_header(path, pq.read_schema(path).names)
-        table = pq.read_table(path)
-        columns = [(name, _cells(column)) for name, column in zip(table.column_names, table.columns, strict=True)]
+        with pq.ParquetFile(path) as file:
+            names, count = file.schema_arrow.names, file.metadata.num_rows
+        _check_header(path, names)
+        check_column_names(names, joints, path)
+        if count > MOST_MEASUREMENTS:
+            raise _too_many(path, f"{count}")
+        # As dictionaries texts take the memory that they take in the file.
+        table = pq.read_table(
+            path, read_dictionary=[name for name in texts if name in names], page_checksum_verification=True, partitioning=None
+        )
+        table.validate(full=True)
+        columns = {name: _cells(path, name, column) for name, column in zip(table.column_names, table.columns, strict=True)}
     except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", "a Parquet file") from None
-    return dict(columns), np.arange(1, table.num_rows + 1, dtype=np.int32)
+    return columns, np.arange(1, table.num_rows + 1, dtype=np.int32), None
 
 
-def _cells(column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
+def _cells(path: str, name: str, column: pa.ChunkedArray) -> Sequence[Any] | np.ndarray:
     """Cells of a column of Parquet: an array where all are numbers, which takes a fourth of the memory of a list."""
-    numbers = pa.types.is_floating(column.type) or pa.types.is_integer(column.type)
-    return column.to_numpy() if numbers and not column.null_count else column.to_pylist()
+    kind = column.type
+    if pa.types.is_dictionary(kind) and pa.types.is_string(kind.value_type):
+        whole = column.unify_dictionaries().combine_chunks()
+        words = [*map(sys.intern, whole.dictionary.to_pylist()), None]
+        return [words[code] for code in whole.indices.fill_null(len(words) - 1).to_pylist()]
+    if (pa.types.is_floating(kind) or pa.types.is_integer(kind)) and not column.null_count:
+        return column.to_numpy()
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_string(kind) or pa.types.is_null(kind)):
+        raise InputError(path, f"column {name}", f"type {kind}", "numbers, or text")
+    return column.to_pylist()
 
 
 def _check_header(path: str, names: Sequence[str]) -> None:
+    seen: set[str] = set()
     for name in names:
-        if names.count(name) > 1:
+        if name in seen:
             raise InputError(path, "header", f"column {name!r} twice", "each column once")
+        seen.add(name)
+
+
+def _too_many(path: str, found: str) -> InputError:
+    allowed = f"at most {MOST_MEASUREMENTS} (the mean of a tracker's stream at each pose is one measurement)"
+    return InputError(path, "", f"{found} rows of data", allowed)
 
 
 class MeasurementFile:
@@ -177,20 +276,21 @@ class MeasurementFile:
         Cells as they stand in the file.
     rows : ndarray of int32 (N,)
         Number in the file of each row that is not blank, 1 for the first of data.
+    lines : ndarray of int32 (N,) or None
+        Line of the file that each row ends in, where the file is a text.
     angles, wrench, approach, orientation : list of str
         Names of the columns that belong together; no orientation where positions are measured.
     """
 
     def __init__(
-        self, path: str, columns: Mapping[str, Sequence[Any] | np.ndarray], rows: np.ndarray, joints: int, measured: str
+        self, path: str, columns: Columns, rows: np.ndarray, lines: np.ndarray | None, joints: int, measured: str
     ) -> None:
-        self.path, self.columns, self.rows = path, columns, rows
+        self.path, self.columns, self.rows, self.lines = path, columns, rows, lines
         known = file_columns(joints)
         self.angles = [f"q{j}" for j in range(1, joints + 1)]
         self.approach = [f"approach{j}" for j in range(1, joints + 1)]
         self.wrench = [name for name, _, _ in WRENCH]
         self.orientation = ["rx", "ry", "rz"] if measured == "pose" else []
-        check_column_names(columns, joints, path)
         required = ["pose", "load", "repeat", "target", *self.angles, "x", "y", "z", *self.orientation]
         for group in (self.wrench, self.approach):
             required += group if any(name in columns for name in group) else []
@@ -204,8 +304,10 @@ class MeasurementFile:
         return InputError(self.path, key, found, allowed)
 
     def cell_fault(self, index: int, name: str, found: str, allowed: str) -> InputError:
-        """InputError of one cell; `index` counts the measurements."""
-        return self.fault(f"row {self.rows[index]}, column {name}", found, allowed)
+        """InputError of one cell, or without `name` of a row; `index` counts the measurements."""
+        column = f", column {name}" if name else ""
+        line = "" if self.lines is None else f" (line {self.lines[index]})"
+        return self.fault(f"row {self.rows[index]}{column}{line}", found, allowed)
 
     def has(self, names: Iterable[str]) -> bool:
         """Whether all of some columns are there."""
@@ -221,7 +323,7 @@ class MeasurementFile:
         wrong = (values != np.round(values)) | (np.abs(values) >= 2**31)
         if wrong.any():
             index = int(np.argmax(wrong))
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), "an integer")
+            raise self.cell_fault(index, name, shown(self.columns[name][index]), f"an integer, up to {2**31 - 1}")
         return values.astype(np.int32)
 
     def texts(self, name: str) -> list[str]:
@@ -230,7 +332,7 @@ class MeasurementFile:
 
     def _column(self, name: str) -> np.ndarray:
         try:
-            values = np.array(self.columns[name], float)
+            values = _as_numbers(self.columns[name])
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), "a number with a decimal point") from None
@@ -242,7 +344,7 @@ class MeasurementFile:
 
 def _is_number(cell: Any) -> bool:
     try:
-        np.array([cell], float)
+        _as_numbers([cell])
     except (ValueError, TypeError):
         return False
     return True
@@ -250,7 +352,7 @@ def _is_number(cell: Any) -> bool:
 
 def shown(cell: Any) -> str:
     """A cell as an error shows it."""
-    text = str(cell).strip() if cell is not None else ""
+    text = str(cell).strip().removesuffix(".0") if cell is not None else ""
     return repr(text[:40]) if text else "nothing"
 
 
@@ -265,7 +367,7 @@ def _write_csv(path: str, columns: Iterable[Column], table: Mapping[str, Sequenc
 def _write_parquet(path: str, columns: Iterable[Column], table: Mapping[str, Sequence[Any] | np.ndarray]) -> None:
     fields = [pa.field(c.name, pa.type_for_alias(c.type), False, {"unit": c.unit, "meaning": c.meaning}) for c in columns]
     arrays = [pa.array(np.asarray(table[field.name]).tolist(), field.type) for field in fields]
-    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, compression="zstd")
+    pq.write_table(pa.Table.from_arrays(arrays, schema=pa.schema(fields)), path, compression="zstd", write_page_checksum=True)
 
 
 def closest_first(name: str, known: Collection[str]) -> str:

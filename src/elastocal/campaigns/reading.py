@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.campaign import DEFAULT_HOLDOUT, DOCUMENT, Measurements, described_campaign, targets_from
-from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses
+from elastocal.campaigns.holdout import FEWEST_HELD_OUT_POSES, held_out_mask, holdout_from, measured_poses, other_folder
 from elastocal.campaigns.measurement_checks import check_angles, check_measurements
 from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_measurements, shown
+from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.robot_file import robot_from_document
@@ -59,6 +60,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
+    for path in _tables(folder):
+        _check_place(path, folder)
     table = read_measurements(folder, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets)
     check_measurements(measurements, table, robot, targets, source)
@@ -88,6 +91,7 @@ def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[di
         A document that its schema refuses, or a robot that is not there.
     """
     source = (Path(folder) / DOCUMENT).as_posix()
+    _check_place(Path(source), folder)
     document = read_document(source)
     check_document(document, "campaign", source)
     return document, _robot_path(document["robot"], Path(folder), robots_folder, source)
@@ -108,13 +112,20 @@ def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
     Raises
     ------
     InputError
-        As in `read_descriptions`.
+        As in `read_descriptions` and `holdout.other_folder`.
     """
     document, robot_path = read_descriptions(folder, robots_folder)
-    files = [Path(folder) / DOCUMENT, *(path for kind in (CSV, PARQUET) if (path := Path(folder) / kind).is_file()), robot_path]
-    other = document.get("holdout", {}).get("campaign")
-    beyond = campaign_files(Path(folder) / other, robots_folder) if other else []
-    return [path.as_posix() for path in files] + beyond
+    files = [Path(folder) / DOCUMENT, *_tables(Path(folder)), robot_path]
+    if other := document.get("holdout", {}).get("campaign"):
+        there = other_folder(other, Path(folder), files[0].as_posix())
+        # What tests the other one is no part of this one: two campaigns may test each other.
+        files += [there / DOCUMENT, *_tables(there), read_descriptions(there, robots_folder)[1]]
+    return [path.as_posix() for path in files]
+
+
+def _tables(folder: Path) -> list[Path]:
+    """Files of measurements in a folder."""
+    return [path for kind in (CSV, PARQUET) if (path := folder / kind).is_file()]
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -165,9 +176,8 @@ def held_out_campaign(
     """
     if "campaign" not in campaign.holdout:
         return None
-    other_folder = Path(folder) / campaign.holdout["campaign"]
-    other = read_campaign(other_folder, robots_folder, effects)
     source, key = (Path(folder) / DOCUMENT).as_posix(), "holdout.campaign"
+    other = read_campaign(other_folder(campaign.holdout["campaign"], Path(folder), source), robots_folder, effects)
     if other.robot.chain != campaign.robot.chain:
         raise InputError(
             source, key, f"another chain, of {other.robot.name}", f"a campaign of the same chain, {campaign.robot.name}"
@@ -242,12 +252,16 @@ def _check_noise(document: Mapping[str, Any], measurements: Measurements, joints
 def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str) -> Path:
     known = sorted(file.stem for file in Path(robots_folder).glob("*.yaml"))
     path = Path(robots_folder) / f"{name}.yaml" if name in known else folder / name
-    if not path.is_file():
-        allowed = (
-            f"a file relative to this folder, or a robot of {Path(robots_folder).as_posix()}: {closest_first(name, known)}"
-        )
+    if not is_file_in(path, folder, robots_folder):
+        listed = f"{Path(robots_folder).as_posix()}: {closest_first(name, known)}"
+        allowed = f"a file in this folder, named relative to this folder, or a robot of {listed}"
         raise InputError(source, "robot", repr(name), allowed)
     return path
+
+
+def _check_place(path: Path, folder: str | Path) -> None:
+    if is_file(path) and not is_file_in(path, folder):
+        raise InputError(path, "", "a link out of the campaign's folder", "the file itself")
 
 
 def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> Measurements:

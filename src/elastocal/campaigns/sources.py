@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.importers.catalogue import check_importer
-from elastocal.campaigns.reading import read_descriptions
+from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
 from elastocal.io.documents import document_path, named_document
+from elastocal.io.json_files import read_json
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from pathlib import Path
     from typing import Any
+
+# What Snakemake refuses as the value of a wildcard.
+_PERIODIC = re.compile(r"(.+)\1{19}$")
 
 
 def campaign_sources(config: Mapping[str, Any], folder: str | Path, source: str = "config.yaml") -> dict[str, dict[str, Any]]:
@@ -64,14 +68,16 @@ def named_league(config: Mapping[str, Any]) -> list[str]:
     )
 
 
-def user_campaign(config: Mapping[str, Any], robots_folder: str | Path) -> dict[str, str]:
-    """A user's own campaign, checked as a whole before any job starts.
+def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results: str | Path) -> dict[str, str]:
+    """A user's own campaign, its documents checked before any job starts.
 
     Parameters
     ----------
     config : dict
         ``campaign`` is its folder.
     robots_folder : str or Path
+    results : str or Path
+        Folder with the results of each campaign by its name.
 
     Returns
     -------
@@ -81,15 +87,28 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path) -> dict[
     Raises
     ------
     InputError
-        A name that no file can have or that a campaign of this project has.
+        As `reading.campaign_files`; a name that a campaign of this project has, or another one whose results are there.
     """
     folder = config.get("campaign")
     if not folder:
         return {}
+    campaign_files(folder, robots_folder)
     document, _ = read_descriptions(folder, robots_folder)
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
-    if not re.fullmatch(r"[\w.-]+", name):
-        raise InputError(source, "campaign", repr(name), "letters, digits, _, - and . for the name of its folder of results")
+    if _PERIODIC.search(name):
+        raise InputError(source, "campaign", repr(name), "a name that Snakemake does not take for an endless repetition")
     if name in named_campaigns(config):
         raise InputError(source, "campaign", repr(name), "a name that no campaign of config.yaml has")
+    earlier = _folder_of_results(Path(results) / name)
+    if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
+        found = f"{name!r}, whose results are of {earlier.as_posix()}"
+        raise InputError(source, "campaign", found, f"another name, or first take away {Path(results, name).as_posix()}")
     return {name: str(folder).rstrip("/")}
+
+
+def _folder_of_results(folder: Path) -> Path | None:
+    """Folder of the campaign that results are of, None where they do not say."""
+    try:
+        return Path(read_json(folder / "campaign.json")["source"]).parent
+    except (OSError, ValueError, KeyError, TypeError):
+        return None

@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import difflib
+import json
 import math
+import os
+import re
+import stat
 from functools import cache
 from importlib import resources
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -15,7 +20,7 @@ import yaml
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Iterator
     from typing import Any, Protocol
 
     class _Violation(Protocol):
@@ -29,19 +34,71 @@ if TYPE_CHECKING:
         message: str
 
 
+# Far above what people write by hand (no schema goes deeper than 7), and read in seconds whatever it holds.
+LARGEST_BYTES, MOST_VALUES, DEEPEST = 300_000, 100_000, 20
+# More digits are no number that anything here counts, and beyond 308 no floating-point number.
+_MOST_DIGITS = 18
+_DECIMAL = re.compile(
+    rf"[-+]?(0|[1-9]\d{{0,{_MOST_DIGITS - 1}}})|[-+]?(\d+\.\d*|\.\d+)([eE][-+]\d+)?|[-+]?\.(inf|nan)", re.ASCII | re.IGNORECASE
+)
+# What some programs write and YAML 1.1 takes for a text.
+_WITHOUT_POINT = re.compile(r"([-+]?\d+)(?:\.(\d*))?[eE]([-+]?)(\d+)", re.ASCII)
+# Faults of one document that are looked at: it may hold a fault in each of its entries.
+_MOST_FAULTS = 1000
+
+
+class _UnclearError(yaml.MarkedYAMLError):
+    """What people and YAML 1.1 read differently; `allowed` is what may stand there."""
+
+    def __init__(self, mark: Any, found: str, allowed: str) -> None:
+        super().__init__(problem=found, problem_mark=mark)
+        self.allowed = allowed
+
+
 # The safe loader, in C where libyaml is there: the study is read at every call of snakemake.
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """Safe, and a date stays the text that it is in the file."""
+    """Safe; a date stays the text that it is in the file, each key stands once, and numbers are decimal."""
 
     yaml_implicit_resolvers: ClassVar = {
         first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:timestamp"]
         for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
     }
 
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """A mapping; of keys that stand there twice the last would win."""
+        first: dict[str, yaml.Node] = {}
+        for key, _ in node.value:
+            if isinstance(key, yaml.ScalarNode) and first.setdefault(key.value, key) is not key:
+                line = first[key.value].start_mark.line + 1
+                raise _UnclearError(key.start_mark, f"the key {key.value!r} again", f"each key once (first in line {line})")
+        mapping: dict[Any, Any] = super().construct_mapping(node, deep)
+        return mapping
+
+    def construct_number(self, node: yaml.ScalarNode) -> int | float:
+        """A decimal number; YAML 1.1 would read 1_0 as 10, 010 as 8 and 1:30 as 90."""
+        if not _DECIMAL.fullmatch(node.value):
+            allowed = f"a decimal number of at most {_MOST_DIGITS} digits, or in quotes what is a text"
+            raise _UnclearError(node.start_mark, node.value, allowed)
+        number: int | float = self.construct_yaml_float(node) if node.tag.endswith("float") else int(node.value)
+        return number
+
+
+for _kind in ("int", "float"):
+    _Loader.add_constructor(f"tag:yaml.org,2002:{_kind}", _Loader.construct_number)
+
+
+def _each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[jsonschema.ValidationError]:
+    """The rule uniqueItems in linear time: jsonschema compares each pair where numbers and lists are mixed."""
+    if wanted and isinstance(instance, list):
+        entries = [json.dumps(entry, default=str) for entry in instance]
+        if len(set(entries)) < len(entries):
+            yield jsonschema.ValidationError("an entry twice")
+
 
 # Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
 _Validator = jsonschema.validators.extend(
     jsonschema.Draft202012Validator,
+    {"uniqueItems": _each_once},
     type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
         {
             "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
@@ -70,19 +127,80 @@ def read_document(path: str | Path) -> Any:
         A file that is missing or is no YAML, such as a URDF.
     """
     try:
-        with open(path, encoding="utf-8") as file:
-            text = file.read()
-        if text.lstrip("\ufeff \r\n\t").startswith("<"):
-            raise InputError(path, "", "XML", _NOT_XML)
-        return yaml.load(text, Loader=_Loader)
+        # A pipe or a device would never end.
+        if not stat.S_ISREG((status := os.stat(path)).st_mode):
+            raise InputError(path, "", "no regular file", "a readable file")
+        if status.st_size > LARGEST_BYTES:
+            raise InputError(path, "", f"{status.st_size} bytes", f"at most {LARGEST_BYTES} bytes of YAML")
+        text = Path(path).read_text("utf-8")
     except OSError as error:
         raise InputError(path, "", error.strerror or str(error), "a readable file") from None
     except UnicodeDecodeError as error:
         raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    return parsed(text, path)
+
+
+def parsed(text: str, source: str | Path) -> Any:
+    """Contents of a YAML text.
+
+    Parameters
+    ----------
+    text : str
+    source : str or Path
+        Named in errors.
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    InputError
+        No YAML, such as a URDF, or YAML that is unclear or out of bounds; the line is named.
+    """
+    if text.lstrip("\ufeff \r\n\t").startswith("<"):
+        raise InputError(source, "", "XML", _NOT_XML)
+    try:
+        _check_events(text)
+        return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
         where = "" if line is None else f"line {line + 1}"
-        raise InputError(path, where, getattr(error, "problem", None) or str(error), "YAML") from None
+        found = (getattr(error, "problem", None) or str(error)).removeprefix("but ").removeprefix("found ")
+        raise InputError(source, where, found, getattr(error, "allowed", "YAML")) from None
+
+
+def _check_events(text: str) -> None:
+    """Refuse what lets a small file grow beyond bounds or makes other objects than values, before anything is made of it."""
+    # Of each open list or mapping its anchor, how many values it holds with all aliases written out, and how deep they go.
+    sizes: dict[str, tuple[int, int]] = {}
+    frames: list[tuple[str | None, int, int]] = [(None, 0, 0)]
+    for event in yaml.parse(text, Loader=_Loader):
+        if isinstance(event, yaml.CollectionStartEvent):
+            frames.append((event.anchor, 0, 0))
+        elif isinstance(event, yaml.CollectionEndEvent):
+            anchor, count, height = frames.pop()
+            sizes |= {} if anchor is None else {anchor: (count, height + 1)}
+            frames[-1] = _enlarged(frames[-1], count, height + 1)
+        elif isinstance(event, yaml.AliasEvent):
+            if event.anchor not in sizes:
+                raise _UnclearError(event.start_mark, f"the alias *{event.anchor} of what is not complete", "values")
+            frames[-1] = _enlarged(frames[-1], *sizes[event.anchor])
+        elif isinstance(event, yaml.ScalarEvent):
+            sizes |= {} if event.anchor is None else {event.anchor: (1, 0)}
+            frames[-1] = _enlarged(frames[-1], 1, 0)
+        if isinstance(event, yaml.ScalarEvent | yaml.CollectionStartEvent) and event.tag is not None:
+            raise _UnclearError(event.start_mark, f"the tag {event.tag}", "values without tags")
+        if len(frames) + frames[-1][2] - 1 > DEEPEST:
+            raise _UnclearError(event.start_mark, "lists or keys in each other", f"at most {DEEPEST} deep")
+        if frames[-1][1] > MOST_VALUES:
+            raise _UnclearError(
+                event.start_mark, "more values than a document has", f"at most {MOST_VALUES}, aliases written out"
+            )
+
+
+def _enlarged(frame: tuple[str | None, int, int], count: int, height: int) -> tuple[str | None, int, int]:
+    return frame[0], frame[1] + count, max(frame[2], height)
 
 
 def one_line(value: Any) -> str:
@@ -124,7 +242,9 @@ def check_document(document: Any, schema: str, source: str) -> None:
         Names the first key at fault, what was found and what is allowed.
     """
     validator = _Validator(read_schema(schema))
-    errors = sorted(validator.iter_errors(document), key=lambda error: [str(part) for part in error.absolute_path])
+    errors = sorted(
+        islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
+    )
     if errors:
         raise InputError(source, *_explained(errors[0]))
 
@@ -145,14 +265,28 @@ def _explained(error: _Violation) -> tuple[str, str, str]:
     meaning = error.schema.get("description", "")
     allowed = {
         "enum": lambda: " | ".join(map(str, value)),
-        "type": lambda: f"{value}",
+        "type": lambda: _of_type(value, error.instance),
         "minimum": lambda: f"{value} or more",
+        "maximum": lambda: f"{value} or less",
         "exclusiveMinimum": lambda: f"more than {value}",
+        "exclusiveMaximum": lambda: f"less than {value}",
+        "minLength": lambda: f"{value} or more characters",
+        "maxLength": lambda: f"{value} or fewer characters",
         "minItems": lambda: f"{value} or more entries",
         "maxItems": lambda: f"{value} or fewer entries",
+        "minProperties": lambda: f"{value} or more keys",
         "uniqueItems": lambda: "each entry once",
+        "pattern": lambda: f"text that matches {value}",
     }.get(rule, lambda: error.message)()
     return key, repr(error.instance), f"{allowed} ({meaning})" if meaning else allowed
+
+
+def _of_type(allowed: str | list[str], instance: Any) -> str:
+    """What of a type is allowed, with the way to write a number that YAML takes for a text."""
+    written = _WITHOUT_POINT.fullmatch(instance) if isinstance(instance, str) else None
+    if written and ("number" in allowed):
+        return f"number, which YAML has as {written[1]}.{written[2] or 0}e{written[3] or '+'}{written[4]}"
+    return allowed if isinstance(allowed, str) else " or ".join(allowed)
 
 
 def document_path(folder: str | Path, kind: str, name: str) -> str:
@@ -185,11 +319,12 @@ def named_document(folder: str | Path, kind: str, schema: str, name: str, source
         No such file, or a document that its schema refuses.
     """
     path = Path(document_path(folder, kind, name))
-    if not path.is_file():
-        known = sorted(file.stem for file in path.parent.glob("*.yaml"))
+    known = sorted(file.stem for file in Path(folder, kind).glob("*.yaml") if file.is_file())
+    # By its name alone: a path would lead out of the folder.
+    if name not in known:
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"{close[0]!r}? ({', '.join(known)})" if close else ", ".join(known)
-        raise InputError(source, kind, repr(name), f"a file of {path.parent.as_posix()}: {hint}")
+        raise InputError(source, kind, repr(name), f"a file of {Path(folder, kind).as_posix()}: {hint}")
     document = read_document(path)
     check_document(document, schema, path.as_posix())
     return document

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
         def items(self) -> Iterable[tuple[str, Any]]: ...
 
 
+# A parameter of every rule that tells Snakemake of edited sources, and nothing of what was configured.
+SOURCES_DIGEST = "sources_sha256"
+
+
 def provenance(settings: Settings, **more: Any) -> dict[str, Any]:
     """Provenance of an output.
 
@@ -33,6 +37,7 @@ def provenance(settings: Settings, **more: Any) -> dict[str, Any]:
     dict
         JSON-serialisable and the same for the same settings.
     """
-    leaves = json.loads(json.dumps(dict(settings.items()), sort_keys=True, default=list))
+    kept = {name: value for name, value in settings.items() if name != SOURCES_DIGEST}
+    leaves = json.loads(json.dumps(kept, sort_keys=True, default=list))
     digest = hashlib.sha256(json.dumps(leaves, sort_keys=True).encode()).hexdigest()[:16]
     return {"elastocal_version": __version__, "configuration": leaves, "configuration_sha256": digest, **more}

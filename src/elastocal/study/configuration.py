@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
-from elastocal.io.documents import check_document, document_path, named_document
+from elastocal.io.documents import check_document, document_path, named_document, parsed
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.identification import first_solvable_length
 from elastocal.study.strategies import check_strategy, strategy_from_document
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
 # A measuring point in chain notation.
 _POINT = re.compile(r"\[(\w*[A-Za-z]\w*)\]")
@@ -70,6 +70,11 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
                 document_path(folder, "robots", name), key, "nothing", "values to simulate with, in a robot of the study"
             )
     strategies = {name: named_document(folder, "strategies", "strategy", name, source) for name in config["strategies"]}
+    named: dict[str, str] = {}
+    for name, document in strategies.items():
+        if (first := named.setdefault(document["name"], name)) != name:
+            place = document_path(folder, "strategies", name)
+            raise InputError(place, "name", f"{document['name']!r}, as of {first}", "a name of its own: tables go by it")
     chains = {
         name: robot_from_document(document, document_path(folder, "robots", name)).chain for name, document in robots.items()
     }
@@ -100,6 +105,36 @@ def check_study(config: Mapping[str, Any], folder: str | Path, source: str = "co
     return Study(robots, strategies, points, {name: chain.end_effector.name for name, chain in chains.items()})
 
 
+def with_overrides(config: Mapping[str, Any], entries: Iterable[str]) -> dict[str, Any]:
+    """A configuration with keys changed on the command line, numbers read as in the file.
+
+    Parameters
+    ----------
+    config : dict
+    entries : iterable of str
+        ``key=value``; a value that is a mapping changes some keys of a mapping.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        A value that is no YAML.
+    """
+    changed = dict(config)
+    for key, _, text in (entry.partition("=") for entry in entries):
+        changed[key] = _merged(changed.get(key), parsed(text, f"--config {key}"))
+    return changed
+
+
+def _merged(old: Any, new: Any) -> Any:
+    if isinstance(old, dict) and isinstance(new, dict):
+        return old | {key: _merged(old.get(key), value) for key, value in new.items()}
+    return new
+
+
 def rows_read(measured: str) -> int:
     """Measurements of one point in one configuration: 6 where poses are measured, 3 where positions are."""
     return {"pose": 6, "position": 3}[measured]
@@ -107,6 +142,10 @@ def rows_read(measured: str) -> int:
 
 def _check_cells(config: Mapping[str, Any], source: str) -> None:
     tables, longest = config["tables"], config["configurations"]
+    levels: dict[str, float] = {}
+    for level in config["noise_um"]:
+        if levels.setdefault(f"{level:g}", level) != level:
+            raise InputError(source, "noise_um", f"{levels[f'{level:g}']} and {level}", "levels that differ in 6 digits")
     if tables["classical_strategy"] not in config["strategies"]:
         raise InputError(
             source, "tables.classical_strategy", repr(tables["classical_strategy"]), f"one of strategies {config['strategies']}"

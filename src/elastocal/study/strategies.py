@@ -117,7 +117,7 @@ def check_strategy(strategy: Strategy, chain: Chain, source: str) -> None:
     """
     known: set[int] = set()
     names = [p.name for p in chain.points]
-    for number, stage in enumerate(strategy.stages, 1):
+    for number, stage in enumerate(strategy.stages):
         where = f"stages[{number}]"
         for name in stage.points:
             if name not in names:

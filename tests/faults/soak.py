@@ -1,0 +1,235 @@
+"""Kills, full disks, read-only folders, wrong clocks and two runs at once: a plain `snakemake -j2` has to get over each.
+
+`make soak` runs it with forty kills; tests/workflow/test_soak.py with a few. After each fault a plain run has to finish, and
+every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed.
+
+Usage: python tests/faults/soak.py [--kills 40] [--seed 1]
+"""
+
+import argparse
+import hashlib
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import psutil
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "helpers"))
+
+from study_folder import SMALL, Study
+
+VICTIMS = ("job", "snakemake", "group")
+MADE = ("data", "results", "reports")
+# What a part of the study is made of; enough jobs after and beside one another, in some seconds.
+CHANGES = SMALL | {"robots": ["kuka", "kuka_extended"], "noise_um": [0, 200], "data_sets": 300}
+TARGETS = """
+        "results/metrics/kuka/200um/6DoF.parquet",
+        "results/metrics/kuka/0um/6DoF.parquet",
+        "reports/tables/table1.csv",
+        "reports/tables/table2.csv",
+        lambda wildcards: files_behind(rules.all.input),
+"""
+
+
+def part_of_the_study(folder):
+    """Sources whose default target is a part of the study."""
+    study = Study.of_sources(folder)
+    study.configure(CHANGES)
+    study.replace("Snakefile", "        rules.study.input,\n        rules.loop.input,\n", TARGETS.lstrip("\n"))
+    return study
+
+
+def contents(study):
+    """Digest of each file that jobs write, but for logs and timings."""
+    files = [p for name in MADE for p in study.path(name).rglob("*") if p.is_file()]
+    named = {p.relative_to(study.folder).as_posix(): p for p in files}
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for name, path in named.items()
+        if not name.startswith(("results/logs/", "results/timings/"))
+    }
+
+
+def cleared(study):
+    """As before the first run."""
+    for name in (*MADE, ".snakemake"):
+        shutil.rmtree(study.path(name), ignore_errors=True)
+
+
+def started(study):
+    """A plain run, under way in a process group of its own."""
+    return subprocess.Popen(
+        **study.command("-j2"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
+    )
+
+
+def ended_by_itself(study):
+    """Last lines of a plain run that has to finish."""
+    done = study.snakemake("-j2")
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+
+
+def killed(study, victim, after_s, draws):
+    """Start a run and kill a part of it.
+
+    Parameters
+    ----------
+    study : Study
+    victim : {"job", "snakemake", "group"}
+    after_s : float
+        Seconds from the start.
+    draws : random.Random
+        Chooses the job.
+
+    Returns
+    -------
+    bool
+        Whether there was something left to kill.
+    """
+    run = started(study)
+    time.sleep(after_s)
+    jobs = psutil.Process(run.pid).children(recursive=True) if run.poll() is None else []
+    there = run.poll() is None and (victim != "job" or bool(jobs))
+    if there and victim == "group":
+        os.killpg(run.pid, signal.SIGKILL)
+    elif there:
+        (draws.choice(jobs) if victim == "job" else psutil.Process(run.pid)).kill()
+    run.wait()
+    return there
+
+
+def refused_in_one_line(study):
+    """The last line of a plain run that cannot finish; no traceback."""
+    done = study.snakemake("-j2")
+    said = (done.stdout + done.stderr).strip().splitlines()
+    assert done.returncode != 0 and "Traceback" not in done.stdout + done.stderr, "\n".join(said[-30:])
+    assert len(said[-1]) <= 500 and "allowed:" in said[-1], "\n".join(said[-30:])
+    return said[-1]
+
+
+def on_a_small_disk(reference, megabytes, options=()):
+    """A file system in memory with the sources; to be unmounted by whoever asked for it."""
+    folder = Path(tempfile.mkdtemp())
+    subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={megabytes}m", "tmpfs", folder], check=True)
+    for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "README.md"):
+        source = reference.path(name)
+        (shutil.copytree if source.is_dir() else shutil.copy2)(source, folder / name)
+    return Study(folder)
+
+
+def full_disk(reference, expected):
+    """Refused in a line while the disk is full, and finished once there is room."""
+    study = on_a_small_disk(reference, 40)
+    try:
+        said = []
+        # What is left, from nothing on, so that it runs out before the first job and during later ones.
+        for left in (0, 30_000, 300_000, 1_000_000):
+            filler = study.path("filler")
+            space = shutil.disk_usage(study.folder).free
+            with open(filler, "wb") as file:
+                file.write(bytes(max(0, space - left)))
+            said.append(refused_in_one_line(study))
+            filler.unlink()
+        ended_by_itself(study)
+        assert contents(study) == expected
+        return said
+    finally:
+        subprocess.run(["umount", "-l", study.folder], check=True)
+
+
+def read_only(reference, expected):
+    """Refused in a line while results cannot be written, and finished once they can."""
+    study = on_a_small_disk(reference, 60)
+    try:
+        said = []
+        for name in ("results", "."):
+            folder = study.path(name)
+            folder.mkdir(exist_ok=True)
+            subprocess.run(["mount", "--bind", folder, folder], check=True)
+            subprocess.run(["mount", "-o", "remount,ro,bind", folder], check=True)
+            try:
+                said.append(refused_in_one_line(study))
+            finally:
+                subprocess.run(["umount", "-l", folder], check=True)
+        ended_by_itself(study)
+        assert contents(study) == expected
+        return said
+    finally:
+        subprocess.run(["umount", "-l", study.folder], check=True)
+
+
+def clock_set_back(study, expected):
+    """An edit that is older than what was made from it reruns what depends on it; dates alone rerun nothing."""
+    ended_by_itself(study)
+    for shift in (-1e6, 1e6):
+        for name in contents(study):
+            os.utime(study.path(name), (time.time() + shift,) * 2)
+        ended_by_itself(study)
+        assert contents(study) == expected
+    source = study.path("src/elastocal/study/metrics.py")
+    before = source.read_text(encoding="utf-8")
+    study.append("src/elastocal/study/metrics.py", "# an edit\n")
+    os.utime(source, (1e9, 1e9))
+    assert ("evaluate", "kuka", "200", "6DoF") in study.planned()
+    source.write_text(before, encoding="utf-8")
+    os.utime(source, (1e9, 1e9))
+    ended_by_itself(study)
+    assert contents(study) == expected
+
+
+def two_at_once(study, expected, apart_s):
+    """One of them may be refused; what they leave is that of one."""
+    cleared(study)
+    first = started(study)
+    time.sleep(apart_s)
+    second = started(study)
+    codes = first.wait(), second.wait()
+    assert 0 in codes, codes
+    ended_by_itself(study)
+    assert contents(study) == expected
+    return codes
+
+
+def soak(folder, kills, seed):
+    """All of it, said line by line."""
+    draws = random.Random(seed)
+    study = part_of_the_study(Path(folder) / "study")
+    begin = time.monotonic()
+    ended_by_itself(study)
+    lasts, expected = time.monotonic() - begin, contents(study)
+    print(f"undisturbed: {lasts:.1f} s, {len(expected)} files", flush=True)
+    counts = dict.fromkeys(VICTIMS, 0)
+    number = 0
+    while sum(counts.values()) < kills:
+        cleared(study)
+        victim, after = VICTIMS[number % 3], draws.uniform(0.3, lasts)
+        number += 1
+        if killed(study, victim, after, draws):
+            counts[victim] += 1
+            ended_by_itself(study)
+            assert contents(study) == expected, (victim, after)
+            print(f"{sum(counts.values())}: {victim} killed after {after:.1f} s, finished, identical", flush=True)
+    for apart in (0.0, 1.0, lasts / 2):
+        print(f"two runs {apart:.1f} s apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
+    clock_set_back(study, expected)
+    print("clock set back: identical", flush=True)
+    if os.geteuid() == 0:
+        for line in [*full_disk(study, expected), *read_only(study, expected)]:
+            print(line)
+        print("full disk, read-only folders: one line each, finished later, identical", flush=True)
+    print(f"kills survived: {counts}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--kills", type=int, default=40)
+    parser.add_argument("--seed", type=int, default=1)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as top:
+        soak(top, given.kills, given.seed)

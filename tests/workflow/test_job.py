@@ -1,0 +1,82 @@
+"""What every script does around its one call: whatever ends it, the log says why, and bad input is one line."""
+
+import errno
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from study_folder import REPOSITORY
+
+sys.path.insert(0, str(REPOSITORY / "workflow" / "scripts"))
+
+from elastocal.errors import InputError
+
+from job import run
+
+INPUT, OUTPUT = "data/a.csv", "results/b.csv"
+
+
+@pytest.fixture
+def job(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder in ("data", "results/logs", ".snakemake"):
+        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / INPUT).write_text("1\n")
+    return SimpleNamespace(input=[INPUT], output=[OUTPUT], log=["results/logs/b.log"])
+
+
+def log(job):
+    return Path(job.log[0]).read_text(encoding="utf-8")
+
+
+def copied(job):
+    Path(job.output[0]).write_bytes(Path(job.input[0]).read_bytes())
+
+
+def test_what_a_job_wrote_is_checked_by_the_next(job):
+    run(copied, job)
+    assert log(job) == "done\n"
+    following = SimpleNamespace(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"])
+    run(copied, following)
+    Path(OUTPUT).write_text("2\n")
+    with pytest.raises(SystemExit) as ended:
+        run(copied, following)
+    assert str(ended.value).startswith(f"{OUTPUT}: found other contents than were written; allowed: ")
+    assert log(following) == f"{ended.value}\n"
+
+
+@pytest.mark.parametrize(
+    ("fault", "line"),
+    [
+        (InputError("a.csv", "row 1", "x", "y"), "a.csv: row 1: found x; allowed: y"),
+        (OSError(errno.ENOSPC, "No space left on device"), f"{OUTPUT}: found No space left on device; allowed: a disk with"),
+        (PermissionError(errno.EROFS, "Read-only file system", "results/x"), "results/x: found Read-only file system; "),
+        (MemoryError(), "memory: found none left; allowed: more memory, or fewer jobs"),
+    ],
+)
+def test_bad_input_and_faults_of_the_machine_are_one_line(job, fault, line):
+    def step(_):
+        raise fault
+
+    with pytest.raises(SystemExit) as ended:
+        run(step, job)
+    assert str(ended.value).startswith(line) and len(str(ended.value).splitlines()) == 1
+    assert log(job).splitlines()[-1] == str(ended.value)
+    assert ("Traceback" in log(job)) == (not isinstance(fault, InputError))
+
+
+@pytest.mark.parametrize("fault", [ZeroDivisionError("x"), KeyboardInterrupt(), RuntimeError("y"), SystemExit(3)])
+def test_the_log_holds_the_traceback_of_anything_else(job, fault):
+    def step(_):
+        raise fault
+
+    with pytest.raises(type(fault)):
+        run(step, job)
+    assert "Traceback" in log(job) and type(fault).__name__ in log(job).splitlines()[-1]
+
+
+def test_a_log_that_cannot_be_written_hides_no_fault(job):
+    job.log = ["nowhere/b.log"]
+    with pytest.raises(SystemExit, match="found x"):
+        run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)

@@ -1,0 +1,18 @@
+"""Before all else: the configuration is a document that can be read, which Snakemake's own reader would not say in one line."""
+
+import sys
+from pathlib import Path
+
+from elastocal.errors import InputError
+from elastocal.io.documents import read_document
+
+# In a checkout by its name alone, in an installed package with its folder.
+FILE = Path(workflow.basedir, "config.yaml")
+
+try:
+    # Of what the file holds no key counts here; Snakemake reads it again, with the changes of the command line.
+    FILE = FILE.relative_to(Path.cwd()) if FILE.is_relative_to(Path.cwd()) else FILE
+    if not isinstance(read_document(FILE), dict):
+        raise InputError(FILE, "", "no keys", "the keys of src/elastocal/schemas/config.yaml")
+except InputError as error:
+    sys.exit(str(error))
