@@ -23,6 +23,7 @@ include: "workflow/rules/blind_follow_up.smk"
 include: "workflow/rules/blind_report.smk"
 include: "workflow/rules/closed_loop.smk"
 include: "workflow/rules/planning.smk"
+include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 
 
