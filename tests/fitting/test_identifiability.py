@@ -196,3 +196,31 @@ def test_a_law_that_is_nearly_a_straight_line_keeps_its_coefficient_and_not_its_
     # Given the torque; of the straight line within four standard errors.
     assert value > 5 * deviation
     assert abs(value / torque - half_play / taken_up) < 4 * deviation / torque
+
+
+@pytest.mark.parametrize("off", [-2.0, 0.0, 2.0])
+def test_a_prior_of_the_plausible_size_alone_identifies_nothing_however_it_rounds(off):
+    gram = np.diag([50.0, 1.0 + off * np.finfo(float).eps, 3.0])
+    none = np.zeros(3, bool)
+    np.testing.assert_array_equal(identifiable(gram, none, none), [True, False, True])
+
+
+def test_kept_are_those_of_one_pivot_after_the_other_where_ranks_are_deficient():
+    rng, given_up = np.random.default_rng(48), 0
+    for _ in range(200):
+        size = int(rng.integers(2, 12))
+        left = rng.standard_normal((int(rng.integers(1, size + 4)), size)) * 10.0 ** rng.uniform(-1, 3, size)
+        gram, kept = left.T @ left, []
+        for number in range(size):
+            before = gram[kept, number]
+            rest = gram[number, number] - before @ np.linalg.solve(gram[np.ix_(kept, kept)], before)
+            if rest > max(1.0, 1e-11 * gram[number, number]):
+                kept.append(number)
+        none = np.zeros(size, bool)
+        found = np.flatnonzero(identifiable(gram, none, none)).tolist()
+        # Those that come later may take what told their predecessors.
+        assert set(found) <= set(kept)
+        if (np.diag(np.linalg.inv(gram[np.ix_(kept, kept)])) <= 1.0).all():
+            assert found == kept
+            given_up += len(kept) < size
+    assert given_up > 20

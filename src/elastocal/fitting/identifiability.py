@@ -133,8 +133,8 @@ def _first_without_information(gram: np.ndarray) -> int | None:
     factor, number = dpotrf(gram, lower=1)
     known = number - 1 if number else len(gram)
     left_over = np.diag(factor)[:known] ** 2
-    # Rounding of the squares counts as nothing.
-    lacking = left_over <= np.maximum(1.0, 1e-11 * np.diag(gram)[:known])
+    # Rounding of the squares counts as nothing, nor that of a prior which alone makes one.
+    lacking = left_over <= np.maximum(1.0 + 1e-12, 1e-11 * np.diag(gram)[:known])
     if lacking.any():
         return int(np.argmax(lacking))
     return known if number else None

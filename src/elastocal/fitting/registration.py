@@ -57,19 +57,22 @@ def registered(model: Model, observations: Observations) -> Estimate:
     session = np.searchsorted(sessions, states.session[observations.state])
     frames = np.tile(np.eye(3), (len(sessions), 1, 1)), np.zeros((len(sessions), 3))
     offsets = np.array([target.offset_m or (0.0, 0.0, 0.0) for target in model.targets], float)
-    seen = set(observations.target.tolist())
+    seen = np.flatnonzero(np.bincount(observations.target, minlength=len(model.targets))).tolist()
     # A target may have all of its measurements among those held out.
-    unknown = [index for index, target in enumerate(model.targets) if target.offset_m is None and index in seen]
+    unknown = [index for index in seen if model.targets[index].offset_m is None]
+    pairs = {
+        (int(number), index): _Sums(nominal_position[mask], nominal_rotation[mask], observations.position[mask])
+        for number in np.unique(session)
+        for index in seen
+        if (mask := (session == number) & (observations.target == index)).any()
+    }
     for _ in range(_ROUNDS if model.fitted_frames and unknown else 1):
-        placed = nominal_position + (nominal_rotation @ offsets[observations.target][..., None])[..., 0]
         if model.fitted_frames:
-            frames = _frames(placed, observations.position, session, len(sessions))
-        in_base = _into_base(frames, session, observations.position - frames[1][session])
+            frames = _frames(pairs, offsets, len(sessions))
         before = offsets.copy()
         for index in unknown:
-            mask = observations.target == index
-            local = nominal_rotation[mask].transpose(0, 2, 1) @ (in_base[mask] - nominal_position[mask])[..., None]
-            offsets[index] = local[..., 0].mean(axis=0)
+            mine = [(sums, *(part[number] for part in frames)) for (number, target), sums in pairs.items() if target == index]
+            offsets[index] = sum(sums.local(*frame) for sums, *frame in mine) / sum(sums.count for sums, *_ in mine)
         if np.abs(offsets - before).max() < _SETTLED_M:
             break
     turns = np.tile(np.eye(3), (len(model.targets), 1, 1))
@@ -86,15 +89,52 @@ def registered(model: Model, observations: Observations) -> Estimate:
     return Estimate(nothing.sessions, *frames, offsets, turns, tuple(start), nothing.shapes)
 
 
-def _frames(placed: np.ndarray, measured: np.ndarray, session: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+class _Sums:
+    """What rounds need of the measurements of one target in one session, whose number does not matter then.
+
+    Parameters
+    ----------
+    position : ndarray (N, 3)
+        p, of the nominal measuring point.
+    rotation : ndarray (N, 3, 3)
+        R, of the same.
+    measured : ndarray (N, 3)
+        y.
+    """
+
+    def __init__(self, position: np.ndarray, rotation: np.ndarray, measured: np.ndarray) -> None:
+        self.count, self.measured = len(position), measured.mean(axis=0)
+        self.position, self.rotation = position.mean(axis=0), rotation.mean(axis=0)
+        # About the means, so that nothing cancels.
+        off = measured - self.measured
+        self.with_position = off.T @ (position - self.position)
+        self.with_rotation = np.tensordot(off, rotation - self.rotation, (0, 0))
+        self.backwards = np.einsum("nik,ni->k", rotation, position)
+
+    def placed(self, offset: np.ndarray) -> np.ndarray:
+        """Mean of p + R o, (3,)."""
+        return self.position + self.rotation @ offset
+
+    def across(self, offset: np.ndarray) -> np.ndarray:
+        """Sum of y (p + R o)' about the means of both, (3, 3)."""
+        return self.with_position + self.with_rotation @ offset
+
+    def local(self, turn: np.ndarray, shift: np.ndarray) -> np.ndarray:
+        """Sum of R' (F' (y - t) - p) with a frame's F and t, (3,)."""
+        mean = self.count * self.rotation.T @ (turn.T @ (self.measured - shift))
+        return np.tensordot(turn, self.with_rotation, 2) + mean - self.backwards
+
+
+def _frames(pairs: dict[tuple[int, int], _Sums], offsets: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
     for number in range(count):
-        mask = session == number
-        centre, seen = placed[mask].mean(axis=0), measured[mask].mean(axis=0)
-        rotation[number] = Rotation.align_vectors(measured[mask] - seen, placed[mask] - centre)[0].as_matrix()
+        mine = [(sums, offsets[target]) for (session, target), sums in pairs.items() if session == number]
+        counts = np.array([sums.count for sums, _ in mine])
+        each, measured = np.array([sums.placed(o) for sums, o in mine]), np.array([sums.measured for sums, _ in mine])
+        centre, seen = counts @ each / counts.sum(), counts @ measured / counts.sum()
+        across = sum(sums.across(o) for sums, o in mine) + (counts[:, None] * (measured - seen)).T @ (each - centre)
+        left, _, right = np.linalg.svd(across)
+        left[:, -1] *= np.sign(np.linalg.det(left @ right))
+        rotation[number] = left @ right
         position[number] = seen - rotation[number] @ centre
     return rotation, position
-
-
-def _into_base(frames: tuple[np.ndarray, np.ndarray], session: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    return (frames[0][session].transpose(0, 2, 1) @ vectors[..., None])[..., 0]
