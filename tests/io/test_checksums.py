@@ -32,7 +32,8 @@ def test_any_altered_byte_is_found(file, altered, place):
     content = bytearray(Path(altered).read_bytes())
     content[place] ^= 1
     Path(altered).write_bytes(content)
-    with refused(file, "", "other contents than were written", "delete it and it is made again"):
+    again = "it" if altered == file else file
+    with refused(altered, "", "other contents than were written", f"delete {again} and it is made again"):
         check_checksums(FILES)
     record_checksums(FILES)
     check_checksums(FILES)
@@ -40,11 +41,17 @@ def test_any_altered_byte_is_found(file, altered, place):
 
 def test_a_file_that_is_taken_away_or_added_to_a_folder_is_found():
     Path("data/sealed/block/3.json").write_text("")
-    with refused(FILES[2], "", "other contents"):
+    with refused("data/sealed/block/3.json", "", "other contents"):
         check_checksums(FILES)
-    Path("data/sealed/block/3.json").rename("data/sealed/block/1/4.json")
-    with refused(FILES[2], "", "other contents"):
+    Path("data/sealed/block/3.json").unlink()
+    Path("data/sealed/block/1/case.json").unlink()
+    with refused("data/sealed/block/1/case.json", "", "other contents"):
         check_checksums(FILES)
+
+
+def test_the_time_that_snakemake_notes_in_a_folder_is_no_part_of_it():
+    Path("data/sealed/block/.snakemake_timestamp").touch()
+    check_checksums(FILES)
 
 
 def test_what_is_missing_not_recorded_or_not_made_here_is_not_judged(tmp_path):
@@ -59,6 +66,8 @@ def test_what_is_missing_not_recorded_or_not_made_here_is_not_judged(tmp_path):
 
 
 def test_sha256sum_reads_the_records():
+    folder = Path(f"results/checksums/{FILES[2]}.sha256").read_text().splitlines()
+    assert [line.split("  ")[1] for line in folder] == ["data/sealed/block/1/case.json", "data/sealed/block/2/case.json"]
     lines = Path(f"results/checksums/{FILES[0]}.sha256").read_text()
     assert lines == f"{checksum(FILES[0])}  {FILES[0]}\n"
     done = subprocess.run(["sha256sum", "--check"], input=lines, capture_output=True, text=True)

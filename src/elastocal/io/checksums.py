@@ -1,6 +1,6 @@
 """Checksums of what the steps wrote, beside the results, so that whoever reads a file next finds a byte that was altered.
 
-Each record is a line of ``sha256sum``, whose option ``--check`` reads it.
+Each record holds lines of ``sha256sum``, whose option ``--check`` reads them; one for each file where a step wrote a folder.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def record_checksums(paths: Iterable[str]) -> None:
     for path in filter(_made, paths):
         place = _record_of(path)
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_text(place, f"{checksum(path)}  {path}\n")
+        write_text(place, "".join(f"{checksum(file)}  {file}\n" for file in _files_of(path)))
 
 
 def check_checksums(paths: Iterable[str]) -> None:
@@ -49,13 +49,20 @@ def check_checksums(paths: Iterable[str]) -> None:
     """
     for path in filter(_made, paths):
         place = _record_of(path)
-        if place.is_file() and Path(path).exists() and place.read_text("utf-8").split(" ")[0] != checksum(path):
-            allowed = "the file as the pipeline wrote it (delete it and it is made again)"
-            raise InputError(path, "", "other contents than were written", allowed)
+        if not place.is_file() or not Path(path).exists():
+            continue
+        lines = place.read_text("utf-8").splitlines()
+        written = {file: digest for digest, _, file in (line.partition("  ") for line in lines)}
+        found = {file: checksum(file) for file in _files_of(path)}
+        for file in sorted(written.keys() | found.keys()):
+            if written.get(file) != found.get(file):
+                again = "it" if file == path else path
+                allowed = f"the file as the pipeline wrote it (delete {again} and it is made again)"
+                raise InputError(file, "", "other contents than were written", allowed)
 
 
 def checksum(path: str | Path) -> str:
-    """SHA-256 of a file, or of the names and checksums of all files below a folder.
+    """SHA-256 of a file.
 
     Parameters
     ----------
@@ -65,12 +72,15 @@ def checksum(path: str | Path) -> str:
     -------
     str
     """
-    if Path(path).is_dir():
-        files = sorted(file for file in Path(path).rglob("*") if file.is_file())
-        listed = "".join(f"{checksum(file)}  {file.relative_to(path).as_posix()}\n" for file in files)
-        return hashlib.sha256(listed.encode()).hexdigest()
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _files_of(path: str) -> list[str]:
+    """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step."""
+    if not Path(path).is_dir():
+        return [path]
+    return sorted(file.as_posix() for file in Path(path).rglob("*") if file.is_file() and not file.name.startswith("."))
 
 
 def _made(path: str) -> bool:
