@@ -31,6 +31,7 @@ CALLERS = {
     "workflow/scripts/diagnose_campaign.py": "rules",
     "workflow/scripts/diagnose_cases.py": "blind proof",
     "workflow/scripts/diagnose_follow_ups.py": "follow-ups",
+    "workflow/scripts/diagnose_league_folds.py": "makes the call on the training poses of each fold of the league",
     "benchmarks/loop.py": "times the call on the case that `cases_in` gives",
     "benchmarks/large.py": "benchmark of the engine",
 }

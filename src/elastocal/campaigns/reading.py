@@ -221,7 +221,7 @@ def _check_compliance(
     """Refuse loads on a robot whose compliances are neither known nor identified; without loads its joints count as rigid."""
     nominal = document.get("compliance", "nominal") == "nominal"
     if nominal and not robot.compliance_known and measurements.wrench.any():
-        found = f"nominal, but no compliance_urad_per_Nm in {robot_path.as_posix()}, and loads"
+        found = f"nominal, but no compliance_urad_per_Nm in {robot_path.name}, and loads"
         raise InputError(source, "compliance", found, "identify, or nominal with compliance_urad_per_Nm in the robot file")
 
 
