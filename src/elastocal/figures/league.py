@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import FixedLocator, NullFormatter, NullLocator, StrMethodFormatter
 
+from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.words import physical_name
 from elastocal.figures.style import PALETTE, note, panels, styled
 
@@ -25,6 +26,7 @@ _TICKS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 _WHOLE = 420.0
 # Mechanisms that no data set makes more probable than this are left out.
 _LEAST_PROBABLE = 0.5
+_UNKNOWN = "not in the catalogue"
 
 
 @styled
@@ -95,12 +97,14 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
     across = [names.index(name) for name in shown["data"]]
     down = [order.get_loc(name) for name in shown["mechanism"]]
     area = _WHOLE * np.clip(shown["share"].to_numpy(), 0.004, 1.0)
-    drawn = axis.scatter(across, down, area, shown["probability"], cmap="viridis_r", vmin=0.0, vmax=1.0, lw=0.4, ec="#4d4d4d")
+    drawn = axis.scatter(
+        across, down, area, shown["probability"], cmap="viridis_r", vmin=0.0, vmax=1.0, lw=0.4, ec="#4d4d4d", zorder=3
+    )
     for x, y, share in zip(across, down, shown["share"], strict=True):
         if share >= 0.005:
             axis.annotate(f"{100 * share:.0f} %", (x, y), (11, 0), textcoords="offset points", va="center", fontsize=6.5)
     axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=30, ha="right")
-    axis.set_yticks(range(len(order)), [physical_name(name) for name in order])
+    axis.set_yticks(range(len(order)), [_UNKNOWN if name == OTHER else physical_name(name) for name in order])
     axis.set_xlim(-0.5, len(names) - 0.2)
     axis.set_ylim(len(order) - 0.5, -0.5)
     figure.colorbar(drawn, ax=axis, label="probability (mean over folds)", shrink=0.8)
