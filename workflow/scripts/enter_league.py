@@ -6,7 +6,7 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.league.data_files import load_data_set
 from elastocal.league.diagnosed_folds import physics_of_fold
 from elastocal.league.entry_columns import entry_columns
-from elastocal.league.methods import Method, entered
+from elastocal.league.methods import entered, method_from
 from elastocal.league.rounds import held_out_rounds, training_rounds
 from elastocal.league.schemas import ENTRIES, FITS
 
@@ -14,7 +14,7 @@ from job import Job, run
 
 
 def enter_league(job: Job) -> None:
-    split, method = job.wildcards.split, Method(**job.params.method)
+    split, method = job.wildcards.split, method_from(job.params.method, job.wildcards.method, "config.yaml")
     files = zip(job.input.descriptions, job.input.measurements, job.input.folds, strict=True)
     data, *others = (load_data_set(*paths) for paths in files)
     facts = read_json(job.input.facts) if job.input.facts else None

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from elastocal.remainder.protocol import Setting
 
 FRAMES, GEOMETRY, DIAGNOSIS = "frames", "geometry", "diagnosis"
-PHYSICS = (FRAMES, GEOMETRY, DIAGNOSIS)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.joint_space import blocks_of_poses
-from elastocal.fitting.least_squares import fit, fit_frames
-from elastocal.fitting.observations import sample_of, select_states, state_clusters
-from elastocal.fitting.registration import registered
+from elastocal.fitting.least_squares import fit_frames
+from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.catalogue import regressions
 from elastocal.remainder.inputs import inputs_of
 from elastocal.remainder.intervals import calibrated
@@ -18,7 +17,8 @@ from elastocal.remainder.protocol import Part
 from elastocal.remainder.tuning import tuned
 from elastocal.validation.fitted_range import outside_poses
 from elastocal.validation.held_out import position_residuals
-from elastocal.validation.placing import placed, placed_estimate, same_campaign
+from elastocal.validation.placing import placed, same_campaign
+from elastocal.validation.splits import refits
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -137,15 +137,10 @@ def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere:
         fold = blocks_of_poses(states.joint_angles, pose, count)
     else:
         fold = np.random.default_rng(plan.seed).permutation(pose.max() + 1) % count
-    for number in range(count):
-        within = fold[pose] == number
-        rest, judged = select_states(observations, ~within), select_states(observations, within)
-        start = replace(registered(model, rest), shapes=fitted.estimate.shapes)
-        refit = fit(model, rest, fitted.noise, start)
-        there = placed_estimate(refit, judged)
+    for refit in refits(fitted, observations, fold[pose]):
         yield Part(
-            inputs_of(model, refit.estimate, rest, elsewhere),
-            position_residuals(model, refit.estimate, rest),
-            inputs_of(model, there, judged, elsewhere),
-            position_residuals(model, there, judged),
+            inputs_of(model, refit.estimate, refit.rest, elsewhere),
+            position_residuals(model, refit.estimate, refit.rest),
+            inputs_of(model, refit.there, refit.left_out, elsewhere),
+            position_residuals(model, refit.there, refit.left_out),
         )

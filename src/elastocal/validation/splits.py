@@ -26,9 +26,11 @@ from elastocal.validation.held_out import Errors, intervals, position_errors, su
 from elastocal.validation.placing import placed_estimate
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
     from typing import Any
 
     from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate
     from elastocal.fitting.observations import Observations, States
 
 # A quarter of the poses is about the share that campaigns hold out at random, so that both errors come from as many poses.
@@ -75,33 +77,72 @@ def splits_of(states: States) -> list[Split]:
     return [split for split in found if _fewest_left(split, pose) >= FEWEST_TRAINING_POSES]
 
 
-def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
-    """Position errors of observations, each predicted by a refit without the part that it belongs to.
+@dataclass(frozen=True)
+class Refit:
+    """A model fitted without one part of some observations.
 
-    Leave-one-block-out cross-validation. A refit starts from the nominal robot, so that a parameter that only the part left out
-    identifies does not keep its value, and keeps the shapes of the fit. A session that is left out has its frame fitted to
-    itself, see `placing.placed_estimate`.
+    Attributes
+    ----------
+    within : ndarray of bool (S,)
+        States of the part left out.
+    rest, left_out : Observations
+    estimate : Estimate
+        Fitted to the rest.
+    there : Estimate
+        The same for the part left out.
+    """
+
+    within: np.ndarray
+    rest: Observations
+    left_out: Observations
+    estimate: Estimate
+    there: Estimate
+
+
+def refits(fitted: Fit, observations: Observations, part: np.ndarray) -> Iterator[Refit]:
+    """Fit a model anew without each part of the observations in turn.
+
+    A refit starts from the nominal robot, so that a parameter that only the part left out identifies does not keep its value,
+    and keeps the shapes of the fit. A session that is left out has its frame fitted to itself, see `placing.placed_estimate`.
 
     Parameters
     ----------
     fitted : Fit
     observations : Observations
-        Which it was fitted to.
+        Which it was fitted to, or some of them.
     part : ndarray of int (S,)
         Of each state.
+
+    Yields
+    ------
+    Refit
+    """
+    for number in np.unique(part):
+        within = part == number
+        rest, left_out = select_states(observations, ~within), select_states(observations, within)
+        start = replace(registered(fitted.model, rest), shapes=fitted.estimate.shapes)
+        refit = fit(fitted.model, rest, fitted.noise, start)
+        yield Refit(within, rest, left_out, refit.estimate, placed_estimate(refit, left_out))
+
+
+def cross_validated(fitted: Fit, observations: Observations, part: np.ndarray) -> Errors:
+    """Position errors of observations, each predicted by a refit without the part that it belongs to.
+
+    Leave-one-block-out cross-validation, see `refits`.
+
+    Parameters
+    ----------
+    fitted, observations, part
+        As in `refits`.
 
     Returns
     -------
     Errors
     """
-    model, distance = fitted.model, np.empty(len(observations))
-    for number in np.unique(part):
-        within = part == number
-        rest, tested = select_states(observations, ~within), select_states(observations, within)
-        start = replace(registered(model, rest), shapes=fitted.estimate.shapes)
-        refit = fit(model, rest, fitted.noise, start)
-        errors = position_errors(model, placed_estimate(refit, tested), tested)
-        distance[within[observations.state]] = errors.distance
+    distance = np.empty(len(observations))
+    for refit in refits(fitted, observations, part):
+        errors = position_errors(fitted.model, refit.there, refit.left_out)
+        distance[refit.within[observations.state]] = errors.distance
     return Errors(distance, observations.cluster)
 
 
