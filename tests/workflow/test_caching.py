@@ -15,7 +15,7 @@ from import_closure import closure
 SCRIPTS = sorted(
     path.name
     for path in (REPOSITORY / "workflow" / "scripts").glob("*.py")
-    if "snakemake)" in path.read_text(encoding="utf-8").splitlines()[-1]
+    if path.read_text(encoding="utf-8").splitlines()[-1].startswith("run(")
 )
 LOOP = {
     rule
