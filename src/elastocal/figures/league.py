@@ -91,7 +91,7 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
         return note("No data set shows a mechanism of the catalogue with a probability of one half.")
     order = table[table["mechanism"].isin(kept)].groupby("mechanism")["share"].sum().sort_values(ascending=False).index
     names = list(dict.fromkeys(table["data"]))
-    figure, axes = panels(1, 1, 34 + 8 * len(order))
+    figure, axes = panels(1, 1, 34 + 12 * len(order))
     axis = axes[0, 0]
     shown = table[table["mechanism"].isin(kept)]
     across = [names.index(name) for name in shown["data"]]
@@ -100,9 +100,12 @@ def mechanism_picture(table: pd.DataFrame) -> Figure:
     drawn = axis.scatter(
         across, down, area, shown["probability"], cmap="viridis_r", vmin=0.0, vmax=1.0, lw=0.4, ec="#4d4d4d", zorder=3
     )
-    for x, y, share in zip(across, down, shown["share"], strict=True):
+    for x, y, share, size in zip(across, down, shown["share"], area, strict=True):
         if share >= 0.005:
-            axis.annotate(f"{100 * share:.0f} %", (x, y), (11, 0), textcoords="offset points", va="center", fontsize=6.5)
+            # Below its circle, where no neighbour hides it.
+            place = (0.0, -0.5 * float(np.sqrt(size)) - 1.0)
+            words = f"{100 * share:.0f} %"
+            axis.annotate(words, (x, y), place, textcoords="offset points", ha="center", va="top", fontsize=6.5)
     axis.set_xticks(range(len(names)), [name.replace("_", " ") for name in names], rotation=30, ha="right")
     axis.set_yticks(range(len(order)), [_UNKNOWN if name == OTHER else physical_name(name) for name in order])
     axis.set_xlim(-0.5, len(names) - 0.2)
