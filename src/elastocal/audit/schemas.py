@@ -6,6 +6,7 @@ from inspect import isfunction
 from typing import TYPE_CHECKING
 
 from elastocal.io.storage import TableSchema
+from elastocal.league import schemas as of_league
 from elastocal.loop import schemas as of_loop
 from elastocal.study import table_schemas as of_study
 
@@ -31,4 +32,4 @@ def _constant(schema: TableSchema) -> Callable[[int], TableSchema]:
     return lambda joints: schema
 
 
-SCHEMAS = _of_module(of_study) | _of_module(of_loop)
+SCHEMAS = _of_module(of_study) | _of_module(of_loop) | _of_module(of_league)
