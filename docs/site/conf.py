@@ -1,0 +1,37 @@
+"""Configuration of Sphinx, which makes the site from the pages that assemble.py puts together."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import elastocal
+
+project = "elastocal"
+copyright = "the elastocal developers"
+release = elastocal.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docstrings", "formulas"]
+
+myst_enable_extensions = ["dollarmath"]
+# Links to headings, as the hosting site makes them too.
+myst_heading_anchors = 3
+# Blocks of the pages show shells, tables and files of several kinds.
+highlight_language = "text"
+# Names in docstrings stand between single backticks.
+default_role = "code"
+exclude_patterns = ["docs/site"]
+
+autodoc_default_options = {"members": True}
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = "elastocal"
+html_math_renderer = "mathml"
+html_static_path = ["docs/site/static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+html_show_sphinx = False
