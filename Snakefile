@@ -26,6 +26,7 @@ include: "workflow/rules/planning.smk"
 include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
+include: "workflow/rules/audit.smk"
 
 
 watch_sources()

@@ -19,7 +19,9 @@ myst_heading_anchors = 3
 highlight_language = "text"
 # Names in docstrings stand between single backticks.
 default_role = "code"
-exclude_patterns = ["docs/site"]
+
+# Words of docstrings, such as the type of a parameter, that more than one class of the package has for a name.
+suppress_warnings = ["ref.python"]
 
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
@@ -31,7 +33,10 @@ napoleon_use_ivar = True
 html_theme = "furo"
 html_title = "elastocal"
 html_math_renderer = "mathml"
-html_static_path = ["docs/site/static"]
+html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
+# The search finds names; an index of all of them took as long as the rest of the reference.
+html_use_index = False
+html_domain_indices = False
 html_show_sphinx = False

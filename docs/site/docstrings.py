@@ -15,7 +15,9 @@ _REFERENCE = re.compile(r"^\.\. \[(\d+)\] (.*(?:\n {3}.*)*)", re.MULTILINE)
 def with_plain_references(text: str) -> str:
     """A docstring whose references are a list and whose citations are the numbers of its items."""
     listed = _REFERENCE.sub(lambda found: f"- [{found[1]}] {' '.join(found[2].split())}", text)
-    return re.sub(r"\[(\d+)\]_", r"[\1]", listed)
+    plain = re.sub(r"\[(\d+)\]_", r"[\1]", listed)
+    # Determinants and absolute values are no substitutions.
+    return "\n".join(line if "`" in line else line.replace("|", r"\|") for line in plain.split("\n"))
 
 
 def _of_member(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:

@@ -30,7 +30,9 @@ TABLES = {
 # Robots have different numbers of joints; tables are shown for this one.
 JOINTS = 6
 # The library links each pattern to a site that tries it.
-_TRIED_ELSEWHERE = re.compile(r" \(\[Test\]\([^)]*\)\)")
+_TRIED_ELSEWHERE = re.compile(r" \(\[Test\]\(https.*?\)\)(?=[.,;]|$)", re.MULTILINE)
+# It links references to keys by paths that are no anchors of the page.
+_TO_KEY = re.compile(r"\[([^]]+)\]\(#[^)]*\)")
 
 HEAD = """# File formats
 
@@ -56,7 +58,7 @@ def _document(name: str, words: str) -> str:
     # Of keys that allow only some values the library does not say which are required.
     required = ", ".join(f"`{key}`" for key in schema.get("required", ())) or "none"
     intro = f"{words} Keys that must be there: {required}. Other keys than these are refused."
-    return f"{title}\n\n{intro}\n{_TRIED_ELSEWHERE.sub('', listed)}"
+    return f"{title}\n\n{intro}\n{_TO_KEY.sub(r'\1', _TRIED_ELSEWHERE.sub('', listed))}"
 
 
 def _tables() -> str:
@@ -74,7 +76,8 @@ def table_schemas(module: str) -> list[TableSchema]:
         if isinstance(thing, TableSchema):
             found.append(thing)
         elif isfunction(thing) and thing.__module__ == module and not name.startswith("_"):
-            if thing.__annotations__.get("return") in ("TableSchema", TableSchema) and list(signature(thing).parameters) == ["joints"]:
+            made_of = list(signature(thing).parameters), thing.__annotations__.get("return")
+            if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
                 found.append(thing(JOINTS))
     return found
 

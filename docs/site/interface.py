@@ -11,8 +11,7 @@ HEAD = """Programming interface
 =====================
 
 One page for each room of the package ``elastocal``, made of the docstrings. The science needs no Snakemake and no configuration
-file: ``import elastocal.mechanics.kinematics`` and the like. Modules that begin with an underscore do not exist; what begins with one is
-not for use elsewhere.
+file: ``import elastocal.mechanics.kinematics`` and the like.
 
 .. toctree::
    :maxdepth: 1

@@ -3,7 +3,7 @@
 import fcntl
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,13 +25,16 @@ class Job(Protocol):
     log: Any
 
 
-def run(step: Callable[[Job], None], snakemake: Job) -> None:
-    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line."""
+def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None) -> None:
+    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line.
+
+    Files in `checked` that are no longer what a job wrote are refused before; all inputs where it is not given.
+    """
     log = Path(snakemake.log[0])
     _write(log, "")
     try:
         with _under_way():
-            check_checksums(snakemake.input)
+            check_checksums(snakemake.input if checked is None else checked)
             step(snakemake)
             record_checksums(snakemake.output)
     except InputError as error:
