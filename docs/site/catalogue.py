@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import yaml
 from docstrings import with_plain_references
 
 from elastocal.campaigns.reading import read_robot
@@ -48,6 +49,7 @@ FAMILIES = {
 }
 # That of the figures, see workflow/rules/signatures.smk.
 ROBOT = read_robot(Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml")
+FORMULAS = yaml.safe_load(Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8"))
 NEEDS = {
     "load": "a load, or declared masses",
     "external load": "an external load",
@@ -61,8 +63,9 @@ def page() -> str:
     """The page, in reStructuredText as the docstrings are."""
     listed = effects()
     unknown = {effect.FAMILY for effect in listed.values()} - set(FAMILIES)
-    if unknown:
-        raise KeyError(f"docs/site/catalogue.py has no words for the families {sorted(unknown)}")
+    if unknown or set(FORMULAS) != set(listed):
+        differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))
+        raise KeyError(f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}")
     parts = [HEAD]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
@@ -81,7 +84,9 @@ def _section(effect: Effect) -> str:
     text = text.replace("References\n----------\n", "*References*\n\n")
     moves = "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
     picture = f".. image:: /signatures/{effect.NAME}.svg\n   :alt: What {effect.WORDS} does to a measured point\n\n"
-    return f".. _{effect.NAME}:\n\n{_headed(title, '~')}{text.strip()}\n\n{moves}\n\n{picture}{_table(effect)}\n"
+    summary, _, rest = text.strip().partition("\n\n")
+    formula = f".. math:: {FORMULAS[effect.NAME]}\n\n"
+    return f".. _{effect.NAME}:\n\n{_headed(title, '~')}{summary}\n\n{formula}{rest}\n\n{moves}\n\n{picture}{_table(effect)}\n"
 
 
 def _table(effect: Effect) -> str:

@@ -58,7 +58,8 @@ def _document(name: str, words: str) -> str:
     # Of keys that allow only some values the library does not say which are required.
     required = ", ".join(f"`{key}`" for key in schema.get("required", ())) or "none"
     intro = f"{words} Keys that must be there: {required}. Other keys than these are refused."
-    return f"{title}\n\n{intro}\n{_TO_KEY.sub(r'\1', _TRIED_ELSEWHERE.sub('', listed))}"
+    keys = _TO_KEY.sub(r"\1", _TRIED_ELSEWHERE.sub("", listed))
+    return f"{title}\n\n{intro}\n{keys}"
 
 
 def _tables() -> str:

@@ -55,9 +55,9 @@ ELSEWHERE = {
     "pip install -e .": ("Makefile", "pip install -q --no-deps --no-build-isolation -e ."),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
     "python -m pip wheel --no-deps --no-build-isolation -w dist .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
-    # The exit status of the long ones is their result; each part of them has tests of its own.
-    "python benchmarks/run.py": ("Makefile", "python benchmarks/run.py"),
 }
+# Minutes of measurement by hand, of which CI has no room: nothing but that they start is tested.
+BY_HAND = ("python benchmarks/run.py", "python benchmarks/interval_coverage.py")
 # Not of this project, and with an effect on the machine: of the system's own package manager and of git's hooks.
 NOT_OURS = ("apt-get install", "pre-commit install", "pip show elastocal", "alias elastocal=")
 
@@ -70,7 +70,7 @@ def pages():
 def as_typed(line):
     """A line of a shell without its comment, blanks that align it, and the folder of the environment."""
     words = re.sub(r"\s+#.*", "", line.strip())
-    return " ".join(words.split()).replace(".venv/bin/", "")
+    return " ".join(words.split()).replace(".venv/bin/", "").replace(r"\|", "|")
 
 
 def begins_a_command(text):
@@ -129,10 +129,15 @@ def way_of(text):
         return "story"
     if text in ELSEWHERE:
         return "elsewhere"
+    if text in BY_HAND:
+        return "by hand"
     if text.startswith(NOT_OURS):
         return "not ours"
     if re.fullmatch(r"make [\w./-]+", text):
         return "make"
+    # `make test` runs all of them.
+    if (found := re.fullmatch(r"python -m pytest (tests/\S+)", text)) and (ROOT / found[1]).exists():
+        return "script"
     if text.startswith("snakemake "):
         return "dry run"
     if re.fullmatch(r"elastocal( \w+){0,2}( --help)?", text):
@@ -148,7 +153,7 @@ def test_no_command_of_a_page_is_run_by_nobody():
 def test_the_search_finds_commands_of_each_kind(tmp_path):
     """Lest a change of the pages' style empty it."""
     ways = {way_of(text) for text, _ in every_command()}
-    assert ways == {"script", "story", "elsewhere", "not ours", "make", "dry run", "help"}
+    assert ways == {"script", "story", "elsewhere", "not ours", "make", "dry run", "help", "by hand"}
     assert len(every_command()) > 60
     new = tmp_path / "new.md"
     new.write_text("Try `elastocal plan mine.yaml --poses 3`.\n\n    make coffee now\n\n```sh\nrm nothing\n```\n", encoding="utf-8")
@@ -169,6 +174,12 @@ def test_commands_that_are_only_named_have_help():
         words = [word for word in text.split() if word != "--help"][1:]
         result = CliRunner().invoke(app, [*words, "--help"])
         assert result.exit_code == 0, text
+
+
+@pytest.mark.parametrize("text", BY_HAND)
+def test_what_is_run_by_hand_is_there_and_compiles(text):
+    path = ROOT / text.split()[1]
+    compile(path.read_text(encoding="utf-8"), path, "exec")
 
 
 def test_make_knows_its_targets():
