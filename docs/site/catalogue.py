@@ -80,13 +80,15 @@ def _headed(title: str, underline: str) -> str:
 def _section(effect: Effect) -> str:
     title = f"{effect.WORDS[0].upper()}{effect.WORDS[1:]} (``{effect.NAME}``)"
     text = with_plain_references(sys.modules[effect.__name__].__doc__ or "")
-    # A heading of a docstring would be a heading of the page.
-    text = text.replace("References\n----------\n", "*References*\n\n")
     moves = "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
     picture = f".. image:: /signatures/{effect.NAME}.svg\n   :alt: What {effect.WORDS} does to a measured point\n\n"
     summary, _, rest = text.strip().partition("\n\n")
+    # A heading of a docstring would be a heading of the page.
+    rest, _, references = rest.partition("References\n----------\n")
     formula = f".. math:: {FORMULAS[effect.NAME]}\n\n"
-    return f".. _{effect.NAME}:\n\n{_headed(title, '~')}{summary}\n\n{formula}{rest}\n\n{moves}\n\n{picture}{_table(effect)}\n"
+    head = f".. _{effect.NAME}:\n\n{_headed(title, '~')}"
+    parts = (summary, formula + rest, moves, picture + _table(effect), references)
+    return head + "\n\n".join(part.strip() for part in parts) + "\n\n"
 
 
 def _table(effect: Effect) -> str:

@@ -26,6 +26,8 @@ suppress_warnings = ["ref.python"]
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
+# The contents of a page list modules; with all of their members they would be longer than the page.
+toc_object_entries = False
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 napoleon_use_ivar = True
@@ -36,6 +38,8 @@ html_math_renderer = "mathml"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
 html_copy_source = False
+# A browser lets no page that is opened as a file read others: results of a search are titles.
+html_show_search_summary = False
 # The search finds names; an index of all of them took as long as the rest of the reference.
 html_use_index = False
 html_domain_indices = False

@@ -185,15 +185,15 @@ def signature_figure(shown: Signature) -> Figure:
     _lines(force, shown.force_N, shown.by_force, "-", "approached upwards")
     _lines(force, shown.force_N, shown.by_force_falling, ":", "approached downwards")
     _lines(time, shown.time_h, shown.by_time, "-", "")
-    angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement of the reflector (mm)")
+    angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement (mm)")
     force.set(xlabel="force on the end-effector (N)")
-    time.set(xlabel=f"time (h), while {_LOWEST_C:.0f} °C become {_LOWEST_C + _RISE_K:.0f} °C")
+    time.set(xlabel=f"time (h), warming by {_RISE_K:.0f} K")
     for panel in (angle, force):
         panel.legend(handles=_dashes(panel), loc="upper left")
     time.legend(handles=time.lines[:3], labels=["along x", "along y", "along z"], loc="upper left")
     largest = max(np.abs(line.get_ydata()).max() for panel in axes[0] for line in panel.lines)
-    # A flat line is a finding too, and must not fill the panel with rounding errors.
-    angle.set_ylim(-1.1 * max(largest, 1e-3), 1.1 * max(largest, 1e-3))
+    # Above the lines is room for the legends.
+    angle.set_ylim(-1.1 * largest, 1.7 * largest)
     return figure
 
 
