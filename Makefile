@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
 
-.PHONY: paper test fuzz soak mutants lint bench pictures lock clean
+.PHONY: paper test fuzz soak mutants lint bench pictures site lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -39,6 +39,12 @@ bench: .venv/ready-for-tests
 pictures: .venv/ready
 	$(BIN)/snakemake -j$(CORES) pictures
 
+# The documentation as a site, site/html/index.html: a browser reads it with and without a network. A warning is an error.
+site: .venv/ready-for-tests
+	$(BIN)/snakemake -j1 signatures
+	$(BIN)/python docs/site/assemble.py site/source
+	$(BIN)/sphinx-build -q -W --keep-going -j $(CORES) -b html -c docs/site -d site/cache site/source site/html
+
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
@@ -46,7 +52,7 @@ lock:
 	    -c requirements.lock -o requirements-test.lock
 
 clean:
-	rm -rf .venv .snakemake data/simulated results/[a-z]* reports/[a-z]*
+	rm -rf .venv .snakemake data/simulated results/[a-z]* reports/[a-z]* site
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.image import imread
 from PIL import Image
 
-from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, styled
+from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, save_svg, styled
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
 DICHROMATS = {
@@ -108,3 +108,13 @@ def test_numbers_on_a_colour_have_the_ink_of_the_higher_contrast(colour, ink):
 def test_blue_carries_white_although_a_green_as_bright_carries_black():
     assert ink_on((0.0, 0.0, 1.0)) == "white"
     assert ink_on((0.0, 1.0, 0.0)) == "black"
+
+
+def test_an_svg_is_the_same_in_every_run_and_its_letters_are_letters(tmp_path):
+    for name in "ab":
+        figure, axes = panels(1, 1, 40)
+        axes[0, 0].plot([0, 1], label="line")
+        axes[0, 0].set_xlabel("angle (°)")
+        save_svg(figure, str(tmp_path / f"{name}.svg"))
+    assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+    assert "angle (°)" in (tmp_path / "a.svg").read_text(encoding="utf-8")

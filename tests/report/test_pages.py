@@ -15,6 +15,7 @@ HEAD = {
     "table2": ["robot", "mean mm"],
     "table3": ["robot", "c1"],
     "table4": [f"n {k}" for k in range(8)],
+    "interpretations": ["number", "open", "interpretation"],
 }
 
 

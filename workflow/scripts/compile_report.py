@@ -9,9 +9,12 @@ from elastocal.study.tables import headed_rows
 from job import Job, run
 
 
+TABLES = ("table1", "table2", "table3", "table4", "interpretations")
+
+
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
-    tables = {name: headed_rows(pd.read_csv(job.input[name])) for name in ("table1", "table2", "table3", "table4")}
+    tables = {name: headed_rows(pd.read_csv(job.input[name])) for name in TABLES}
     write_report(job.output.report, facts, tables | {"figures": job.params.figures}, job.input.figures)
 
 

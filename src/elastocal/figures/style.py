@@ -104,3 +104,19 @@ def save(figure: Figure, pdf: str, png: str) -> None:
     for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
         with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
+
+
+@styled
+def save_svg(figure: Figure, path: str) -> None:
+    """Write a figure for a page of the site, without a date and with names that are the same in every run.
+
+    Letters stay letters, which the reader's own sans serif draws.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+    path : str
+        The file appears whole or not at all.
+    """
+    with rc_context({"svg.hashsalt": "elastocal", "svg.fonttype": "none"}), atomic_write(path) as partial:
+        figure.savefig(partial, format="svg", metadata={"Date": None})

@@ -1,0 +1,111 @@
+"""The page of the catalogue of effects: physics and formula of each from its docstring, its figure, its parameters and sizes."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import yaml
+from docstrings import with_plain_references
+
+from elastocal.campaigns.reading import read_robot
+from elastocal.effects.catalogue import effects
+from elastocal.figures.effect_signatures import offered_candidates, signature
+
+if TYPE_CHECKING:
+    from elastocal.effects.protocol import Effect
+
+HEAD = """The catalogue of effects
+========================
+
+What a calibrated model may lack, one physical effect each. Made of the modules of ``elastocal.effects``: what a page says is what the
+code computes. A diagnosis compares all of them, at every location where they can act on the robot.
+
+How to read the figures
+-----------------------
+
+Each effect acts on the same heavy arm (Yaskawa GP180, gears of 100:1), with all its parameters at the *plausible size* that the
+table states: a size that such an effect reaches on real robots. Shown is by how much a reflector at the flange is displaced, in
+millimetres along the axes of the base; all three panels have the same scale.
+
+- **Left**: one joint turns through its range, without a load (solid) and under an oblique pull of 1 kN (dashed).
+- **Middle**: the pull rises from -1 to 1 kN in one pose; where a joint comes from below (solid) or from above (dotted).
+- **Right**: four hours in one pose without a load, while the arm warms up by 10 K. Something that happens at one moment
+  happens in the middle.
+
+A line that is flat in one panel and not in another is what distinguishes effects: an offset of a joint needs no load and no time, a
+spring does nothing without a load, a drift nothing at the beginning. Effects with alike figures are ambiguous, and a verdict says so.
+
+"""
+FAMILIES = {
+    "geometry": "Geometry: present without a load, fixed in time",
+    "gravity": "Gravity: present without a load, by weights and joint compliances",
+    "transmission": "Transmission: present without a load, by the angle of the joint",
+    "elastic": "Elastic: in proportion to the load",
+    "gearbox": "Gearboxes: by the load or the approach, but not in proportion",
+    "load": "Loads: what the force sensor shows is not what acts",
+    "drift": "Drift: by time, temperature or the order of measurements",
+}
+# That of the figures, see workflow/rules/signatures.smk.
+ROBOT = read_robot(Path(__file__).resolve().parents[2] / "config" / "robots" / "gp180.yaml")
+FORMULAS = yaml.safe_load(Path(__file__).with_name("effect_formulas.yaml").read_text(encoding="utf-8"))
+NEEDS = {
+    "load": "a load, or declared masses",
+    "external load": "an external load",
+    "approach": "the sense of approach of each joint",
+    "time": "the time of each measurement",
+    "temperature": "the temperature",
+}
+
+
+def page() -> str:
+    """The page, in reStructuredText as the docstrings are."""
+    listed = effects()
+    unknown = {effect.FAMILY for effect in listed.values()} - set(FAMILIES)
+    if unknown or set(FORMULAS) != set(listed):
+        differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))
+        raise KeyError(f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}")
+    parts = [HEAD]
+    for family, words in FAMILIES.items():
+        parts.append(_headed(words, "-"))
+        parts += [_section(effect) for effect in listed.values() if effect.FAMILY == family]
+    return "".join(parts)
+
+
+def _headed(title: str, underline: str) -> str:
+    return f"{title}\n{underline * len(title)}\n\n"
+
+
+def _section(effect: Effect) -> str:
+    title = f"{effect.WORDS[0].upper()}{effect.WORDS[1:]} (``{effect.NAME}``)"
+    text = with_plain_references(sys.modules[effect.__name__].__doc__ or "")
+    moves = "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
+    picture = f".. image:: /signatures/{effect.NAME}.svg\n   :alt: What {effect.WORDS} does to a measured point\n\n"
+    summary, _, rest = text.strip().partition("\n\n")
+    # A heading of a docstring would be a heading of the page.
+    rest, _, references = rest.partition("References\n----------\n")
+    formula = f".. math:: {FORMULAS[effect.NAME]}\n\n"
+    head = f".. _{effect.NAME}:\n\n{_headed(title, '~')}"
+    parts = (summary, formula + rest, moves, picture + _table(effect), references)
+    return head + "\n\n".join(part.strip() for part in parts) + "\n\n"
+
+
+def _table(effect: Effect) -> str:
+    candidate, count = signature(effect.NAME, ROBOT).candidate, len(offered_candidates(effect.NAME, ROBOT))
+    rows = [
+        f"   * - ``{parameter.name}``\n     - {parameter.unit}\n     - {parameter.plausible:.2g}\n     - {_sign(parameter.sign)}\n"
+        for parameter in candidate.parameters
+    ]
+    lines = [f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."]
+    if candidate.needs:
+        lines.append(f"It can be found only with {' and '.join(NEEDS[need] for need in sorted(candidate.needs))}.")
+    for shape in candidate.shapes:
+        unit = "" if shape.unit == "1" else f" {shape.unit}"
+        lines.append(f"Not linear in ``{shape.name}``, between {shape.lowest:.3g} and {shape.highest:.3g}{unit}.")
+    head = ".. list-table::\n   :header-rows: 1\n\n   * - parameter\n     - unit\n     - plausible size\n     - sign\n"
+    return f"{' '.join(lines)}\n\n{head}{''.join(rows)}"
+
+
+def _sign(sign: int) -> str:
+    return {-1: "negative", 0: "either", 1: "positive"}[sign]

@@ -1,0 +1,46 @@
+"""Configuration of Sphinx, which makes the site from the pages that assemble.py puts together."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import elastocal
+
+project = "elastocal"
+copyright = "the elastocal developers"
+release = elastocal.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "docstrings", "formulas"]
+
+myst_enable_extensions = ["dollarmath"]
+# Links to headings, as the hosting site makes them too.
+myst_heading_anchors = 3
+# Blocks of the pages show shells, tables and files of several kinds.
+highlight_language = "text"
+# Names in docstrings stand between single backticks.
+default_role = "code"
+
+# Words of docstrings, such as the type of a parameter, that more than one class of the package has for a name.
+suppress_warnings = ["ref.python"]
+
+autodoc_default_options = {"members": True}
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+# The contents of a page list modules; with all of their members they would be longer than the page.
+toc_object_entries = False
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+
+html_theme = "furo"
+html_title = "elastocal"
+html_math_renderer = "mathml"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_copy_source = False
+# A browser lets no page that is opened as a file read others: results of a search are titles.
+html_show_search_summary = False
+# The search finds names; an index of all of them took as long as the rest of the reference.
+html_use_index = False
+html_domain_indices = False
+html_show_sphinx = False

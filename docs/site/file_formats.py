@@ -1,0 +1,91 @@
+"""Pages of the file formats: what people write, of the JSON Schemas; what the pipeline writes, of the schemas of its tables."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module, resources
+from inspect import isfunction, signature
+
+import yaml
+from jsonschema2md import Parser
+
+from elastocal.io.storage import TableSchema
+
+# Each document with where it stands.
+DOCUMENTS = {
+    "campaign": "`campaign.yaml` of a campaign's folder.",
+    "robot": "A file of `config/robots`, or beside a campaign.",
+    "strategy": "A file of `config/strategies`.",
+    "config": "`config.yaml` at the top of the repository.",
+    "campaign_source": "A file of `config/campaigns`: where a campaign of this project comes from.",
+    "measurement_import": "`import.yaml`, by which an import of measurements can be repeated.",
+}
+# Each module of table schemas with where its tables lie.
+TABLES = {
+    "elastocal.study.table_schemas": "The study: `data/simulated`, `results`.",
+    "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
+    "elastocal.league.schemas": "The league of methods: `results/league`, `reports/league`.",
+    "elastocal.blind.closed_loop": "The closed loop: `results/closed_loop`.",
+}
+# Robots have different numbers of joints; tables are shown for this one.
+JOINTS = 6
+# The library links each pattern to a site that tries it.
+_TRIED_ELSEWHERE = re.compile(r" \(\[Test\]\(https.*?\)\)(?=[.,;]|$)", re.MULTILINE)
+# It links references to keys by paths that are no anchors of the page.
+_TO_KEY = re.compile(r"\[([^]]+)\]\(#[^)]*\)")
+
+HEAD = """# File formats
+
+Made of the schemas by which files are checked when they are read and written. Measurements, `measurements.csv`, are described in
+[a campaign](../../docs/campaign.md), tables for an audit in [the audit](../../docs/audit.md).
+
+```{toctree}
+:maxdepth: 1
+
+"""
+
+
+def pages() -> dict[str, str]:
+    """Text of each page by its name."""
+    found = {f"{name}.md": _document(name, words) for name, words in DOCUMENTS.items()} | {"tables.md": _tables()}
+    return {"index.md": HEAD + "".join(f"{name.removesuffix('.md')}\n" for name in found) + "```\n", **found}
+
+
+def _document(name: str, words: str) -> str:
+    text = resources.files("elastocal.schemas").joinpath(f"{name}.yaml").read_text(encoding="utf-8")
+    schema = yaml.safe_load(text)
+    title, _, listed = "".join(Parser(examples_as_yaml=True).parse_schema(schema)).partition("\n")
+    # Of keys that allow only some values the library does not say which are required.
+    required = ", ".join(f"`{key}`" for key in schema.get("required", ())) or "none"
+    intro = f"{words} Keys that must be there: {required}. Other keys than these are refused."
+    keys = _TO_KEY.sub(r"\1", _TRIED_ELSEWHERE.sub("", listed))
+    return f"{title}\n\n{intro}\n{keys}"
+
+
+def _tables() -> str:
+    parts = [f"# Tables\n\nParquet files, column by column; those that go with the robot are shown for {JOINTS} joints.\n"]
+    for module, words in TABLES.items():
+        parts.append(f"\n## {words.partition(':')[0]}\n\n{words.partition(': ')[2]}\n")
+        parts += [_table(schema) for schema in table_schemas(module)]
+    return "".join(parts)
+
+
+def table_schemas(module: str) -> list[TableSchema]:
+    """Every schema of a module, those included that go with the number of joints."""
+    found = []
+    for name, thing in vars(import_module(module)).items():
+        if isinstance(thing, TableSchema):
+            found.append(thing)
+        elif isfunction(thing) and thing.__module__ == module and not name.startswith("_"):
+            made_of = list(signature(thing).parameters), thing.__annotations__.get("return")
+            if made_of in ((["joints"], TableSchema), (["joints"], "TableSchema")):
+                found.append(thing(JOINTS))
+    return found
+
+
+def _table(schema: TableSchema) -> str:
+    rows = [
+        f"| `{column.name}` | {column.type} | {column.unit or '–'} | {column.meaning} | {'yes' if column.missing else ''} |\n"
+        for column in schema.columns
+    ]
+    return f"\n### {schema.name}\n\n| column | type | unit | meaning | may be missing |\n|---|---|---|---|---|\n{''.join(rows)}"

@@ -1,0 +1,210 @@
+"""What each effect of the catalogue does to a measured point: along a joint's angle, up and down a load, and over time.
+
+Effects are distinguishable by these dependences, so that all are shown by the same three experiments on one arm.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.effects.catalogue import effects
+from elastocal.effects.conditions import conditions_of
+from elastocal.figures.style import PALETTE, panels, styled
+from elastocal.fitting.displacement import displace
+from elastocal.fitting.observations import States
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.sites import sites_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from elastocal.effects.protocol import Candidate
+    from elastocal.mechanics.robot import Robot
+    from elastocal.mechanics.sites import Sites
+
+# The joint that bears the arm shows most effects; one that can act at several joints is shown there.
+_SHOWN_AT = 2
+# No robot file has to state its gears; those of heavy arms reduce about so much.
+_GEAR_RATIO = 100.0
+# A bent arm: no effect is hidden by a lever that happens to be zero.
+_POSE_DEG = (20.0, 10.0, 15.0, 30.0, 45.0, 20.0, 30.0)
+# A reflector beside the axis of the last joint, so that its turns are seen.
+_REFLECTOR_M = (0.1, 0.0, 0.1)
+# Across all axes of the arm, and over all its links.
+_PULL = np.array([0.5, 0.5, -0.5**0.5])
+_PULL_N = 1000.0
+# Four hours of a working day; the hall and the motors warm the arm from the temperature at which dimensions are stated.
+_HOURS, _LOWEST_C, _RISE_K = 4.0, 20.0, 10.0
+_WIDEST_SWEEP_DEG = 180.0
+_SAMPLES = 73
+_HOUR_S = 3600.0
+
+
+@dataclass(frozen=True)
+class Signature:
+    """An effect at one location of the arm, displaced through the three experiments.
+
+    Attributes
+    ----------
+    candidate : Candidate
+        With all its parameters at their plausible sizes and its shapes where a search starts.
+    joint : int
+        Whose angle is varied, counted from 1.
+    angle_deg, force_N, time_h : ndarray (S,)
+    by_angle, by_angle_loaded : ndarray (S, 3)
+        Displacement of the reflector in mm, base axes, without and with the largest pull.
+    by_force, by_force_falling : ndarray (S, 3)
+        While the force rises and while it falls.
+    by_time : ndarray (S, 3)
+    """
+
+    candidate: Candidate
+    joint: int
+    angle_deg: np.ndarray
+    force_N: np.ndarray
+    time_h: np.ndarray
+    by_angle: np.ndarray
+    by_angle_loaded: np.ndarray
+    by_force: np.ndarray
+    by_force_falling: np.ndarray
+    by_time: np.ndarray
+
+
+def signature(name: str, robot: Robot) -> Signature:
+    """The signature of an effect on an arm.
+
+    Parameters
+    ----------
+    name : str
+        Of an effect of the catalogue.
+    robot : Robot
+        With compliances, and with a compensator for the effects of one. What its links weigh is left aside, since the
+        weight of links is an effect only where it is not declared.
+
+    Returns
+    -------
+    Signature
+    """
+    sites = _weightless(robot)
+    offered = offered_candidates(name, robot)
+    candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
+    joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
+    limits = np.degrees(robot.joint_limits[joint - 1])
+    angle = np.linspace(*np.clip(limits, -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG), _SAMPLES)
+    force, time = np.linspace(-_PULL_N, _PULL_N, _SAMPLES), np.linspace(0, _HOURS, _SAMPLES)
+    turned = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
+    turned[:, joint - 1] = np.radians(angle)
+
+    def moved(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: np.ndarray | float) -> np.ndarray:
+        return _displacement_mm(candidate, sites, robot.compliance, _states(robot.joints, angles, newtons, **more))
+
+    return Signature(
+        candidate,
+        joint,
+        angle,
+        force,
+        time,
+        moved(turned),
+        moved(turned, _PULL_N),
+        moved(None, force),
+        moved(None, force, approach=-1.0),
+        moved(None, time_h=time),
+    )
+
+
+def offered_candidates(name: str, robot: Robot) -> list[Candidate]:
+    """Every way in which an effect can act on the arm of the figures, see `signature`."""
+    return effects()[name].candidates(_weightless(robot))
+
+
+def _weightless(robot: Robot) -> Sites:
+    return replace(sites_of(robot), masses=(), gear_ratio=(_GEAR_RATIO,) * robot.joints)
+
+
+def _states(
+    joints: int,
+    angles: np.ndarray | None,
+    newtons: np.ndarray | float,
+    approach: float = 1.0,
+    time_h: np.ndarray | float = _HOURS / 2,
+) -> States:
+    """States that differ in what is given alone; the rest is as in the middle of the campaign."""
+    every = np.ones(_SAMPLES)
+    share = every * time_h / _HOURS
+    pose = np.tile(np.radians(_POSE_DEG[:joints]), (_SAMPLES, 1)) if angles is None else angles
+    return States(
+        session=np.zeros(_SAMPLES, int),
+        pose=np.arange(_SAMPLES),
+        load=np.ones(_SAMPLES, int),
+        joint_angles=pose,
+        wrench=np.column_stack([np.outer(every * newtons, _PULL), np.zeros((_SAMPLES, 3))]),
+        repeats=np.ones(_SAMPLES, int),
+        approach=np.full((_SAMPLES, joints), approach),
+        time_s=_HOUR_S * _HOURS * share,
+        temperature_c=_LOWEST_C + _RISE_K * share,
+        row=share,
+    )
+
+
+def _displacement_mm(candidate: Candidate, sites: Sites, compliance: np.ndarray, states: States) -> np.ndarray:
+    """Displacement of the reflector, ndarray (S, 3)."""
+    around = conditions_of(sites, compliance, states, row_span=(0, 1))
+    point = replace(sites.chain.end_effector, offset_m=_REFLECTOR_M)
+    commanded = np.zeros((len(states), sites.chain.coordinates))
+    commanded[:, : sites.joints] = states.joint_angles
+    displaced = commanded.copy()
+    sizes = np.array([(parameter.sign or 1) * parameter.plausible for parameter in candidate.parameters])
+    displace(displaced, candidate, sizes, [shape.start for shape in candidate.shapes], around)
+    return 1e3 * (poses(sites.chain, displaced, point)[0] - poses(sites.chain, commanded, point)[0])
+
+
+@styled
+def signature_figure(shown: Signature) -> Figure:
+    """Draw a signature.
+
+    Parameters
+    ----------
+    shown : Signature
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Three panels on one scale of millimetres: angle of the joint, force, time.
+    """
+    figure, axes = panels(1, 3, 58, sharey=True)
+    # All figures alike; to search for a layout takes longer than to draw.
+    figure.set_layout_engine(None)
+    figure.subplots_adjust(left=0.085, right=0.99, bottom=0.18, top=0.96, wspace=0.08)
+    angle, force, time = axes[0]
+    _lines(angle, shown.angle_deg, shown.by_angle, "-", "unloaded")
+    _lines(angle, shown.angle_deg, shown.by_angle_loaded, "--", f"pulled by {_PULL_N:.0f} N")
+    _lines(force, shown.force_N, shown.by_force, "-", "approached upwards")
+    _lines(force, shown.force_N, shown.by_force_falling, ":", "approached downwards")
+    _lines(time, shown.time_h, shown.by_time, "-", "")
+    angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement (mm)")
+    force.set(xlabel="force on the end-effector (N)")
+    time.set(xlabel=f"time (h), warming by {_RISE_K:.0f} K")
+    for panel in (angle, force):
+        panel.legend(handles=_dashes(panel), loc="upper left")
+    time.legend(handles=time.lines[:3], labels=["along x", "along y", "along z"], loc="upper left")
+    largest = max(np.abs(line.get_ydata()).max() for panel in axes[0] for line in panel.lines)
+    # Above the lines is room for the legends.
+    angle.set_ylim(-1.1 * largest, 1.7 * largest)
+    return figure
+
+
+def _lines(axes: Axes, along: np.ndarray, moved: np.ndarray, dashes: str, label: str) -> None:
+    for axis, colour in enumerate(PALETTE[:3]):
+        axes.plot(along, moved[:, axis], dashes, color=colour, label=label if axis == 0 else "")
+
+
+def _dashes(axes: Axes) -> list:
+    """One grey line for each kind of dashes; the colours are those of the last panel."""
+    from matplotlib.lines import Line2D
+
+    kinds = {line.get_linestyle(): line.get_label() for line in axes.lines[::3]}
+    return [Line2D([], [], color="#4D4D4D", linestyle=dashes, label=label) for dashes, label in kinds.items()]

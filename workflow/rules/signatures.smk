@@ -1,0 +1,24 @@
+"""Pictures of the catalogue: what each effect does to a measured point, for the site.
+
+`snakemake -j1 signatures`. Writes reports/figures/signatures/EFFECT.svg.
+"""
+
+
+rule draw_signatures:
+    input:
+        # It has a compensator and a rated load, without which some effects are not offered.
+        robot=f"{CONFIG}/robots/gp180.yaml",
+        sources=sources("draw_signatures.py"),
+    output:
+        figures=directory("reports/figures/signatures"),
+    log:
+        "results/logs/draw_signatures.log",
+    benchmark:
+        "results/timings/draw_signatures.tsv"
+    script:
+        "../scripts/draw_signatures.py"
+
+
+rule signatures:
+    input:
+        rules.draw_signatures.output,

@@ -1,0 +1,20 @@
+"""What each effect of the catalogue does to a measured point."""
+
+from pathlib import Path
+
+from elastocal.campaigns.reading import read_robot
+from elastocal.effects.catalogue import effects
+from elastocal.figures.effect_signatures import signature, signature_figure
+from elastocal.figures.style import save_svg
+
+from job import Job, run
+
+
+def draw_signatures(job: Job) -> None:
+    robot = read_robot(Path(job.input.robot))
+    Path(job.output.figures).mkdir(exist_ok=True)
+    for name in effects():
+        save_svg(signature_figure(signature(name, robot)), f"{job.output.figures}/{name}.svg")
+
+
+run(draw_signatures, snakemake)
