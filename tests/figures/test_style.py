@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from PIL import Image
 
 from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, styled
+from elastocal.io.origin import Origin
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
 DICHROMATS = {
@@ -108,3 +109,16 @@ def test_numbers_on_a_colour_have_the_ink_of_the_higher_contrast(colour, ink):
 def test_blue_carries_white_although_a_green_as_bright_carries_black():
     assert ink_on((0.0, 0.0, 1.0)) == "white"
     assert ink_on((0.0, 1.0, 0.0)) == "black"
+
+
+def test_a_figure_names_commit_configuration_and_seed_in_both_files(tmp_path):
+    origin = Origin("c0ffee", "d16e57", 7)
+    for name, given in (("named", origin), ("again", origin), ("unnamed", None)):
+        save(note("Nothing."), str(tmp_path / f"{name}.pdf"), str(tmp_path / f"{name}.png"), given)
+    words = "commit c0ffee, configuration SHA-256 d16e57, seed 7"
+    assert Image.open(tmp_path / "named.png").text == {"Description": words, "Source": "c0ffee"}
+    assert f"/Subject ({words})".encode() in (tmp_path / "named.pdf").read_bytes()
+    assert b"/Keywords (c0ffee d16e57 7)" in (tmp_path / "named.pdf").read_bytes()
+    assert b"c0ffee" not in (tmp_path / "unnamed.pdf").read_bytes() + (tmp_path / "unnamed.png").read_bytes()
+    for kind in ("pdf", "png"):
+        assert (tmp_path / f"named.{kind}").read_bytes() == (tmp_path / f"again.{kind}").read_bytes()
