@@ -25,6 +25,7 @@ include: "workflow/rules/closed_loop.smk"
 include: "workflow/rules/planning.smk"
 include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
+include: "workflow/rules/audit.smk"
 
 
 watch_sources()

@@ -86,6 +86,11 @@ STUDY_SIZE = {
     "tests": config["test_configurations"],
     "noise": 1e-6 * config["tables"]["noise_um"],
 }
+# Keys of config.yaml that the files of study and loop depend on, and so their audit.
+AUDITED = [
+    *("seed", "robots", "strategies", "noise_um", "data_sets", "configurations", "test_configurations", "loading"),
+    *("interpretations", "identification", "evaluation", "tables", "questions"),
+]
 # Files that jobs make.
 MADE = re.compile("(data|results|reports)/")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}

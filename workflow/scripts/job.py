@@ -3,7 +3,7 @@
 import fcntl
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -30,14 +30,17 @@ class Job(Protocol):
     config: Any
 
 
-def run(step: Callable[[Job], None], snakemake: Job) -> None:
-    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line."""
+def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None) -> None:
+    """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line.
+
+    Files in `checked` that are no longer what a job wrote are refused before; all inputs where it is not given.
+    """
     log = Path(snakemake.log[0])
     _write(log, "")
     try:
         with _under_way():
             started = _now()
-            check_checksums(snakemake.input)
+            check_checksums(snakemake.input if checked is None else checked)
             step(snakemake)
             record_checksums(snakemake.output)
             write_job_record(snakemake.log[0], _record(snakemake, started))

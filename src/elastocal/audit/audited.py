@@ -1,0 +1,132 @@
+"""What an audit has at hand: the finished run's folder and what was configured; tables are read by pyarrow and pandas alone."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import pyarrow.parquet as pq
+
+from elastocal.audit.arm import Arm
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+
+COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
+_KEPT_TABLES = 40
+WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
+
+
+class Audited:
+    """A finished run; files, arms and regressors are kept once they have been read or worked out.
+
+    Parameters
+    ----------
+    folder : Path
+        With data/, results/ and reports/.
+    configuration : mapping
+        As in config.yaml.
+    robots, strategies : mapping of str to mapping
+        The files of these names.
+    sample : int
+        Rows of each file that are recomputed.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        configuration: Mapping[str, Any],
+        robots: Mapping[str, Mapping[str, Any]],
+        strategies: Mapping[str, Mapping[str, Any]],
+        sample: int,
+    ) -> None:
+        self.folder, self.configuration, self.sample = folder, configuration, sample
+        self.robots, self.strategies = robots, strategies
+        # Of a whole study all tables together are too large for a small machine.
+        self.table = lru_cache(_KEPT_TABLES)(self._read)
+        self._arms: dict[tuple[str, float], Arm] = {}
+        self._regressors: dict[tuple[str, int, int, str, bool], np.ndarray] = {}
+
+    @property
+    def seed(self) -> int:
+        """Seed of the run."""
+        return int(self.configuration["seed"])
+
+    @property
+    def wrench_at(self) -> str:
+        """Interpretation R6."""
+        return str(self.configuration["interpretations"]["wrench_at"])
+
+    @property
+    def rows(self) -> int:
+        """Measurements of a point in a configuration."""
+        return 6 if self.configuration["interpretations"]["measured"] == "pose" else 3
+
+    @cached_property
+    def strategy_named(self) -> dict[str, Mapping[str, Any]]:
+        """Strategies by the names that they print."""
+        return {document["name"]: document for document in self.strategies.values()}
+
+    def chance(self, file: str) -> np.random.Generator:
+        """What draws the sample of a file: the seed and the file's name."""
+        return np.random.default_rng([self.seed, zlib.crc32(file.encode())])
+
+    def picked(self, file: str, count: int, most: int | None = None) -> np.ndarray:
+        """Some of so many rows, in order."""
+        size = min(count, most or self.sample)
+        return np.sort(self.chance(file).choice(count, size, replace=False))
+
+    def _read(self, file: str) -> pd.DataFrame:
+        """A Parquet or CSV file; `table` is the same, read once."""
+        path = self.folder / file
+        return pq.ParquetFile(path).read().to_pandas() if file.endswith(".parquet") else pd.read_csv(path)
+
+    def metadata(self, file: str) -> dict[str, Any]:
+        """The entries of a Parquet file's own metadata that the pipeline wrote."""
+        raw = pq.ParquetFile(self.folder / file).metadata.metadata or {}
+        return {key.decode(): json.loads(value) for key, value in raw.items() if key.startswith(b"elastocal.")}
+
+    def there(self, file: str) -> bool:
+        """Whether the run has made a file."""
+        return (self.folder / file).is_file()
+
+    def arm(self, robot: str, diameter: float = 1.0) -> Arm:
+        """The robot by pinocchio and MuJoCo."""
+        if (robot, diameter) not in self._arms:
+            tool = self.configuration["interpretations"]["tool_offset_m"]
+            self._arms[robot, diameter] = Arm(self.robots[robot], tool, diameter)
+        return self._arms[robot, diameter]
+
+    def experiments(self, robot: str, test: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Joint angles (sets, configurations, n) and wrenches (sets, configurations, 6) as the file has them."""
+        frame = self.table(f"data/simulated/{robot}{'/test' if test else ''}/experiments.parquet")
+        joints = self.arm(robot).joints
+        sets = frame["data_set"].nunique()
+        angles = frame[[f"q{j}" for j in range(1, joints + 1)]].to_numpy().reshape(sets, -1, joints)
+        wrench = frame[list(WRENCH)].to_numpy().reshape(sets, -1, 6)
+        return angles, wrench
+
+    def deflections(self, file: str, point: str) -> np.ndarray:
+        """Deflections (sets, configurations, 6) of a measuring point as a file has them."""
+        frame = self.table(file)
+        rows = frame[frame["point"] == point]
+        return rows[list(COMPONENTS)].to_numpy().reshape(rows["data_set"].nunique(), -1, 6)
+
+    def regressor(self, robot: str, data_set: int, configuration: int, point: str, test: bool = False) -> np.ndarray:
+        """Matrix A (6, n) of equation 10 by pinocchio."""
+        key = (robot, data_set, configuration, point, test)
+        if key not in self._regressors:
+            angles, wrench = (each[data_set, configuration] for each in self.experiments(robot, test))
+            self._regressors[key] = self.arm(robot).regressor(angles, wrench, point, self.wrench_at)
+        return self._regressors[key]
+
+    def stacked(self, robot: str, data_set: int, length: int, points: list[str]) -> np.ndarray:
+        """Regressors of the first configurations of a data set, one below the other, point by point."""
+        rows = [self.regressor(robot, data_set, k, point)[: self.rows] for point in points for k in range(length)]
+        return np.concatenate(rows)

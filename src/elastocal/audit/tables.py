@@ -1,0 +1,525 @@
+"""Cells of the study's tables, followed back to the files that they come from, by pandas alone.
+
+Each function makes a table again, or those of its columns that follow from files; every cell of these columns is compared.
+Columns that are left are named in the finding.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from elastocal.audit.estimates import points_of
+from elastocal.audit.findings import Finding, compared, held
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping
+
+    from elastocal.audit.audited import Audited
+
+# Tables are written with nine digits.
+_NINE_DIGITS = 5.1e-9
+# Percentages and differences of what agrees to rounding, in the units of the tables.
+_ZERO = 1e-7
+# Of a normal distribution: 95 % within.
+_QUANTILE = 1.96
+
+
+def reduced(run: Audited) -> list[str]:
+    """Robots of the study without elastic links."""
+    return [name for name in run.configuration["robots"] if "links" not in run.robots[name]]
+
+
+def extended(run: Audited) -> list[str]:
+    """Robots of the study with elastic links."""
+    return [name for name in run.configuration["robots"] if "links" in run.robots[name]]
+
+
+def _noise(run: Audited) -> str:
+    return f"{run.configuration['tables']['noise_um']:g}"
+
+
+def _cell(run: Audited, kind: str, robot: str, noise_um: str, key: str) -> pd.DataFrame:
+    return run.table(f"results/{kind}/{robot}/{noise_um}um/{key}.parquet")
+
+
+def table1(run: Audited) -> pd.DataFrame:
+    """Compliances of the robot files."""
+    rows = {name: run.robots[name]["compliance_urad_per_Nm"] for name in reduced(run)}
+    return pd.DataFrame([{"robot": name} | {f"c{j}": c for j, c in enumerate(row, 1)} for name, row in rows.items()])
+
+
+def table2(run: Audited) -> pd.DataFrame:
+    """Deflections before calibration, from results/initial and results/weights."""
+    rows = []
+    for robot in run.configuration["robots"]:
+        frame, weights = run.table(f"results/initial/{robot}.parquet"), run.table(f"results/weights/{robot}.parquet")
+        counts = weights[weights["members"] == "data sets"].pivot(index="replicate", columns="number", values="count")
+        # Data sets are of one size: weights are those of their configurations.
+        drawn = np.array(
+            [[np.average(frame[name], weights=each) for name in ("mean", "mean_square")] for each in counts.to_numpy()]
+        )
+        mean, square = frame["mean"].mean(), frame["mean_square"].mean()
+        single: dict[str, pd.Series] = {
+            "mean": frame["mean"],
+            "std": (frame["mean_square"] - frame["mean"] ** 2) ** 0.5,
+            "max": frame["maximum"],
+        }
+        row: dict[str, Any] = {
+            "robot": robot,
+            "mean_mm": mean,
+            "std_mm": np.sqrt(square - mean**2),
+            "max_mm": frame["maximum"].max(),
+        }
+        row["mean_mm_std_error"] = drawn[:, 0].std(ddof=1)
+        row["std_mm_std_error"] = np.sqrt(drawn[:, 1] - drawn[:, 0] ** 2).std(ddof=1)
+        for name, values in single.items():
+            row |= {f"{name}_mm_one_set": values.mean(), f"{name}_mm_one_set_std": values.std(ddof=1)}
+        rows.append({name: value if name == "robot" else 1e3 * value for name, value in row.items()})
+    return pd.DataFrame(rows)
+
+
+def table3(run: Audited) -> pd.DataFrame:
+    """Compliances by the classical strategy, from results/metrics."""
+    tables, rows = run.configuration["tables"], []
+    for robot in reduced(run):
+        frame = _cell(run, "metrics", robot, _noise(run), tables["classical_strategy"]).set_index("length")
+        at, row = frame.loc[tables["length"]], {"robot": robot}
+        for j in range(1, run.arm(robot).joints + 1):
+            row |= {f"c{j}": 1e6 * at[f"compliance_{j}"], f"c{j}_std_error": 1e6 * at[f"compliance_{j}_std_error"]}
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def table4(run: Audited) -> pd.DataFrame:
+    """Strategies side by side, from results/metrics and results/replicates."""
+    tables, rows = run.configuration["tables"], []
+    length = tables["length"]
+    for key, strategy in run.strategies.items():
+        for robot in reduced(run):
+            frame = _cell(run, "metrics", robot, _noise(run), key)
+            at = frame.set_index("length").loc[length]
+            drawn = _cell(run, "replicates", robot, _noise(run), key)
+            row: dict[str, Any] = {"strategy": strategy["name"], "robot": robot}
+            for suffix in ("", "_first_stage"):
+                name, limit = f"k_sigma{suffix}", tables["k_sigma_limit_percent"]
+                row[f"k_sigma_{length}_percent{suffix}"] = at[name]
+                row[f"k_sigma_{length}_percent{suffix}_std_error"] = at[f"{name}_std_error"]
+                reached = f"n_k_sigma_{limit:g}_percent{suffix}"
+                row[reached], row[f"{reached}_std_error"] = _reached(frame, drawn, name, limit)
+            row |= {f"dev_{length}_um": 1e6 * at["deviation"], f"dev_{length}_um_std_error": 1e6 * at["deviation_std_error"]}
+            limit = tables["deviation_limit_um"]
+            reached = f"n_dev_{limit:g}_um"
+            row[reached], row[f"{reached}_std_error"] = _reached(frame, drawn, "deviation", 1e-6 * limit)
+            rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _reached(frame: pd.DataFrame, drawn: pd.DataFrame, name: str, limit: float) -> tuple[float, float]:
+    """First length at which a score is at most its limit, and its standard error over replicates, continued as 1 / length."""
+
+    def first(values: np.ndarray) -> float:
+        below = np.flatnonzero(np.abs(values) <= limit)
+        return float(below[0] + 1) if len(below) else np.inf
+
+    lengths = []
+    for _, some in drawn.groupby("replicate"):
+        values = some.sort_values("length")[name].to_numpy()
+        reached = first(values)
+        lengths.append(reached if np.isfinite(reached) else len(values) * max(abs(values[-1]) / limit, 1.0))
+    return first(frame.sort_values("length")[name].to_numpy()), float(np.std(lengths, ddof=1))
+
+
+def extended_table(run: Audited) -> pd.DataFrame:
+    """What the reduced model leaves, from results/metrics and results/replicates."""
+    rows, length = [], run.configuration["tables"]["length"]
+    for robot in extended(run):
+        for key, strategy in run.strategies.items():
+            at = _cell(run, "metrics", robot, _noise(run), key).set_index("length").loc[length]
+            drawn = _cell(run, "replicates", robot, _noise(run), key)
+            drawn = drawn[drawn["length"] == length]
+            rows.append(
+                {
+                    "strategy": strategy["name"],
+                    "robot": robot,
+                    "initial_mean_mm": 1e3 * at["initial_deviation"],
+                    "initial_mean_mm_std_error": 1e3 * at["initial_deviation_std_error"],
+                    "residual_mean_um": 1e6 * at["deviation"],
+                    "residual_mean_um_std_error": 1e6 * at["deviation_std_error"],
+                    "share_compensated_percent": 100 * (1 - at["deviation"] / at["initial_deviation"]),
+                    "share_compensated_percent_std_error": (100 * (1 - drawn["deviation"] / drawn["initial_deviation"])).std(
+                        ddof=1
+                    ),
+                }
+            )
+    return pd.DataFrame(rows)
+
+
+def per_dataset(run: Audited) -> pd.DataFrame:
+    """Accuracy of one data set beside its bound, from results/accuracy and results/bounds."""
+    rows = []
+    for robot in run.configuration["robots"]:
+        bounds = run.table(f"results/bounds/{robot}.parquet").set_index(["points", "length"])["rms_per_noise"]
+        for noise_um in run.configuration["noise_um"]:
+            for key, strategy in run.strategies.items():
+                points = "+".join(sorted(points_of(strategy)))
+                for _, at in _cell(run, "accuracy", robot, f"{noise_um:g}", key).iterrows():
+                    row = {"strategy": strategy["name"], "robot": robot, "noise_um": float(noise_um), "ds": at["length"]}
+                    row |= {f"{name}_um": 1e6 * at[name] for name in ("mean", "rms", "p95", "max")}
+                    row |= {f"{name}_um_std_error": 1e6 * at[f"{name}_std_error"] for name in ("mean", "rms", "p95", "max")}
+                    row["crlb_rms_um"] = bounds[points, int(at["length"])] * noise_um
+                    row["efficiency"] = (row["crlb_rms_um"] / row["rms_um"]) ** 2 if noise_um else np.nan
+                    rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def solvers(run: Audited) -> pd.DataFrame:
+    """How far the solvers lie apart, from results/solvers."""
+    rows = []
+    for robot in reduced(run):
+        for strategy, some in run.table(f"results/solvers/{robot}.parquet").groupby("strategy", observed=True):
+            linear, exact = (some.filter(like=name).to_numpy() for name in ("equation_11", "gauss_newton"))
+            apart = float(np.max(np.abs(linear - exact) / np.abs(exact)))
+            rows.append({"robot": robot, "strategy": strategy, "between_solvers": apart})
+    return pd.DataFrame(rows)
+
+
+def budget(run: Audited) -> pd.DataFrame:
+    """Sets of points, from results/budget."""
+    rows, length = [], run.configuration["tables"]["length"]
+    for robot in reduced(run):
+        frame = run.table(f"results/budget/{robot}.parquet")
+        for points, names in run.configuration["questions"]["point_sets"].items():
+            for count in sorted({length, 2 * length // len(names)}):
+                at = frame[(frame["points"] == points) & (frame["length"] == count)]
+                if len(at):
+                    rms, error = _root_mean(at["mean_square"])
+                    row = {
+                        "robot": robot,
+                        "points": points,
+                        "configurations": count,
+                        "measurements_per_configuration": len(names),
+                    }
+                    row |= {"crlb_rms_um": 1e6 * np.sqrt(at["bound"].mean()), "rms_um": 1e6 * rms, "std_error_um": 1e6 * error}
+                    rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def budget_pairs(run: Audited) -> pd.DataFrame:
+    """Sets of points against the first one at as many measurements, from results/budget."""
+    rows, length, sets = [], run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
+    first = next(iter(sets))
+    for robot in reduced(run):
+        frame = run.table(f"results/budget/{robot}.parquet").set_index(["points", "length"]).sort_values("data_set")
+        for points, names in sets.items():
+            keys = (points, 2 * length // len(names)), (first, 2 * length // len(sets[first]))
+            if points == first or any(key not in frame.index for key in keys):
+                continue
+            ours, theirs = (frame.loc[[key]]["mean_square"].to_numpy() for key in keys)
+            row = {"robot": robot, "points": points, "difference_um": 1e6 * (np.sqrt(ours.mean()) - np.sqrt(theirs.mean()))}
+            rows.append(row | dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(ours, theirs), strict=True)))
+    return pd.DataFrame(rows, columns=["robot", "points", "difference_um", "ratio", "ratio_low", "ratio_high"])
+
+
+def configurations_needed(run: Audited) -> pd.DataFrame:
+    """How many configurations reach an accuracy for good, from results/budget."""
+    rows, questions = [], run.configuration["questions"]
+    for robot in reduced(run):
+        frame = run.table(f"results/budget/{robot}.parquet")
+        for points, names in questions["point_sets"].items():
+            mine = frame[frame["points"] == points]
+            for accuracy in questions["accuracies_um"] if len(mine) else ():
+                # A length at which some data set determines nothing reaches no accuracy.
+                rms = mine.groupby("length")["mean_square"].agg(lambda some: np.sqrt(some.mean(skipna=False)))
+                missed = rms.index[~(1e6 * rms <= accuracy)]
+                needed = float(missed[-1] + 1) if len(missed) else 1.0
+                needed = needed if needed <= rms.index[-1] else np.inf
+                row = {"robot": robot, "points": points, "accuracy_um": accuracy, "configurations": needed}
+                rows.append(row | {"measurements": needed * len(names)})
+    return pd.DataFrame(rows)
+
+
+def ladder(run: Audited) -> pd.DataFrame:
+    """Errors by number of link springs, from results/ladder."""
+    rows = []
+    for robot in extended(run):
+        frame = run.table(f"results/ladder/{robot}.parquet")
+        for (noise, length), cell in frame.groupby(["noise", "length"]):
+            parts = {str(springs): some for springs, some in cell.groupby("link_springs")}
+            for springs, some in (parts | {"by cross-validation": cell[cell["chosen"]]}).items():
+                rms, error = _root_mean(some["mean_square"])
+                row = {"robot": robot, "noise_um": round(1e6 * float(str(noise)), 6), "length": length, "link_springs": springs}
+                row |= {"rms_um": 1e6 * rms, "rms_um_std_error": 1e6 * error}
+                rows.append(row | {"chosen_percent": 100 * some["chosen"].mean() if springs.isdigit() else np.nan})
+    return pd.DataFrame(rows)
+
+
+def designs(run: Audited) -> pd.DataFrame:
+    """Designs, from results/designs."""
+    parts = []
+    for robot in reduced(run):
+        frame = run.table(f"results/designs/{robot}.parquet").copy()
+        for name in ("rms", "low", "high"):
+            frame[f"{name}_um"] = 1e6 * frame.pop(name)
+        parts.append(frame.assign(robot=robot))
+    return pd.concat(parts)
+
+
+def observability(run: Audited) -> pd.DataFrame:
+    """Rank correlations, from results/observability, by pandas."""
+    rows = []
+    for robot in reduced(run):
+        ranked = run.table(f"results/observability/{robot}.parquet").corr("spearman")
+        for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
+            row = {"robot": robot, "index": index, "rank_correlation_with_bound": ranked.loc[index, "bound"]}
+            rows.append(row | {"rank_correlation_with_error": ranked.loc[index, "mean_square"]})
+    return pd.DataFrame(rows)
+
+
+def places(run: Audited) -> pd.DataFrame:
+    """A second target at each place, from results/places."""
+    rows = []
+    for robot in reduced(run):
+        for key, cell in run.table(f"results/places/{robot}.parquet").groupby(["joints", "along", "side"], sort=False):
+            row = {"robot": robot} | dict(zip(("joints", "along_m", "side"), key, strict=True))
+            pair = cell["bound"].to_numpy(), cell["bound_end_effector"].to_numpy()
+            row |= dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(*pair), strict=True))
+            rows.append(row | {f"seen_{name}_percent": 100 * cell[name].mean() for name in ("turned", "fixed")})
+    return pd.DataFrame(rows)
+
+
+def geometry(run: Audited) -> pd.DataFrame:
+    """Geometry and compliances, from results/geometry."""
+    parts = []
+    for robot in reduced(run):
+        frame = run.table(f"results/geometry/{robot}.parquet")
+        part = frame.rename(columns={f"compliance_{name}": f"compliance_{name}_percent" for name in ("noise", "leak")})
+        part = part.assign(robot=robot, rms_um=1e6 * np.sqrt(frame["noise"] ** 2 + frame["leak"] ** 2))
+        for name in ("noise", "leak"):
+            part[f"{name}_um"], part[f"zero_{name}_urad"] = 1e6 * frame[name], 1e6 * frame[f"zero_{name}"]
+        parts.append(part)
+    return pd.concat(parts)
+
+
+def weighting(run: Audited) -> pd.DataFrame:
+    """What equal weights cost, from results/weighting."""
+    parts = []
+    for robot in reduced(run):
+        frame = run.table(f"results/weighting/{robot}.parquet")
+        scaled = {f"{name}_um": 1e6 * frame[name] for name in ("per_metre", "equal", "weighted")}
+        parts.append(frame[["orientation_ratio"]].assign(robot=robot, ratio=frame["equal"] / frame["weighted"], **scaled))
+    return pd.concat(parts)
+
+
+def tubes(run: Audited) -> pd.DataFrame:
+    """Other diameters, from results/tubes."""
+    rows = []
+    for robot in extended(run):
+        for diameter, cell in run.table(f"results/tubes/{robot}.parquet").groupby("diameter", sort=False):
+            single: dict[str, pd.Series] = {
+                "mean": cell["mean"],
+                "std": (cell["mean_square"] - cell["mean"] ** 2) ** 0.5,
+                "max": cell["maximum"],
+            }
+            row: dict[str, Any] = {"robot": robot, "diameter_mm": 1e3 * float(str(diameter))}
+            for name, values in single.items():
+                row |= {f"{name}_mm": 1e3 * values.mean(), f"{name}_mm_between": 1e3 * values.std(ddof=1)}
+            left, error = _root_mean(cell["left"])
+            rows.append(row | {"left_um": 1e6 * left, "left_um_std_error": 1e6 * error})
+    return pd.DataFrame(rows)
+
+
+def strategy_scores(run: Audited) -> pd.DataFrame:
+    """Every strategy by every metric, from results/uses and results/metrics."""
+    rows, length = [], run.configuration["tables"]["length"]
+    for robot in reduced(run):
+        uses = run.table(f"results/uses/{robot}.parquet")
+        for key, strategy in run.strategies.items():
+            mine = uses[uses["strategy"] == strategy["name"]]
+            at = _cell(run, "metrics", robot, _noise(run), key).set_index("length").loc[length]
+            values = {
+                "rms_um": 1e6 * np.sqrt(mine["mean_square"].mean()),
+                "mean_um": 1e6 * mine["mean"].mean(),
+                "p95_um": 1e6 * mine["p95"].mean(),
+                "pooled_p95_um": 1e6 * mine["pooled_p95"].iloc[0],
+                "iso_9283_um": 1e6 * mine["iso_9283"].mean(),
+                "path_rms_um": 1e6 * np.sqrt(mine["path_mean_square"].mean()),
+                "path_max_um": 1e6 * mine["path_max"].mean(),
+                "k_sigma_percent": at["k_sigma"],
+                "k_sigma_percent_first_stage": at["k_sigma_first_stage"],
+                "dev_um": 1e6 * at["deviation"],
+            }
+            head = {"robot": robot, "strategy": strategy["name"]}
+            rows += [head | {"metric": name, "value": value} for name, value in values.items() if not np.isnan(value)]
+    return pd.DataFrame(rows)
+
+
+def comparison(run: Audited) -> pd.DataFrame:
+    """Our figures beside the paper's: those of Tables 1 to 4 from these tables, scatter and p values of Table 2 by scipy."""
+    rows = []
+    columns = {"deviation_mean": "mean", "deviation_std": "std", "deviation_max": "max"}
+    table = run.table("reports/tables/comparison.csv")
+    for _, printed in table[table["table"].astype(str).isin(list("1234"))].iterrows():
+        number, robot, quantity = str(printed["table"]), printed["robot"], printed["quantity"]
+        row = {name: printed[name] for name in ("table", "robot", "strategy", "quantity")} | {"paper": printed["paper"]}
+        source = run.table(f"reports/tables/table{number}.csv")
+        source = source[source["robot"] == robot]
+        if number == "4":
+            source = source[source["strategy"] == printed["strategy"]]
+        name = (
+            f"{columns[quantity]}_mm"
+            if number == "2"
+            else {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}.get(quantity, quantity)
+        )
+        name = f"{name}_first_stage" if "k_sigma" in name else name
+        row["ours"] = float(source[name].iloc[0]) if len(source) and name in source else np.nan
+        if number == "1":
+            # What the study starts from.
+            row["mc_std"] = 0.0
+        elif len(source) and name in source:
+            # A maximum has no standard error.
+            row["mc_std"] = float(source[f"{name}_std_error"].iloc[0]) if f"{name}_std_error" in source else 0.0
+        else:
+            row["mc_std"] = np.nan
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _root_mean(squares: pd.Series) -> tuple[float, float]:
+    """Root of a mean and its standard error by the delta method."""
+    values = squares.to_numpy(float)
+    root = float(np.sqrt(values.mean()))
+    return root, float(stats.sem(values) / (2 * root))
+
+
+def _ratio(ours: np.ndarray, theirs: np.ndarray) -> tuple[float, float, float]:
+    """Ratio of two roots of means of pairs, with its 95 % interval on the logarithm."""
+    ratio = float(np.sqrt(ours.mean() / theirs.mean()))
+    error = _QUANTILE * float(stats.sem(ours / ours.mean() - theirs / theirs.mean())) / 2
+    return ratio, ratio * np.exp(-error), ratio * np.exp(error)
+
+
+# By the name of the table: what makes it again, and the columns that name a row.
+TABLES: Mapping[str, tuple[Any, tuple[str, ...]]] = {
+    "table1": (table1, ("robot",)),
+    "table2": (table2, ("robot",)),
+    "table3": (table3, ("robot",)),
+    "table4": (table4, ("strategy", "robot")),
+    "extended": (extended_table, ("strategy", "robot")),
+    "per_dataset": (per_dataset, ("strategy", "robot", "noise_um", "ds")),
+    "solvers": (solvers, ("robot", "strategy")),
+    "budget": (budget, ("robot", "points", "configurations")),
+    "budget_pairs": (budget_pairs, ("robot", "points")),
+    "configurations_needed": (configurations_needed, ("robot", "points", "accuracy_um")),
+    "ladder": (ladder, ("robot", "noise_um", "length", "link_springs")),
+    "designs": (designs, ("robot", "joint_range", "design", "configurations")),
+    "observability": (observability, ("robot", "index")),
+    "places": (places, ("robot", "joints", "along_m", "side")),
+    "geometry": (geometry, ("robot", "estimator")),
+    "weighting": (weighting, ("robot", "orientation_ratio", "per_metre_um")),
+    "tubes": (tubes, ("robot", "diameter_mm")),
+    "strategy_scores": (strategy_scores, ("robot", "metric", "strategy")),
+    "comparison": (comparison, ("table", "robot", "strategy", "quantity")),
+}
+
+
+def table(run: Audited, file: str, name: str) -> list[Finding]:
+    """Every cell of a table that follows from files.
+
+    Parameters
+    ----------
+    run : Audited
+    file, name : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    if name not in TABLES:
+        return []
+    make, keys = TABLES[name]
+    stored, again = run.table(file), make(run)
+    # Names of rows as texts, numbers with the digits of the file.
+    left, right = (_keyed(frame, keys) for frame in (stored, again))
+    missing = sorted(set(right.index) - set(left.index))[:1]
+    found = [held(file, "rows", "pandas", not missing, f"no row {missing}", len(right))]
+    if missing:
+        return found
+    left = left.loc[right.index]
+    columns = [column for column in left.columns if column in right.columns and column not in keys]
+    for column in columns:
+        found.append(
+            compared(file, f"column {column}", "pandas", left[column], right[column], _NINE_DIGITS, _ZERO, right[column])
+        )
+    followed = len(right) * len(columns)
+    numeric = [column for column in stored.select_dtypes("number").columns if column not in keys]
+    rest = sorted(set(numeric) - set(columns))
+    words = f"{followed} of {len(stored) * len(numeric)} cells followed" + (f"; not {', '.join(rest)}" if rest else "")
+    return [*found, Finding(file, words, "counting", followed, 0.0)]
+
+
+def printed(run: Audited, file: str, name: str, ending: str) -> list[Finding]:
+    """Values of a table for people against those of its CSV, to the digits that are printed.
+
+    Parameters
+    ----------
+    run : Audited
+    file, name, ending : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    source = run.table(f"reports/tables/{name}.csv")
+    columns = [column for column in source.columns if not column.endswith("_std_error")]
+    lines = (run.folder / file).read_text("utf-8").splitlines()
+    if ending == "md":
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+    else:
+        rows = [[cell.strip() for cell in line.removesuffix(r"\\").split("&")] for line in lines if line.endswith(r"\\")][1:]
+    shown = [row for row in rows if len(row) == len(columns)]
+    if len(shown) != len(source):
+        return [held(file, "rows", "counting", False, f"found {len(shown)}, expected {len(source)}")]
+    off = [
+        f"{column}: {text}"
+        for row, (_, values) in zip(shown, source.iterrows(), strict=True)
+        for column, text in zip(columns, row, strict=True)
+        if not _says(text, values[column])
+    ]
+    checked = f"values as in {name}.csv, to the digits shown"
+    return [held(file, checked, "pandas", not off, ", ".join(off[:3]), len(source) * len(columns))]
+
+
+def _says(text: str, value: str | float) -> bool:
+    if isinstance(value, str):
+        return re.sub(r"\\", "", text) == value
+    number = float(value)
+    if np.isnan(number) or np.isinf(number):
+        return text in ("", "not reached")
+    shown = re.split(r"\s*(?:±|\$\\pm\$)\s*", text)[0]
+    decimals = len(shown.partition("e")[0].partition(".")[2])
+    exponent = int(shown.partition("e")[2] or 0)
+    digits = max(10.0 ** (exponent - decimals), 0.0)
+    # Three digits of a number without error.
+    return abs(float(shown) - number) <= 0.5000001 * digits
+
+
+def _keyed(frame: pd.DataFrame, keys: Iterable[str]) -> pd.DataFrame:
+    names = ["|".join(_text(value) for value in row) for row in frame[list(keys)].itertuples(index=False)]
+    return frame.assign(**{"row": names}).set_index("row")
+
+
+def _text(value: str | float) -> str:
+    if isinstance(value, str):
+        return value
+    return "" if np.isnan(value) else f"{float(value):.6g}"
+
+
+CHECKS = (
+    (re.compile(r"reports/tables/(\w+)\.csv"), table),
+    (re.compile(r"reports/tables/(table\d)\.(md|tex)"), printed),
+)

@@ -1,0 +1,28 @@
+"""What an audit reads of a run."""
+
+import numpy as np
+import pytest
+from made_audits import made_run
+
+
+@pytest.fixture
+def run(tmp_path):
+    return made_run(tmp_path)
+
+
+def test_experiments_and_deflections_have_the_axes_of_data_sets_and_configurations(run):
+    angles, wrench = run.experiments("two")
+    assert (angles.shape, wrench.shape) == ((4, 5, 2), (4, 5, 6))
+    assert run.deflections("data/simulated/two/ideal.parquet", "hand").shape == (4, 5, 6)
+
+
+def test_a_sample_is_the_same_each_time_and_another_for_another_file(run):
+    assert (run.picked("one", 1000) == run.picked("one", 1000)).all()
+    assert (run.picked("one", 1000) != run.picked("other", 1000)).any()
+    assert len(run.picked("one", 3)) == 3
+
+
+def test_stacked_regressors_stand_point_by_point(run):
+    both = run.stacked("two", 1, 2, ["hand"])
+    expected = np.concatenate([run.regressor("two", 1, k, "hand") for k in range(2)])
+    assert (both == expected).all()

@@ -1,0 +1,79 @@
+"""Files of a campaign that contradict each other are found."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_audits import CONFIGURATION, failed
+
+from elastocal.audit import campaigns
+from elastocal.audit.audited import Audited
+
+FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
+
+
+@pytest.fixture
+def run(tmp_path):
+    for folder in (FOLDER, REPORTS, "data/campaigns/cell"):
+        (tmp_path / folder).mkdir(parents=True)
+    rng = np.random.default_rng(1)
+    rows = pd.DataFrame(rng.normal(size=(8, 3)), columns=list("xyz")).assign(pose=range(8), load=0, session=0, target=0)
+    rows.to_parquet(tmp_path / "data/campaigns/cell/measurements.parquet")
+    numbered = rows.assign(row=range(1, 9))
+    numbered[:5].to_parquet(tmp_path / FOLDER / "training.parquet")
+    numbered[5:].to_parquet(tmp_path / FOLDER / "held_out.parquet")
+    (tmp_path / FOLDER / "campaign.json").write_text(json.dumps({"held_out": None}))
+    models = {"probability": [0.7, 0.3], "mechanisms": ["joint_offset", "joint_offset + payload"]}
+    pd.DataFrame(models).to_parquet(tmp_path / FOLDER / "models.parquet")
+    pd.DataFrame({"correlation": [0.5, -1.0]}).to_parquet(tmp_path / FOLDER / "correlations.parquet")
+    return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
+
+
+def state(run, **mechanisms):
+    document = {"document": {"probabilities": {"mechanisms": mechanisms}}}
+    (run.folder / FOLDER / "diagnosis.json").write_text(json.dumps(document))
+    return failed(campaigns.diagnosis(run, f"{FOLDER}/diagnosis.json", "cell"))
+
+
+def test_a_campaign_in_which_all_agrees_holds(run):
+    assert failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell")) == []
+    assert state(run, joint_offset=1.0, payload=0.3) == []
+
+
+def test_a_held_out_pose_that_was_fitted_is_found(run):
+    frame = pd.read_parquet(run.folder / FOLDER / "training.parquet")
+    frame.loc[4, "pose"] = 6
+    frame.to_parquet(run.folder / FOLDER / "training.parquet")
+    assert "no pose is fitted and held out" in failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell"))
+
+
+def test_a_probability_that_is_no_sum_over_models_is_found(run):
+    assert state(run, joint_offset=1.0, payload=0.6) == ["probability of payload"]
+
+
+@pytest.mark.parametrize("wrong", [False, True])
+def test_errors_before_and_after_are_those_of_the_residuals(run, wrong):
+    columns = [f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]
+    frame = pd.DataFrame(np.random.default_rng(2).normal(size=(8, 6)), columns=columns)
+    frame = frame.assign(session=0, pose=range(8), load=0, target=0, held_out=np.arange(8) > 4)
+    frame.to_parquet(run.folder / REPORTS / "residuals.parquet")
+    rows = []
+    for name in ("before", "after"):
+        row = {"kind": "declared" if name == "before" else "effect"}
+        for part, kept in (("train", ~frame["held_out"]), ("heldout", frame["held_out"])):
+            errors = np.linalg.norm(frame.loc[kept, [f"{name}_d{axis}" for axis in "xyz"]], axis=1)
+            row |= {
+                f"{part}_mean_m": errors.mean(),
+                f"{part}_rms_m": np.sqrt((errors**2).mean()),
+                f"{part}_max_m": errors.max(),
+            }
+        rows.append(row)
+    table = pd.DataFrame(rows)
+    table.loc[1, "heldout_rms_m"] *= 0.9 if wrong else 1.0
+    table.to_csv(run.folder / REPORTS / "before_after.csv", index=False)
+    described = {"held_out": None, "campaign": {"frame": "tracker", "declared": [], "targets": {}}}
+    (run.folder / FOLDER / "campaign.json").write_text(json.dumps(described))
+    (run.folder / REPORTS / "verdict.json").write_text("{}")
+    found = failed(campaigns.residuals(run, f"{REPORTS}/residuals.parquet", "cell"))
+    assert found == (["heldout errors after"] if wrong else [])

@@ -1,0 +1,31 @@
+"""Scores of models against closed forms."""
+
+import numpy as np
+import pytest
+from made_audits import made_run
+
+from elastocal.audit.scores import averaged, errors_of, first_stage, moment
+
+
+def test_the_true_compliances_leave_no_error(tmp_path):
+    run = made_run(tmp_path)
+    truth = run.arm("two").compliance
+    assert errors_of(run, "two", truth[None]).max() < 1e-12
+    off = errors_of(run, "two", 1.1 * truth[None])[0]
+    assert (off**2).mean() == pytest.approx(0.01 * truth @ moment(run, "two") @ truth)
+
+
+@pytest.mark.parametrize(("method", "expected"), [("stiffness", 1.5), ("compliance", 2.0), ("median", 2.0)])
+def test_averages_of_one_and_three(method, expected):
+    assert averaged(np.array([[1.0], [3.0]]), method)[0] == pytest.approx(expected)
+
+
+def test_weights_count_data_sets_so_often():
+    twice = averaged(np.array([[1.0], [3.0], [3.0]]), "stiffness")
+    assert averaged(np.array([[1.0], [3.0]]), "stiffness", np.array([1, 2])) == pytest.approx(twice)
+
+
+def test_the_first_stage_is_what_the_last_one_holds():
+    stages = [{"points": ["a"], "joints": [1, 2]}, {"points": ["b"], "joints": [3], "held": [1, 2]}]
+    assert first_stage({"stages": stages}).tolist() == [0, 1]
+    assert first_stage({"stages": stages[:1]}).tolist() == [0, 1]

@@ -1,0 +1,20 @@
+"""Streams as they are described are streams as they are drawn."""
+
+import numpy as np
+import pytest
+
+from elastocal.audit.streams import numbers
+from elastocal.random_streams import stream
+
+
+@pytest.mark.parametrize("name", [(1, "kuka", "identification/force", 0), (7, "fanuc", "noise/6DoF/again", 999)])
+def test_numbers_are_those_of_the_pipeline(name):
+    assert (numbers(*name).random(5) == stream(*name).random(5)).all()
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_every_part_of_a_name_makes_other_numbers(place):
+    names = [1, "kuka", "force", 2]
+    other = list(names)
+    other[place] = 3 if isinstance(names[place], int) else "other"
+    assert not np.isclose(numbers(*names).random(5), numbers(*other).random(5)).any()

@@ -1,0 +1,208 @@
+"""Errors planted into the files of a finished study, as somebody would make them who also forges every checksum."""
+
+import hashlib
+import json
+import shutil
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from elastocal.audit.schemas import SCHEMAS
+from elastocal.io.storage import read_blocks, write_table
+
+IDEAL = "data/simulated/kuka/ideal.parquet"
+EXPERIMENTS = "data/simulated/kuka/experiments.parquet"
+MEASURED = "data/simulated/kuka/200um/measured.parquet"
+IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
+DESIGN = "results/design/kuka/6DoF.parquet"
+METRICS = "results/metrics/kuka/200um/6DoF.parquet"
+REPLICATES = "results/replicates/kuka/200um/6DoF.parquet"
+ACCURACY = "results/accuracy/kuka/200um/6DoF.parquet"
+
+
+def forge(folder, file):
+    """Record a file's checksum as if a job had written it."""
+    digest = hashlib.sha256((folder / file).read_bytes()).hexdigest()
+    (folder / f"results/checksums/{file}.sha256").write_text(f"{digest}  {file}\n", encoding="utf-8")
+
+
+def rewritten(folder, file, change, joints=6, **origin):
+    """Change the columns of each row group and write the table again, with all digests right."""
+    path = folder / file
+    metadata = {
+        k.decode(): json.loads(v) for k, v in pq.ParquetFile(path).metadata.metadata.items() if k.startswith(b"elastocal.")
+    }
+    schema = SCHEMAS[metadata["elastocal.table"]](joints)
+    blocks = [change({name: np.array(values) for name, values in block.items()}) for block in read_blocks(path, schema)]
+    for block in blocks:
+        for column in schema.columns:
+            if column.type == "string":
+                block[column.name] = block[column.name][0]
+    write_table(path, schema, blocks, metadata["elastocal.provenance"] | origin)
+    forge(folder, file)
+
+
+def scaled(factor, *names):
+    """A change that multiplies columns."""
+    return lambda block: block | {name: factor * block[name] for name in names}
+
+
+def copied(folder, source, file):
+    """A file in place of another one."""
+    shutil.copy(folder / source, folder / file)
+    forge(folder, file)
+
+
+def cell(folder, file, column, factor, row=0):
+    """One cell of a CSV file multiplied."""
+    frame = pd.read_csv(folder / file)
+    frame.loc[row, column] *= factor
+    frame.to_csv(folder / file, index=False, float_format="%.9g", lineterminator="\n")
+    forge(folder, file)
+
+
+def flipped_byte(folder):
+    """One byte in the middle of a file, checksums as they were."""
+    data = bytearray((folder / MEASURED).read_bytes())
+    data[len(data) // 2] ^= 1
+    (folder / MEASURED).write_bytes(data)
+
+
+def one_value(folder):
+    """One value written by another program, which keeps the file's metadata; its checksum is forged."""
+    file = pq.ParquetFile(folder / IDENTIFIED)
+    table = file.read()
+    values = table.column("c3").to_numpy().copy()
+    values[77] *= 1.001
+    place = table.schema.get_field_index("c3")
+    table = table.set_column(place, table.schema.field(place), pa.array(values))
+    pq.write_table(table.replace_schema_metadata(file.metadata.metadata), folder / IDENTIFIED, row_group_size=2**30)
+    forge(folder, IDENTIFIED)
+
+
+def other_unit(folder):
+    """A column that says it is in millimetres."""
+    file = pq.ParquetFile(folder / ACCURACY)
+    # Without the schema that Arrow keeps a second time.
+    metadata = {key: value for key, value in file.metadata.metadata.items() if key != b"ARROW:schema"}
+    table = file.read()
+    place = table.schema.get_field_index("rms")
+    field = table.schema.field(place)
+    field = field.with_metadata(field.metadata | {b"unit": b"mm"})
+    schema = table.schema.set(place, field).with_metadata(metadata)
+    pq.write_table(pa.Table.from_arrays(table.columns, schema=schema), folder / ACCURACY, row_group_size=2**30)
+    forge(folder, ACCURACY)
+
+
+def other_seed(folder):
+    """Noise of another seed, in a file that says it has the right one."""
+
+    def change(block):
+        rng = np.random.default_rng(2)
+        return block | {
+            name: block[name] + 2e-4 * rng.standard_normal(len(block[name])) for name in ("dx", "dy", "dz", "rx", "ry", "rz")
+        }
+
+    shutil.copy(folder / "data/simulated/kuka/0um/measured.parquet", folder / MEASURED)
+    rewritten(folder, MEASURED, change, noise="200")
+
+
+def of_another_run(folder):
+    """A file that a run with another seed has left."""
+    path = folder / MEASURED
+    origin = json.loads(pq.ParquetFile(path).metadata.metadata[b"elastocal.provenance"])
+    configuration = origin["configuration"] | {"seed": 7}
+    digest = hashlib.sha256(json.dumps(configuration, sort_keys=True).encode()).hexdigest()[:16]
+    rewritten(folder, MEASURED, dict, configuration=configuration, configuration_sha256=digest)
+
+
+def without_first_set(block):
+    return {name: values[block["data_set"] > 0] for name, values in block.items()}
+
+
+def second_set_twice(block):
+    return block | {"data_set": np.where(block["data_set"] == 2, 1, block["data_set"])}
+
+
+def mirrored_point(block):
+    return block | {"dz": -block["dz"]} if block["point"][0] == "3DoF" else block
+
+
+def shuffled(block):
+    order = np.random.default_rng(1).permutation(len(block["k_sigma"]))
+    return block | {"k_sigma": block["k_sigma"][order]}
+
+
+def next_length(block):
+    return block | {"rms_per_noise": np.append(block["rms_per_noise"][1:], block["rms_per_noise"][-1] * 0.99)}
+
+
+def swapped_solvers(block):
+    pairs = {
+        f"{name}_c{j}": block[f"{other}_c{j}"]
+        for j in range(1, 7)
+        for name, other in (("equation_11", "gauss_newton"), ("gauss_newton", "equation_11"))
+    }
+    return block | pairs
+
+
+def typo(folder):
+    """A digit of a table for people."""
+    path = folder / "reports/tables/table1.md"
+    text = path.read_text(encoding="utf-8")
+    assert text.count("2.79") == 1
+    path.write_text(text.replace("2.79", "2.97"), encoding="utf-8")
+    forge(folder, "reports/tables/table1.md")
+
+
+# What is planted, in which file, and how.
+PLANTED = {
+    "one byte altered": (MEASURED, flipped_byte),
+    "one value altered by another program": (IDENTIFIED, one_value),
+    "a file deleted": ("results/weights/kuka.parquet", lambda folder: (folder / "results/weights/kuka.parquet").unlink()),
+    "a unit swapped": (ACCURACY, other_unit),
+    "millimetres for metres": (
+        "results/initial/kuka.parquet",
+        lambda f: rewritten(f, "results/initial/kuka.parquet", scaled(1e3, "mean")),
+    ),
+    "degrees for radians": (EXPERIMENTS, lambda f: rewritten(f, EXPERIMENTS, scaled(180 / np.pi, "q3"))),
+    "a force turned round": (EXPERIMENTS, lambda f: rewritten(f, EXPERIMENTS, scaled(-1.0, "fy"))),
+    "noise of another seed": (MEASURED, other_seed),
+    "a file of another run": (MEASURED, of_another_run),
+    "a noise level in place of another": (MEASURED, lambda f: copied(f, "data/simulated/kuka/0um/measured.parquet", MEASURED)),
+    "a strategy in place of another": (METRICS, lambda f: copied(f, "results/metrics/kuka/200um/3+6DoF-comb.parquet", METRICS)),
+    "a data set left out": (IDEAL, lambda f: rewritten(f, IDEAL, without_first_set)),
+    "a data set twice": (IDENTIFIED, lambda f: rewritten(f, IDENTIFIED, second_set_twice)),
+    "an axis mirrored at one point": (IDEAL, lambda f: rewritten(f, IDEAL, mirrored_point)),
+    "compliances scaled": (IDENTIFIED, lambda f: rewritten(f, IDENTIFIED, scaled(1.0001, "c2"))),
+    "variances for standard deviations": (DESIGN, lambda f: rewritten(f, DESIGN, scaled(2.0, "cov_4_4"))),
+    "a score too good": (METRICS, lambda f: rewritten(f, METRICS, scaled(0.99, "deviation"))),
+    "replicates shuffled": (REPLICATES, lambda f: rewritten(f, REPLICATES, shuffled)),
+    "weights that count all alike": (
+        "results/weights/kuka.parquet",
+        lambda f: rewritten(f, "results/weights/kuka.parquet", lambda block: block | {"count": np.ones_like(block["count"])}),
+    ),
+    "a bound of the next length": (
+        "results/bounds/kuka.parquet",
+        lambda f: rewritten(f, "results/bounds/kuka.parquet", next_length),
+    ),
+    "solvers swapped": (
+        "results/solvers/kuka.parquet",
+        lambda f: rewritten(f, "results/solvers/kuka.parquet", swapped_solvers),
+    ),
+    "squares of a research question scaled": (
+        "results/budget/kuka.parquet",
+        lambda f: rewritten(f, "results/budget/kuka.parquet", scaled(1.01, "mean_square")),
+    ),
+    "a standard error too small": (
+        "reports/tables/table3.csv",
+        lambda f: cell(f, "reports/tables/table3.csv", "c4_std_error", 0.7),
+    ),
+    "a cell of Table 4 altered": (
+        "reports/tables/table4.csv",
+        lambda f: cell(f, "reports/tables/table4.csv", "dev_20_um", 0.98, 1),
+    ),
+    "a digit of a printed table": ("reports/tables/table1.md", typo),
+}

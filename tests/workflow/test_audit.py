@@ -1,0 +1,91 @@
+"""An audit holds on a finished study and finds each error that is planted, with the file that has it."""
+
+import shutil
+
+import pandas as pd
+import pytest
+import yaml
+from planted_errors import PLANTED
+
+from elastocal.audit.audited import Audited
+from elastocal.audit.whole import audit
+
+# Of these few data sets and replicates enough that what is planted in a share of a file is in the sample.
+ROWS = 12
+
+
+def audited(folder):
+    configuration = yaml.safe_load((folder / "config.yaml").read_text("utf-8"))
+    documents = {
+        kind: {name: yaml.safe_load((folder / f"config/{kind}/{name}.yaml").read_text("utf-8")) for name in configuration[kind]}
+        for kind in ("robots", "strategies")
+    }
+    return Audited(folder, configuration, documents["robots"], documents["strategies"], ROWS)
+
+
+@pytest.fixture(scope="module")
+def folder(small_study, tmp_path_factory):
+    """A copy of the finished study; each test puts back the file that it changed."""
+    return small_study.copied_to(tmp_path_factory.mktemp("audited") / "study").folder
+
+
+@pytest.fixture(scope="module")
+def findings(folder):
+    return audit(audited(folder))
+
+
+def test_a_finished_study_holds_in_every_check(findings):
+    assert [finding for finding in findings if not finding.holds] == []
+    assert len(findings) > 1500
+    recomputed = {finding.by for finding in findings}
+    assert {"pinocchio", "MuJoCo", "statsmodels on pinocchio", "pandas", "the schemas"} <= recomputed
+
+
+def test_every_table_of_results_is_recomputed(folder, findings):
+    """Beside what is asked of every file: its bytes, schema and provenance."""
+    asked_of_all = {"hashlib, SHA-256", "the schemas", "its own metadata", "numpy", "counting"}
+    recomputed = {finding.file for finding in findings if finding.by not in asked_of_all}
+    there = {p.relative_to(folder).as_posix() for part in ("data", "results") for p in (folder / part).rglob("*.parquet")}
+    assert there - recomputed == set()
+
+
+@pytest.mark.parametrize("error", PLANTED)
+def test_a_planted_error_is_found(error, folder):
+    file, plant = PLANTED[error]
+    changed = [folder / file, folder / f"results/checksums/{file}.sha256"]
+    before = [path.read_bytes() for path in changed]
+    plant(folder)
+    found = audit(audited(folder), {file})
+    for path, content in zip(changed, before, strict=True):
+        path.write_bytes(content)
+    assert [finding.file for finding in found if not finding.holds], error
+
+
+def test_twenty_errors_at_least_are_planted():
+    assert len(PLANTED) >= 20
+
+
+def test_an_edited_robot_makes_its_files_stale(folder):
+    run = audited(folder)
+    run.robots["kuka"]["compliance_urad_per_Nm"][0] *= 1.1
+    wrong = [finding for finding in audit(run, {"results/metrics/kuka/200um/6DoF.parquet"}) if not finding.holds]
+    assert any(finding.checked == "made by what is configured" for finding in wrong)
+
+
+def test_the_command_says_which_file_is_wrong(finished):
+    assert finished.snakemake("-j2", "audit").returncode == 0
+    assert finished.path("reports/audit.txt").read_text("utf-8").endswith("all hold\n")
+    PLANTED["a cell of Table 4 altered"][1](finished.folder)
+    # As of the time of the job that made it, so that no job is run again.
+    shutil.copystat(finished.path("reports/tables/table3.csv"), finished.path("reports/tables/table4.csv"))
+    finished.path("reports/audit.csv").unlink()
+    done = finished.snakemake("-j2", "audit")
+    assert done.returncode != 0
+    assert "do not hold, see reports/audit.html" in done.stdout + done.stderr
+    table = pd.read_csv(finished.path("reports/audit.csv"))
+    wrong = table[~table["holds"]]
+    # Its checksum too is that of what is there; the comparison with the paper no longer follows from it.
+    ours = {f"reports/tables/{name}" for name in ("table4.csv", "table4.md", "table4.tex", "comparison.csv")}
+    assert "reports/tables/table4.csv" in set(wrong["file"]) <= ours
+    assert not finished.path("reports/audit.txt").exists()
+    assert "do not hold" in finished.path("reports/audit.html").read_text("utf-8")

@@ -1,0 +1,46 @@
+"""The audit: samples of every file of a finished run worked out again by libraries that share no code with the pipeline.
+
+`snakemake -j2 audit` makes what is not made yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
+hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
+"""
+
+
+rule audit_files:
+    input:
+        files=lambda wildcards: files_behind([*rules.study.input, *rules.loop.input]),
+        sources=sources("audit_files.py"),
+    output:
+        table="reports/audit.csv",
+        page="reports/audit.html",
+    log:
+        "results/logs/audit_files.log",
+    benchmark:
+        "results/timings/audit_files.tsv"
+    params:
+        robots=STUDY.robots,
+        strategies=STUDY.strategies,
+        configuration={key: config[key] for key in AUDITED},
+        rows=config["audit"]["rows"],
+    script:
+        "../scripts/audit_files.py"
+
+
+rule judge_audit:
+    input:
+        table=rules.audit_files.output.table,
+        page=rules.audit_files.output.page,
+        sources=sources("judge_audit.py"),
+    output:
+        verdict="reports/audit.txt",
+    log:
+        "results/logs/judge_audit.log",
+    benchmark:
+        "results/timings/judge_audit.tsv"
+    script:
+        "../scripts/judge_audit.py"
+
+
+rule audit:
+    input:
+        rules.audit_files.output,
+        rules.judge_audit.output,

@@ -1,0 +1,25 @@
+"""A finished run checked by independent paths: a table of all checks, and a page."""
+
+from pathlib import Path
+
+from elastocal import __version__
+from elastocal.audit.audited import Audited
+from elastocal.audit.page import page
+from elastocal.audit.whole import as_table, audit
+from elastocal.io.atomic_writes import write_text
+from elastocal.io.data_frames import write_csv
+
+from job import Job, run
+
+
+def audit_files(job: Job) -> None:
+    settings = job.params
+    finished = Audited(Path(), settings.configuration, settings.robots, settings.strategies, settings.rows)
+    table = as_table(audit(finished))
+    facts = {"seed": str(finished.seed), "rows of each file": str(settings.rows), "version": __version__}
+    write_text(job.output.page, page(table, facts))
+    write_csv(job.output.table, table)
+
+
+# What was altered is to be found, not to be refused.
+run(audit_files, snakemake, checked=())
