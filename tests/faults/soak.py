@@ -46,13 +46,13 @@ def part_of_the_study(folder):
 
 
 def contents(study):
-    """Digest of each file that jobs write, but for logs and timings."""
+    """Digest of each file that jobs write, but for logs and what says how long jobs took."""
     files = [p for name in MADE for p in study.path(name).rglob("*") if p.is_file()]
     named = {p.relative_to(study.folder).as_posix(): p for p in files}
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()
         for name, path in named.items()
-        if not name.startswith(("results/logs/", "results/timings/"))
+        if not name.startswith(("results/logs/", "results/timings/", "results/jobs/"))
     }
 
 

@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from PIL import Image
 
 from elastocal.figures.style import DASHES, PALETTE, WIDTH_MM, ink_on, line_style, note, panels, save, save_svg, styled
+from elastocal.io.origin import Origin
 
 # Machado, Oliveira and Fernandes 2009, severity 1, on linear RGB.
 DICHROMATS = {
@@ -118,3 +119,16 @@ def test_an_svg_is_the_same_in_every_run_and_its_letters_are_letters(tmp_path):
         save_svg(figure, str(tmp_path / f"{name}.svg"))
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
     assert "angle (°)" in (tmp_path / "a.svg").read_text(encoding="utf-8")
+
+
+def test_a_figure_names_commit_configuration_and_seed_in_both_files(tmp_path):
+    origin = Origin("c0ffee", "d16e57", 7)
+    for name, given in (("named", origin), ("again", origin), ("unnamed", None)):
+        save(note("Nothing."), str(tmp_path / f"{name}.pdf"), str(tmp_path / f"{name}.png"), given)
+    words = "commit c0ffee, configuration SHA-256 d16e57, seed 7"
+    assert Image.open(tmp_path / "named.png").text == {"Description": words, "Source": "c0ffee"}
+    assert f"/Subject ({words})".encode() in (tmp_path / "named.pdf").read_bytes()
+    assert b"/Keywords (c0ffee d16e57 7)" in (tmp_path / "named.pdf").read_bytes()
+    assert b"c0ffee" not in (tmp_path / "unnamed.pdf").read_bytes() + (tmp_path / "unnamed.png").read_bytes()
+    for kind in ("pdf", "png"):
+        assert (tmp_path / f"named.{kind}").read_bytes() == (tmp_path / f"again.{kind}").read_bytes()

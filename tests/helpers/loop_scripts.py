@@ -6,6 +6,7 @@ from pathlib import Path
 
 SCRIPTS = Path(__file__).resolve().parents[2] / "workflow" / "scripts"
 PARAMS = {"seed": 1, "states": 4}
+CONFIG = {"origin": {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}}
 ANALYSIS = ("read_campaign", "diagnose_campaign", "judge_campaign")
 FIGURES = ("before_after", "arrows", "residuals", "candidates", "confounding")
 STEPS = (*ANALYSIS, *(f"draw_{figure}" for figure in FIGURES), "compile_loop_report")
@@ -73,6 +74,8 @@ def run_loop(folder, robots, out, steps=STEPS):
 def run_script(script, job):
     """Run one script of the workflow with a job in the place of Snakemake's."""
     sys.path.insert(0, SCRIPTS.as_posix())
+    for name, value in {"rule": script, "wildcards": {}, "config": CONFIG}.items():
+        job.__dict__.setdefault(name, value)
     try:
         runpy.run_path((SCRIPTS / f"{script}.py").as_posix(), {"snakemake": job}, "__main__")
     finally:

@@ -99,6 +99,14 @@ def test_a_comment_in_the_configuration_reruns_nothing(finished):
     assert finished.planned() == set()
 
 
+def test_a_new_commit_of_unchanged_sources_reruns_nothing(finished):
+    """Figures name the commit at which they were made, which is no reason to make them anew."""
+    git = ["git", "-c", "user.name=somebody", "-c", "user.email=somebody@example.org", "-c", "commit.gpgsign=false"]
+    for words in (["init", "-q"], ["add", "Snakefile", "src", "workflow"], ["commit", "-q", "-m", "a"]):
+        subprocess.run([*git, *words], cwd=finished.folder, check=True)
+    assert finished.planned() == set()
+
+
 def test_a_strategy_with_other_stages_reruns_that_strategy(finished):
     """The points that it reads are the same, so the bounds are."""
     finished.replace(

@@ -1,6 +1,7 @@
 """What every script does around its one call: whatever ends it, the log says why, and bad input is one line."""
 
 import errno
+import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,13 +18,18 @@ from job import run
 INPUT, OUTPUT = "data/a.csv", "results/b.csv"
 
 
+def job_of(**files):
+    origin = {"commit": "c0ffee", "configuration_sha256": "d16e57", "seed": 1}
+    return SimpleNamespace(**files, rule="copy", wildcards={"robot": "kuka"}, config={"origin": origin})
+
+
 @pytest.fixture
 def job(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for folder in ("data", "results/logs", ".snakemake"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / INPUT).write_text("1\n")
-    return SimpleNamespace(input=[INPUT], output=[OUTPUT], log=["results/logs/b.log"])
+    return job_of(input=[INPUT], output=[OUTPUT], log=["results/logs/b.log"])
 
 
 def log(job):
@@ -37,7 +43,7 @@ def copied(job):
 def test_what_a_job_wrote_is_checked_by_the_next(job):
     run(copied, job)
     assert log(job) == "done\n"
-    following = SimpleNamespace(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"])
+    following = job_of(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"])
     run(copied, following)
     Path(OUTPUT).write_text("2\n")
     with pytest.raises(SystemExit) as ended:
@@ -80,3 +86,17 @@ def test_a_log_that_cannot_be_written_hides_no_fault(job):
     job.log = ["nowhere/b.log"]
     with pytest.raises(SystemExit, match="found x"):
         run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)
+
+
+def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_and_from_what(job):
+    run(copied, job)
+    record = json.loads(Path("results/jobs/b.json").read_text(encoding="utf-8"))
+    assert record["inputs"] == [INPUT] and record["outputs"] == [OUTPUT]
+    assert (record["rule"], record["wildcards"], record["origin"]) == ("copy", {"robot": "kuka"}, job.config["origin"])
+    assert record["started"] <= record["ended"] and record["ended"].endswith("+00:00")
+
+
+def test_a_job_that_failed_leaves_none(job):
+    with pytest.raises(SystemExit):
+        run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)
+    assert not Path("results/jobs").exists()

@@ -1,7 +1,10 @@
 """The same seeds give the same study: on one core or two, and whatever else is asked for beside them."""
 
+import json
+
 import pyarrow.parquet as pq
 import pytest
+from PIL import Image
 from study_folder import NOISE, ROBOTS, SMALL, STRATEGIES
 
 REPORTS = ("reports/**/*.csv", "reports/**/*.md", "reports/**/*.tex", "reports/**/*.json", "reports/**/*.pdf")
@@ -40,6 +43,20 @@ def test_one_core_and_two_make_the_same_data(small_study, serial_study):
     assert serial_study.files("data/**/*.parquet", "results/**/*.parquet") == names
     differing = [name for name in names if contents(small_study.path(name)) != contents(serial_study.path(name))]
     assert differing == []
+
+
+def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and_seed(small_study):
+    records = [json.loads(small_study.path(name).read_text("utf-8")) for name in small_study.files("results/jobs/**/*.json")]
+    origins = {file: record["origin"] for record in records for file in record["outputs"]}
+    made = small_study.files("reports/figures/*", "reports/tables/*", "reports/*.pdf", "results/[!cjlt]*/**/*.parquet")
+    assert {"reports/tables/table4.csv", "reports/figures/fig4.png", "reports/study.pdf"} < set(made)
+    assert set(made) <= set(origins)
+    (origin,) = {tuple(origin.items()) for origin in origins.values()}
+    assert dict(origin)["seed"] == 1 and len(dict(origin)["configuration_sha256"]) == 64
+    figures = [name for name in made if name.endswith(".png")]
+    for name in figures:
+        words = Image.open(small_study.path(name)).text["Description"]
+        assert all(str(value) in words for value in dict(origin).values()), name
 
 
 @pytest.mark.parametrize("change", ["more data sets", "another order", "other blocks"])

@@ -15,12 +15,14 @@ from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
 from elastocal.io.checksums import checksum
+from elastocal.io.origin import Origin, configuration_sha256
 from elastocal.io.provenance import SOURCES_DIGEST
 from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
 sys.path.insert(0, str(ROOT / "workflow" / "rules"))
 
+from commit import commit_of
 from import_closure import closure
 from one_run import begin
 from outcome import outcome
@@ -56,6 +58,21 @@ try:
         RUN = begin(Path(".snakemake"), ["data", "results", "reports"])
 except InputError as error:
     sys.exit(str(error))
+
+# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for decides nothing.
+RESOLVED = {
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "origin")},
+    "robots": STUDY.robots,
+    "strategies": STUDY.strategies,
+    "campaigns": SOURCES,
+}
+# Scripts find it in the configuration, an edit of which reruns nothing by itself: a new commit makes no figure anew.
+ORIGIN = Origin(
+    commit_of(ROOT, ["Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "requirements.lock"]),
+    configuration_sha256(RESOLVED),
+    config["seed"],
+)
+config["origin"] = vars(ORIGIN)
 
 NOISE = [f"{level:g}" for level in config["noise_um"]]
 TABLE_NOISE = f"{config['tables']['noise_um']:g}"

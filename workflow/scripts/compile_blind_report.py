@@ -7,7 +7,7 @@ import pandas as pd
 from elastocal.report.blind_facts import blind_facts
 from elastocal.report.blind_pages import write_blind_report
 
-from job import Job, run
+from job import Job, origin_of, run
 
 TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up", "sweep")
 
@@ -17,7 +17,7 @@ def compile_blind_report(job: Job) -> None:
     tables = {name: pd.read_csv(job.input[name]) for name in TABLES}
     manifest = Path(job.input.manifest).read_text(encoding="utf-8")
     facts = blind_facts(tables, manifest, settings.size, settings.seed)
-    write_blind_report(job.output.report, facts, job.input.figures)
+    write_blind_report(job.output.report, facts, job.input.figures, origin_of(job))
 
 
 run(compile_blind_report, snakemake)

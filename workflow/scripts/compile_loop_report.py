@@ -11,7 +11,7 @@ from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.loop_pages import write_loop_report
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def compile_loop_report(job: Job) -> None:
@@ -22,7 +22,7 @@ def compile_loop_report(job: Job) -> None:
     candidates = read_table(job.input.candidates, CANDIDATES)
     parameters = final_parameters(read_json(job.input.diagnosis), read_table(job.input.steps, STEPS))
     facts = loop_facts(verdict, *rows, table, descriptions, parameters)
-    write_loop_report(job.output.report, facts, job.input.figures)
+    write_loop_report(job.output.report, facts, job.input.figures, origin_of(job))
     write_loop_page(job.output.page, *loop_page(facts, verdict, table, candidates, robot))
 
 

@@ -6,7 +6,7 @@ from elastocal.io.json_files import read_json
 from elastocal.report.pages import write_report
 from elastocal.study.tables import headed_rows
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 TABLES = ("table1", "table2", "table3", "table4", "interpretations")
@@ -15,7 +15,7 @@ TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 def compile_report(job: Job) -> None:
     facts = read_json(job.input.answers)
     tables = {name: headed_rows(pd.read_csv(job.input[name])) for name in TABLES}
-    write_report(job.output.report, facts, tables | {"figures": job.params.figures}, job.input.figures)
+    write_report(job.output.report, facts, tables | {"figures": job.params.figures}, job.input.figures, origin_of(job))
 
 
 run(compile_report, snakemake)

@@ -5,14 +5,14 @@ import pandas as pd
 from elastocal.figures.strategies import accuracy_of_one_data_set
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_accuracy(job: Job) -> None:
     settings = job.params
     per_dataset = pd.read_csv(job.input.per_dataset).query("noise_um == @settings.noise_um")
     figure = accuracy_of_one_data_set(per_dataset, settings.titles, settings.order, settings.length)
-    save(figure, job.output.pdf, job.output.png)
+    save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_accuracy, snakemake)

@@ -7,7 +7,7 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_bias_and_accuracy(job: Job) -> None:
@@ -16,7 +16,7 @@ def draw_bias_and_accuracy(job: Job) -> None:
     figure = bias_and_accuracy(
         read_long(job.input.metrics, metrics), per_dataset, settings.titles, settings.order, settings.accuracy_um
     )
-    save(figure, job.output.pdf, job.output.png)
+    save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_bias_and_accuracy, snakemake)

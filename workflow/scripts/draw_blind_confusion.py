@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_power import confusion_map
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_confusion(job: Job) -> None:
-    save(confusion_map(pd.read_csv(job.input.confusion)), job.output.pdf, job.output.png)
+    save(confusion_map(pd.read_csv(job.input.confusion)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_confusion, snakemake)

@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_rates import coverage_by_effect
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_coverage(job: Job) -> None:
-    save(coverage_by_effect(pd.read_csv(job.input.coverage)), job.output.pdf, job.output.png)
+    save(coverage_by_effect(pd.read_csv(job.input.coverage)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_coverage, snakemake)

@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_errors import errors_against_oracle
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_errors(job: Job) -> None:
-    save(errors_against_oracle(pd.read_csv(job.input.cases)), job.output.pdf, job.output.png)
+    save(errors_against_oracle(pd.read_csv(job.input.cases)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_errors, snakemake)

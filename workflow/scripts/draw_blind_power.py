@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_power import power_map
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_power(job: Job) -> None:
-    save(power_map(pd.read_csv(job.input.power)), job.output.pdf, job.output.png)
+    save(power_map(pd.read_csv(job.input.power)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_power, snakemake)

@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_reliability import reliability_diagram
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_reliability(job: Job) -> None:
-    save(reliability_diagram(pd.read_csv(job.input.reliability)), job.output.pdf, job.output.png)
+    save(reliability_diagram(pd.read_csv(job.input.reliability)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_reliability, snakemake)

@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.blind_rates import rates_and_targets
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_blind_targets(job: Job) -> None:
-    save(rates_and_targets(pd.read_csv(job.input.summary)), job.output.pdf, job.output.png)
+    save(rates_and_targets(pd.read_csv(job.input.summary)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_blind_targets, snakemake)

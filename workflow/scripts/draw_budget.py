@@ -5,11 +5,16 @@ import pandas as pd
 from elastocal.figures.questions import budget
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_budget(job: Job) -> None:
-    save(budget(pd.read_csv(job.input.table), job.params.titles, job.params.length), job.output.pdf, job.output.png)
+    save(
+        budget(pd.read_csv(job.input.table), job.params.titles, job.params.length),
+        job.output.pdf,
+        job.output.png,
+        origin_of(job),
+    )
 
 
 run(draw_budget, snakemake)

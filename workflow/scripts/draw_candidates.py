@@ -6,12 +6,12 @@ from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import CANDIDATES
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_candidates(job: Job) -> None:
     stated = read_json(job.input.diagnosis)["document"]["probabilities"]
-    save(probabilities(stated, read_table(job.input.candidates, CANDIDATES)), job.output.pdf, job.output.png)
+    save(probabilities(stated, read_table(job.input.candidates, CANDIDATES)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_candidates, snakemake)

@@ -5,12 +5,12 @@ from elastocal.figures.style import save
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_confounding(job: Job) -> None:
     figure = confounding(read_table(job.input.candidates, CANDIDATES), read_table(job.input.confounding, CONFOUNDING))
-    save(figure, job.output.pdf, job.output.png)
+    save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_confounding, snakemake)

@@ -5,11 +5,11 @@ import pandas as pd
 from elastocal.figures.questions import ladder
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_ladder(job: Job) -> None:
-    save(ladder(pd.read_csv(job.input.table)), job.output.pdf, job.output.png)
+    save(ladder(pd.read_csv(job.input.table)), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_ladder, snakemake)

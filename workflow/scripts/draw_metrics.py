@@ -6,11 +6,11 @@ from elastocal.figures.questions import metrics
 from elastocal.figures.style import save
 from elastocal.report.metric_answers import METRIC_NAMES
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_metrics(job: Job) -> None:
-    save(metrics(pd.read_csv(job.input.table), job.params.titles, METRIC_NAMES), job.output.pdf, job.output.png)
+    save(metrics(pd.read_csv(job.input.table), job.params.titles, METRIC_NAMES), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_metrics, snakemake)

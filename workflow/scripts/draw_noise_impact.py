@@ -5,12 +5,12 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_noise_impact(job: Job) -> None:
     figure = noise_impact(read_long(job.input.metrics, metrics), job.params.strategy, job.params.titles)
-    save(figure, job.output.pdf, job.output.png)
+    save(figure, job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_noise_impact, snakemake)

@@ -7,12 +7,12 @@ from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals as schema
 from elastocal.mechanics.robot_file import joint_count
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_residuals(job: Job) -> None:
     joints = joint_count(read_json(job.input.descriptions)["robot"])
-    save(residuals(read_table(job.input.residuals, schema(joints))), job.output.pdf, job.output.png)
+    save(residuals(read_table(job.input.residuals, schema(joints))), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_residuals, snakemake)

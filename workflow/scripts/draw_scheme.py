@@ -5,14 +5,14 @@ from elastocal.figures.spring_scheme import spring_scheme
 from elastocal.figures.style import save
 from elastocal.mechanics.robot_file import robot_from_document
 
-from job import Job, run
+from job import Job, origin_of, run
 
 SCHEMES = {"kinematic_scheme": kinematic_scheme, "spring_scheme": spring_scheme}
 
 
 def draw_scheme(job: Job) -> None:
     robot = robot_from_document(job.params.robot)
-    save(SCHEMES[job.params.scheme](robot), job.output.pdf, job.output.png)
+    save(SCHEMES[job.params.scheme](robot), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_scheme, snakemake)

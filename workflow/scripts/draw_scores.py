@@ -5,12 +5,17 @@ import pandas as pd
 from elastocal.figures.against_paper import scores
 from elastocal.figures.style import save
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_scores(job: Job) -> None:
     comparison = pd.read_csv(job.input.comparison, dtype={"table": str})
-    save(scores(comparison, pd.read_csv(job.input.expectations), job.params.titles), job.output.pdf, job.output.png)
+    save(
+        scores(comparison, pd.read_csv(job.input.expectations), job.params.titles),
+        job.output.pdf,
+        job.output.png,
+        origin_of(job),
+    )
 
 
 run(draw_scores, snakemake)

@@ -7,7 +7,7 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_stiffness_errors(job: Job) -> None:
@@ -17,6 +17,7 @@ def draw_stiffness_errors(job: Job) -> None:
         stiffness_errors(frame, printed, settings.title, settings.robot, settings.order, settings.limit),
         job.output.pdf,
         job.output.png,
+        origin_of(job),
     )
 
 

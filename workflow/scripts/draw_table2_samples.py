@@ -7,14 +7,14 @@ from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame
 from elastocal.study.table_schemas import INITIAL
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def draw_table2_samples(job: Job) -> None:
     titles = job.params.titles
     initial = {robot: read_frame(path, INITIAL) for robot, path in zip(titles, job.input.initial, strict=True)}
     reference = pd.read_csv(job.input.reference, dtype={"table": str}, keep_default_na=False)
-    save(table2_samples(initial, reference, titles), job.output.pdf, job.output.png)
+    save(table2_samples(initial, reference, titles), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(draw_table2_samples, snakemake)

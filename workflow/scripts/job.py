@@ -5,11 +5,14 @@ import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
 
 from elastocal.errors import InputError
 from elastocal.io.checksums import check_checksums, record_checksums
+from elastocal.io.job_records import JobRecord, write_job_record
+from elastocal.io.origin import Origin
 
 # Shared by the jobs under way: a run that begins after another one was killed waits for the jobs that this one left behind.
 JOBS_LOCK = Path(".snakemake/jobs.lock")
@@ -23,6 +26,8 @@ class Job(Protocol):
     params: Any
     wildcards: Any
     log: Any
+    rule: str
+    config: Any
 
 
 def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None) -> None:
@@ -34,9 +39,11 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
     _write(log, "")
     try:
         with _under_way():
+            started = _now()
             check_checksums(snakemake.input if checked is None else checked)
             step(snakemake)
             record_checksums(snakemake.output)
+            write_job_record(snakemake.log[0], _record(snakemake, started))
     except InputError as error:
         _write(log, f"{error}\n")
         sys.exit(str(error))
@@ -48,6 +55,11 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
         _write(log, traceback.format_exc())
         raise
     _write(log, "done\n")
+
+
+def origin_of(job: Job) -> Origin:
+    """Commit, configuration and seed of the run that this job belongs to."""
+    return Origin(**job.config["origin"])
 
 
 def fault_of_machine(error: OSError | MemoryError, output: str) -> str:
@@ -68,6 +80,16 @@ def _under_way() -> Iterator[None]:
     with open(JOBS_LOCK, "a") as lock:
         fcntl.flock(lock, fcntl.LOCK_SH)
         yield
+
+
+def _record(job: Job, started: str) -> JobRecord:
+    wildcards = {name: str(value) for name, value in job.wildcards.items()}
+    inputs, outputs = (tuple(map(str, files)) for files in (job.input, job.output))
+    return JobRecord(job.rule, wildcards, started, _now(), inputs, outputs, origin_of(job))
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
 
 
 def _write(log: Path, text: str) -> None:

@@ -9,7 +9,7 @@ from elastocal.figures.sweep import sweep
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def score_sweep(job: Job) -> None:
@@ -19,7 +19,7 @@ def score_sweep(job: Job) -> None:
     table = against_angle(cases)
     write_csv(job.output.cases, cases)
     write_csv(job.output.table, table)
-    save(sweep(table), job.output.pdf, job.output.png)
+    save(sweep(table), job.output.pdf, job.output.png, origin_of(job))
 
 
 run(score_sweep, snakemake)

@@ -9,7 +9,7 @@ from elastocal.figures.closed_loop import closed_loop
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame, write_csv
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def summarize_closed_loop(job: Job) -> None:
@@ -23,7 +23,7 @@ def summarize_closed_loop(job: Job) -> None:
     write_csv(job.output.errors, errors)
     write_csv(job.output.summary, table)
     write_csv(job.output.goals, goals(errors))
-    save(closed_loop(table), job.output.figure, job.output.picture)
+    save(closed_loop(table), job.output.figure, job.output.picture, origin_of(job))
 
 
 run(summarize_closed_loop, snakemake)

@@ -15,7 +15,7 @@ from elastocal.league.pages import league_page
 from elastocal.league.schemas import ENTRIES, MECHANISMS
 from elastocal.league.table import Result, cost_table, league_table, mechanism_table
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def timing(folder: str, *names: str) -> dict[str, float]:
@@ -43,8 +43,8 @@ def tabulate_league(job: Job) -> None:
     write_text(job.output.page, league_page(table, costs, mechanisms, published, methods, settings.missing))
     for name, file in settings.missing.items():
         print(f"left out of the league: {name}, as {file} is missing in ELASTOCAL_DATA", file=sys.stderr)
-    save(league_picture(table, methods), job.output.picture_pdf, job.output.picture_png)
-    save(mechanism_picture(mechanisms), job.output.mechanisms_pdf, job.output.mechanisms_png)
+    save(league_picture(table, methods), job.output.picture_pdf, job.output.picture_png, origin_of(job))
+    save(mechanism_picture(mechanisms), job.output.mechanisms_pdf, job.output.mechanisms_png, origin_of(job))
 
 
 run(tabulate_league, snakemake)

@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     import numpy as np
     from matplotlib.typing import RcKeyType
 
+    from elastocal.io.origin import Origin
+
 WIDTH_MM = 165
 # Okabe and Ito's, without black and the yellow that is too pale for lines; then two more.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F3C8D", "#4D4D4D")
@@ -90,7 +92,7 @@ def ink_on(colour: tuple[float, ...]) -> str:
 
 
 @styled
-def save(figure: Figure, pdf: str, png: str) -> None:
+def save(figure: Figure, pdf: str, png: str, origin: Origin | None = None) -> None:
     """Write a figure as PDF and PNG without dates, so that the same data give the same bytes.
 
     Each has a layout of its own: the widths of its letters differ by a few per cent, and labels would be cut off.
@@ -100,8 +102,14 @@ def save(figure: Figure, pdf: str, png: str) -> None:
     figure : matplotlib.figure.Figure
     pdf, png : str
         Paths; each file appears whole or not at all.
+    origin : Origin, optional
+        Named in the metadata of both: Subject and Keywords of the PDF, Description and Source of the PNG.
     """
-    for path, options in ((pdf, {"metadata": {"CreationDate": None}}), (png, {"dpi": 150, "metadata": {"Software": None}})):
+    subject = {} if origin is None else {"Subject": origin.words, "Keywords": " ".join(map(str, vars(origin).values()))}
+    described = {} if origin is None else {"Description": origin.words, "Source": origin.commit}
+    of_pdf = {"CreationDate": None, **subject}
+    of_png = {"Software": None, **described}
+    for path, options in ((pdf, {"metadata": of_pdf}), (png, {"dpi": 150, "metadata": of_png})):
         with atomic_write(path) as partial:
             figure.savefig(partial, format=path.rsplit(".", 1)[1], **options)
 

@@ -11,8 +11,12 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from elastocal.io.origin import Origin
 
-def write_blind_report(path: str | Path, facts: Mapping[str, Any], figures: Iterable[str]) -> None:
+
+def write_blind_report(
+    path: str | Path, facts: Mapping[str, Any], figures: Iterable[str], origin: Origin | None = None
+) -> None:
     """Compile the report of the blind proof; the file appears whole or not at all.
 
     Parameters
@@ -23,5 +27,7 @@ def write_blind_report(path: str | Path, facts: Mapping[str, Any], figures: Iter
         From `blind_facts.blind_facts`.
     figures : sequence of str
         PDF files, named targets, reliability, power, confusion, errors, coverage and sweep.
+    origin : Origin, optional
+        Named in the foot of each page.
     """
-    compile_document(path, "blind.typ", {"facts": facts}, figures)
+    compile_document(path, "blind.typ", {"facts": facts}, figures, origin)

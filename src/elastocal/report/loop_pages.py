@@ -11,8 +11,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Any
 
+    from elastocal.io.origin import Origin
 
-def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str]) -> None:
+
+def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence[str], origin: Origin | None = None) -> None:
     """Compile the report of a campaign; the file appears whole or not at all.
 
     Parameters
@@ -23,6 +25,8 @@ def write_loop_report(path: str | Path, facts: dict[str, Any], figures: Sequence
         From `loop_facts.loop_facts`.
     figures : sequence of str
         PDF files, named before_after, residuals, arrows, candidates and, where there are pairs, confounding.
+    origin : Origin, optional
+        Named in the foot of each page.
     """
     names = [Path(figure).stem for figure in figures]
-    compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures)
+    compile_document(path, "loop.typ", {"facts": facts | {"figures": names}}, figures, origin)

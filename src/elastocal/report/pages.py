@@ -11,9 +11,15 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from elastocal.io.origin import Origin
+
 
 def write_report(
-    path: str | Path, facts: Mapping[str, Any], tables: Mapping[str, Sequence[Sequence[str]]], figures: Iterable[str]
+    path: str | Path,
+    facts: Mapping[str, Any],
+    tables: Mapping[str, Sequence[Sequence[str]]],
+    figures: Iterable[str],
+    origin: Origin | None = None,
 ) -> None:
     """Compile the report; the file appears whole or not at all.
 
@@ -27,5 +33,7 @@ def write_report(
         Rows of each table, the header first.
     figures : iterable of str
         PDF files; the document finds them by their names.
+    origin : Origin, optional
+        Named in the foot of each page.
     """
-    compile_document(path, "study.typ", {"facts": facts, "tables": tables}, figures)
+    compile_document(path, "study.typ", {"facts": facts, "tables": tables}, figures, origin)

@@ -17,8 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
     from typing import Any
 
+    from elastocal.io.origin import Origin
 
-def compile_document(path: str | Path, document: str, data: Mapping[str, Any], figures: Iterable[str] = ()) -> None:
+
+def compile_document(
+    path: str | Path, document: str, data: Mapping[str, Any], figures: Iterable[str] = (), origin: Origin | None = None
+) -> None:
     """Compile a document; the PDF appears whole or not at all.
 
     Parameters
@@ -31,11 +35,13 @@ def compile_document(path: str | Path, document: str, data: Mapping[str, Any], f
         JSON-serialisable contents of the files ``<name>.json`` that the document reads.
     figures : iterable of str
         PDF files; the document finds them by their names.
+    origin : Origin, optional
+        What the document shows in its foot and has in its metadata: the contents of ``origin.json``, empty without.
     """
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder) / document
         source.write_text(resources.files("elastocal.report").joinpath(document).read_text(encoding="utf-8"), encoding="utf-8")
-        for name, contents in data.items():
+        for name, contents in {**data, "origin": "" if origin is None else origin.words}.items():
             (Path(folder) / f"{name}.json").write_text(json.dumps(contents, allow_nan=False), encoding="utf-8")
         for figure in figures:
             shutil.copy(figure, folder)

@@ -1,0 +1,64 @@
+"""Which commit, configuration and seed a file comes from, in words that stand in the file or beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing import Any
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a file was made from.
+
+    Attributes
+    ----------
+    commit : str
+        Of the repository, with ``-dirty`` behind it where sources were edited since; ``unknown`` outside of a checkout.
+    configuration_sha256 : str
+        From `configuration_sha256`.
+    seed : int
+    """
+
+    commit: str
+    configuration_sha256: str
+    seed: int
+
+    @property
+    def words(self) -> str:
+        """One line that people and programs can read."""
+        return f"commit {self.commit}, configuration SHA-256 {self.configuration_sha256}, seed {self.seed}"
+
+
+def canonical_json(value: Any) -> str:
+    """The one JSON text of a value: keys sorted, no spaces, so that equal values have equal digests.
+
+    Parameters
+    ----------
+    value : object
+        JSON-serialisable.
+
+    Returns
+    -------
+    str
+    """
+    return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def configuration_sha256(configuration: Any) -> str:
+    """SHA-256 of the canonical JSON of a configuration, in UTF-8.
+
+    Parameters
+    ----------
+    configuration : object
+        With everything that it refers to, such as the documents of robots.
+
+    Returns
+    -------
+    str
+    """
+    return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
