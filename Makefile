@@ -48,8 +48,10 @@ site: .venv/ready-for-tests
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
-	uv pip compile pyproject.toml --extra build --extra test --universal --python-version 3.11 --generate-hashes --no-header \
-	    -c requirements.lock -o requirements-test.lock
+	uv pip compile pyproject.toml --extra build --extra cluster --universal --python-version 3.11 --generate-hashes --no-header \
+	    -c requirements.lock -o requirements-cluster.lock
+	uv pip compile pyproject.toml --extra build --extra cluster --extra test --universal --python-version 3.11 --generate-hashes --no-header \
+	    -c requirements-cluster.lock -o requirements-test.lock
 
 clean:
 	rm -rf .venv .snakemake data/simulated results/[a-z]* reports/[a-z]* site
@@ -58,10 +60,15 @@ clean:
 	$(PYTHON) -m venv .venv
 
 .venv/ready: requirements.lock pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install -q --require-hashes -r requirements.lock
+	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
 	touch $@
 
+# What a run on a cluster needs besides: docs/cluster.md.
+.venv/ready-for-cluster: requirements-cluster.lock .venv/ready
+	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements-cluster.lock
+	touch $@
+
 .venv/ready-for-tests: requirements-test.lock .venv/ready
-	$(BIN)/python -m pip install -q --require-hashes -r requirements-test.lock
+	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements-test.lock
 	touch $@
