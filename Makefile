@@ -3,7 +3,7 @@ PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
 
-.PHONY: paper test fuzz soak mutants lint bench pictures site lock clean
+.PHONY: paper test fuzz soak mutants lint bench pictures site crate lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
@@ -45,6 +45,12 @@ site: .venv/ready-for-tests
 	$(BIN)/python docs/site/assemble.py site/source
 	$(BIN)/sphinx-build -q -W --keep-going -j $(CORES) -b html -c docs/site -d site/cache site/source site/html
 
+# A finished run as a Workflow Run RO-Crate, held against its files and its profile.
+crate: .venv/ready .venv-crate/ready
+	$(BIN)/snakemake -j$(CORES) crate
+	$(BIN)/python workflow/check_crate.py
+	.venv-crate/bin/python workflow/validate_crate.py
+
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
@@ -52,9 +58,10 @@ lock:
 	    -c requirements.lock -o requirements-cluster.lock
 	uv pip compile pyproject.toml --extra build --extra cluster --extra test --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements-cluster.lock -o requirements-test.lock
+	uv pip compile --group crate --universal --python-version 3.11 --generate-hashes --no-header -o requirements-crate.lock
 
 clean:
-	rm -rf .venv .snakemake data/simulated results/[a-z]* reports/[a-z]* site
+	rm -rf .venv .venv-crate .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
@@ -71,4 +78,10 @@ clean:
 
 .venv/ready-for-tests: requirements-test.lock .venv/ready
 	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements-test.lock
+	touch $@
+
+# The validator of crates.
+.venv-crate/ready: requirements-crate.lock
+	$(PYTHON) -m venv .venv-crate
+	.venv-crate/bin/python -m pip install -q --no-deps --require-hashes -r requirements-crate.lock
 	touch $@

@@ -7,6 +7,10 @@ include: "workflow/rules/begin.smk"
 configfile: f"{workflow.basedir}/config.yaml"
 
 
+# What stands above the results in `snakemake --report`.
+report: f"{workflow.basedir}/workflow/report/workflow.rst"
+
+
 include: "workflow/rules/common.smk"
 include: "workflow/rules/simulate.smk"
 include: "workflow/rules/identify.smk"
@@ -27,6 +31,7 @@ include: "workflow/rules/league_files.smk"
 include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
 include: "workflow/rules/audit.smk"
+include: "workflow/rules/crate.smk"
 
 
 watch_sources()

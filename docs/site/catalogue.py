@@ -1,4 +1,4 @@
-"""The page of the catalogue of effects: physics and formula of each from its docstring, its figure, its parameters and sizes."""
+"""The page of the catalogue of effects: physics and formula of each from its docstring, its figure and its parameters."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import yaml
-from docstrings import with_plain_references
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
 from elastocal.figures.effect_signatures import offered_candidates, signature
+
+from docstrings import with_plain_references
 
 if TYPE_CHECKING:
     from elastocal.effects.protocol import Effect
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 HEAD = """The catalogue of effects
 ========================
 
-What a calibrated model may lack, one physical effect each. Made of the modules of ``elastocal.effects``: what a page says is what the
-code computes. A diagnosis compares all of them, at every location where they can act on the robot.
+What a calibrated model may lack, one physical effect each. Made of the modules of ``elastocal.effects``: what it says is what
+the code computes. A diagnosis compares all of them, at every location where they can act on the robot.
 
 How to read the figures
 -----------------------
@@ -34,8 +35,9 @@ millimetres along the axes of the base; all three panels have the same scale.
 - **Right**: four hours in one pose without a load, while the arm warms up by 10 K. Something that happens at one moment
   happens in the middle.
 
-A line that is flat in one panel and not in another is what distinguishes effects: an offset of a joint needs no load and no time, a
-spring does nothing without a load, a drift nothing at the beginning. Effects with alike figures are ambiguous, and a verdict says so.
+What is flat in one panel and not in another is what distinguishes effects: an offset of a joint needs neither load nor time,
+a spring does nothing without a load, a drift nothing at the beginning. Effects with alike figures are ambiguous, and a verdict
+says so.
 
 """
 FAMILIES = {
@@ -65,11 +67,13 @@ def page() -> str:
     unknown = {effect.FAMILY for effect in listed.values()} - set(FAMILIES)
     if unknown or set(FORMULAS) != set(listed):
         differ = sorted(unknown | (set(FORMULAS) ^ set(listed)))
-        raise KeyError(f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}")
+        raise KeyError(
+            f"docs/site: words of families in catalogue.py and effect_formulas.yaml differ from the catalogue in {differ}"
+        )
     parts = [HEAD]
     for family, words in FAMILIES.items():
         parts.append(_headed(words, "-"))
-        parts += [_section(effect) for effect in listed.values() if effect.FAMILY == family]
+        parts += [_section(effect) for effect in listed.values() if family == effect.FAMILY]
     return "".join(parts)
 
 
@@ -80,7 +84,9 @@ def _headed(title: str, underline: str) -> str:
 def _section(effect: Effect) -> str:
     title = f"{effect.WORDS[0].upper()}{effect.WORDS[1:]} (``{effect.NAME}``)"
     text = with_plain_references(sys.modules[effect.__name__].__doc__ or "")
-    moves = "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
+    moves = (
+        "Moves the robot, so that tasks feel it." if effect.MOVES_ROBOT else "In the measurements alone: tasks do not feel it."
+    )
     picture = f".. image:: /signatures/{effect.NAME}.svg\n   :alt: What {effect.WORDS} does to a measured point\n\n"
     summary, _, rest = text.strip().partition("\n\n")
     # A heading of a docstring would be a heading of the page.
@@ -94,7 +100,14 @@ def _section(effect: Effect) -> str:
 def _table(effect: Effect) -> str:
     candidate, count = signature(effect.NAME, ROBOT).candidate, len(offered_candidates(effect.NAME, ROBOT))
     rows = [
-        f"   * - ``{parameter.name}``\n     - {parameter.unit}\n     - {parameter.plausible:.2g}\n     - {_sign(parameter.sign)}\n"
+        "".join(
+            (
+                f"   * - ``{parameter.name}``\n",
+                f"     - {parameter.unit}\n",
+                f"     - {parameter.plausible:.2g}\n",
+                f"     - {_sign(parameter.sign)}\n",
+            )
+        )
         for parameter in candidate.parameters
     ]
     lines = [f"Where it can act on the arm shown: {count} candidates; shown is ``{candidate.key}``."]

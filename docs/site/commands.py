@@ -7,7 +7,7 @@ import sys
 
 HEAD = """# Commands
 
-Made of the code; `elastocal COMMAND --help` says the same. What the commands do, one by one, is in [the commands](../docs/afternoon.md).
+Made of the code; `elastocal COMMAND --help` says the same. What they do, one by one: [the commands](../docs/afternoon.md).
 
 """
 

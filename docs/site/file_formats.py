@@ -36,7 +36,7 @@ _TO_KEY = re.compile(r"\[([^]]+)\]\(#[^)]*\)")
 
 HEAD = """# File formats
 
-Made of the schemas by which files are checked when they are read and written. Measurements, `measurements.csv`, are described in
+Made of the schemas by which files are checked when they are read and written. Measurements, `measurements.csv`, are in
 [a campaign](../../docs/campaign.md), tables for an audit in [the audit](../../docs/audit.md).
 
 ```{toctree}

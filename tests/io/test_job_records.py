@@ -39,7 +39,11 @@ def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other():
     records = [DRAW, OTHER, FIT, MEASURE]
     assert jobs_behind(["e"], records) == [MEASURE, FIT, DRAW]
     assert jobs_behind(["c"], records) == [MEASURE, FIT]
-    assert jobs_behind(["settings"], records) == []
+
+
+def test_a_file_that_no_record_is_of_is_refused():
+    with pytest.raises(InputError, match=r"^settings: found no record in results/jobs of the job that made it; allowed: "):
+        jobs_behind(["settings"], [FIT])
 
 
 def test_a_job_has_a_name_of_its_own():

@@ -15,7 +15,21 @@ from elastocal.command.main import app
 
 ROOT = Path(__file__).resolve().parents[2]
 SHELLS = ("sh", "bash", "console")
-PROGRAMS = ("make", "snakemake", "elastocal", "python", "pip", "uv", "apt-get", "mkdir", "cp", "find", "sed", "git", "pre-commit")
+PROGRAMS = (
+    "make",
+    "snakemake",
+    "elastocal",
+    "python",
+    "pip",
+    "uv",
+    "apt-get",
+    "mkdir",
+    "cp",
+    "find",
+    "sed",
+    "git",
+    "pre-commit",
+)
 # Where a script of CI runs a command, word for word.
 SCRIPTS = (".ci/run", "workflow/examples/afternoon.sh")
 # How-to pages are run from top to bottom, each in a folder of its own, up to a command of these: they need a diagnosis,
@@ -54,7 +68,10 @@ ELSEWHERE = {
     ),
     "pip install -e .": ("Makefile", "pip install -q --no-deps --no-build-isolation -e ."),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
-    "python -m pip wheel --no-deps --no-build-isolation -w dist .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
+    "python -m pip wheel --no-deps --no-build-isolation -w dist .": (
+        "tests/project/test_wheel.py",
+        '[*pip, "wheel", *alone, ".", "-w", "dist"]',
+    ),
 }
 # Minutes of measurement by hand, of which CI has no room: nothing but that they start is tested.
 BY_HAND = ("python benchmarks/run.py", "python benchmarks/interval_coverage.py")
@@ -93,7 +110,11 @@ def commands(page):
         if token.type in ("fence", "code_block") and token.info.strip() in ("", *SHELLS):
             lines = shell_lines(token.content)
             certain = token.info.strip() in SHELLS
-            found += [(as_typed(line), token.map[0]) for line in lines if line.strip() and (certain or begins_a_command(as_typed(line)))]
+            found += [
+                (as_typed(line), token.map[0])
+                for line in lines
+                if line.strip() and (certain or begins_a_command(as_typed(line)))
+            ]
         for child in token.children or ():
             if child.type == "code_inline" and begins_a_command(as_typed(child.content)) and "=…" not in child.content:
                 found.append((as_typed(child.content), token.map[0]))
@@ -113,7 +134,11 @@ def story(page):
     """What a how-to page types, until something needs a diagnosed campaign; None of another page."""
     if "how_to" not in page.parts:
         return None
-    blocks = [t.content for t in MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8")) if t.type == "fence" and t.info == "sh"]
+    blocks = [
+        t.content
+        for t in MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
+        if t.type == "fence" and t.info == "sh"
+    ]
     return [block for block in blocks if not block.startswith(AFTER_A_DIAGNOSIS)]
 
 
@@ -156,7 +181,9 @@ def test_the_search_finds_commands_of_each_kind(tmp_path):
     assert ways == {"script", "story", "elsewhere", "not ours", "make", "dry run", "help", "by hand"}
     assert len(every_command()) > 60
     new = tmp_path / "new.md"
-    new.write_text("Try `elastocal plan mine.yaml --poses 3`.\n\n    make coffee now\n\n```sh\nrm nothing\n```\n", encoding="utf-8")
+    new.write_text(
+        "Try `elastocal plan mine.yaml --poses 3`.\n\n    make coffee now\n\n```sh\nrm nothing\n```\n", encoding="utf-8"
+    )
     page = ROOT / os.path.relpath(new, ROOT)
     assert [way_of(text) for text, _ in commands(page)] == [None, None, None]
 
@@ -192,7 +219,11 @@ def dry_runs():
     """Targets that can be asked for at once, and those that need a configuration of their own."""
     plain, own = set(), []
     for text in sorted({text for text, _ in every_command() if way_of(text) == "dry run"}):
-        words = [word for word in shlex.split(text)[1:] if word not in ("-n", "-q", "rules", "-k") and not re.fullmatch(r"-j\d+", word)]
+        words = [
+            word
+            for word in shlex.split(text)[1:]
+            if word not in ("-n", "-q", "rules", "-k") and not re.fullmatch(r"-j\d+", word)
+        ]
         if "--config" in words:
             own.append(words)
         else:

@@ -62,7 +62,9 @@ def test_nothing_is_fetched_from_elsewhere(pages):
     """Links that a reader follows may lead away; styles, scripts, fonts and pictures may not."""
     fetched = re.compile(r'<(?:link|script|img|iframe)[^>]*(?:href|src)="(?:https?:)?//[^"]*"')
     assert [found for path in pages for found in fetched.findall(path.read_text(encoding="utf-8"))] == []
-    styles = [path for path in SITE.rglob("*.css") if re.search(r"url\(\s*[\"']?(?:https?:)?//", path.read_text(encoding="utf-8"))]
+    styles = [
+        path for path in SITE.rglob("*.css") if re.search(r"url\(\s*[\"']?(?:https?:)?//", path.read_text(encoding="utf-8"))
+    ]
     assert styles == []
 
 

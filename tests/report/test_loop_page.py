@@ -3,12 +3,14 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import candidate_table, residual_table
 
+from elastocal.mechanics.kinematics import corners
 from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
 
@@ -58,6 +60,14 @@ def test_the_robot_stands_where_its_chain_says(kuka):
     np.testing.assert_allclose(data["outlines"][0][:2], [[0, 0, 0], [0, 0, 0.675]], atol=1e-4)
 
 
+def test_the_robot_is_drawn_at_the_angles_of_the_model_whatever_its_controller_reports(kuka):
+    table, verdict = residual_table(), CAMPAIGNS["named"]
+    other = replace(kuka, reported_matrix=np.diag([1.0, -1, -1, 1, 1, 1]), reported_offset=np.full(6, 0.3))
+    _, data = loop_page(facts_of(verdict), verdict, table, candidate_table(), other)
+    angles = np.column_stack([table[f"q{joint}"] for joint in range(1, 7)])[:1]
+    np.testing.assert_allclose(data["outlines"][0], corners(kuka.chain, angles)[:, 0], atol=1e-4)
+
+
 def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(kuka, monkeypatch):
     monkeypatch.setattr(module, "_MOST_SHOWN", 11)
     page, data = page_of(kuka)
@@ -73,6 +83,17 @@ def test_the_leading_candidates_stand_by_falling_bayes_factor(kuka):
     expected = np.sort(table["log_bayes_factor"][np.isfinite(table["log_bayes_factor"])])[::-1][:15]
     np.testing.assert_allclose(factors, expected, atol=0.051)
     assert [row["chosen"] for row in page["candidates"]].count("yes") == table["chosen"].sum()
+
+
+def test_a_candidate_of_several_shapes_stands_once_at_the_best(kuka):
+    table = candidate_table()
+    key = table["candidate"][np.nanargmax(table["log_bayes_factor"])]
+    lesser = {name: values[table["candidate"] == key][:1].copy() for name, values in table.items()}
+    lesser["log_bayes_factor"] = lesser["log_bayes_factor"] - 1
+    verdict = CAMPAIGNS["named"]
+    twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
+    pages = [loop_page(facts_of(verdict), verdict, residual_table(), some, kuka)[0] for some in (table, twice)]
+    assert pages[0]["candidates"] == pages[1]["candidates"]
 
 
 def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):

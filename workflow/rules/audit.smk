@@ -11,7 +11,7 @@ rule audit_files:
         sources=sources("audit_files.py"),
     output:
         table="reports/audit.csv",
-        page="reports/audit.html",
+        page=shown("reports/audit.html", "audit", "Audit", shows="The audit", kind="report"),
     log:
         "results/logs/audit_files.log",
     benchmark:

@@ -67,7 +67,9 @@ rule score_follow_ups:
         anew=expand(rules.diagnose_follow_ups.output.verdicts, block=BLIND),
         sources=sources("score_follow_ups.py"),
     output:
-        rates="reports/blind/follow_up.csv",
+        rates=shown(
+            "reports/blind/follow_up.csv", "blind_follow_up", "Blind proof", shows="Names after further poses", kind="table"
+        ),
         separable="reports/blind/follow_up_separable.csv",
         others="reports/blind/follow_up_other.csv",
         poses="reports/blind/follow_up_poses.csv",
@@ -96,7 +98,13 @@ rule score_sweep:
         table="reports/blind/sweep.csv",
         cases="reports/blind/sweep_cases.csv",
         pdf="reports/blind/figures/sweep.pdf",
-        png="reports/blind/figures/sweep.png",
+        png=shown(
+            "reports/blind/figures/sweep.png",
+            "blind_sweep",
+            "Blind proof",
+            shows="How near relatives are named",
+            kind="figure",
+        ),
     log:
         "results/logs/score_sweep.log",
     benchmark:

@@ -35,12 +35,16 @@ rule score_cases:
         sources=sources("score_cases.py"),
     output:
         cases="reports/blind/cases.csv",
-        summary="reports/blind/summary.csv",
+        summary=shown(
+            "reports/blind/summary.csv", "blind_targets", "Blind proof", shows="Every figure beside its target", kind="table"
+        ),
         settings="reports/blind/settings.csv",
         confusion="reports/blind/confusion.csv",
-        power="reports/blind/power.csv",
+        power=shown("reports/blind/power.csv", "blind_power", "Blind proof", shows="Power by effect and size", kind="table"),
         coverage="reports/blind/coverage.csv",
-        undetectable="reports/blind/undetectable.csv",
+        undetectable=shown(
+            "reports/blind/undetectable.csv", "blind_undetectable", "Blind proof", shows="What cannot be found", kind="table"
+        ),
         probabilities="reports/blind/probabilities.csv",
         reliability="reports/blind/reliability.csv",
     log:
@@ -59,7 +63,9 @@ rule draw_blind_targets:
         sources=sources("draw_blind_targets.py"),
     output:
         pdf="reports/blind/figures/targets.pdf",
-        png="reports/blind/figures/targets.png",
+        png=shown(
+            "reports/blind/figures/targets.png", "blind_targets", "Blind proof", shows="Figures against targets", kind="figure"
+        ),
     log:
         "results/logs/draw_blind_targets.log",
     benchmark:
@@ -74,7 +80,13 @@ rule draw_blind_reliability:
         sources=sources("draw_blind_reliability.py"),
     output:
         pdf="reports/blind/figures/reliability.pdf",
-        png="reports/blind/figures/reliability.png",
+        png=shown(
+            "reports/blind/figures/reliability.png",
+            "blind_reliability",
+            "Blind proof",
+            shows="Probabilities against frequencies",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_blind_reliability.log",
     benchmark:
@@ -89,7 +101,9 @@ rule draw_blind_power:
         sources=sources("draw_blind_power.py"),
     output:
         pdf="reports/blind/figures/power.pdf",
-        png="reports/blind/figures/power.png",
+        png=shown(
+            "reports/blind/figures/power.png", "blind_power", "Blind proof", shows="What is detected by size", kind="figure"
+        ),
     log:
         "results/logs/draw_blind_power.log",
     benchmark:
@@ -104,7 +118,13 @@ rule draw_blind_confusion:
         sources=sources("draw_blind_confusion.py"),
     output:
         pdf="reports/blind/figures/confusion.pdf",
-        png="reports/blind/figures/confusion.png",
+        png=shown(
+            "reports/blind/figures/confusion.png",
+            "blind_confusion",
+            "Blind proof",
+            shows="Ground truth against verdict",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_blind_confusion.log",
     benchmark:
@@ -119,7 +139,9 @@ rule draw_blind_coverage:
         sources=sources("draw_blind_coverage.py"),
     output:
         pdf="reports/blind/figures/coverage.pdf",
-        png="reports/blind/figures/coverage.png",
+        png=shown(
+            "reports/blind/figures/coverage.png", "blind_coverage", "Blind proof", shows="Coverage of intervals", kind="figure"
+        ),
     log:
         "results/logs/draw_blind_coverage.log",
     benchmark:
@@ -134,7 +156,7 @@ rule draw_blind_errors:
         sources=sources("draw_blind_errors.py"),
     output:
         pdf="reports/blind/figures/errors.pdf",
-        png="reports/blind/figures/errors.png",
+        png=shown("reports/blind/figures/errors.png", "blind_errors", "Blind proof", shows="Held-out errors", kind="figure"),
     log:
         "results/logs/draw_blind_errors.log",
     benchmark:
@@ -158,7 +180,7 @@ rule compile_blind_report:
         pages="src/elastocal/report/blind.typ",
         sources=sources("compile_blind_report.py"),
     output:
-        report="reports/blind/blind.pdf",
+        report=shown("reports/blind/blind.pdf", "blind", "Blind proof", shows="The report of the blind proof", kind="report"),
     log:
         "results/logs/compile_blind_report.log",
     benchmark:

@@ -30,10 +30,22 @@ rule summarize_closed_loop:
         sources=sources("summarize_closed_loop.py"),
     output:
         errors="reports/closed_loop/cases.csv",
-        summary="reports/closed_loop/closed_loop.csv",
+        summary=shown(
+            "reports/closed_loop/closed_loop.csv",
+            "closed_loop",
+            "Closed loop and planning",
+            shows="Errors by robot and model",
+            kind="table",
+        ),
         goals="reports/closed_loop/goals.csv",
         figure="reports/closed_loop/closed_loop.pdf",
-        picture="reports/closed_loop/closed_loop.png",
+        picture=shown(
+            "reports/closed_loop/closed_loop.png",
+            "closed_loop",
+            "Closed loop and planning",
+            shows="Errors after correction",
+            kind="figure",
+        ),
     log:
         "results/logs/summarize_closed_loop.log",
     benchmark:

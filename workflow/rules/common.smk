@@ -38,6 +38,12 @@ def placed(file):
 
 CONFIG = placed(ROOT / "config")
 
+
+def shown(file, caption, category, **labels):
+    """An output that `snakemake --report` shows; its caption is a page of workflow/report."""
+    return report(file, caption=str(ROOT / "workflow" / "report" / f"{caption}.rst"), category=category, labels=labels)
+
+
 # What Snakemake and we have imported by now stays to the end; to look through it for garbage, again and again while the jobs are
 # laid out, took a fifth of a rerun with nothing to do.
 gc.freeze()

@@ -32,7 +32,13 @@ rule draw_scheme:
         sources=sources("draw_scheme.py"),
     output:
         pdf="reports/figures/{scheme}.pdf",
-        png="reports/figures/{scheme}.png",
+        png=shown(
+            "reports/figures/{scheme}.png",
+            "scheme",
+            "Tables and figures of the paper",
+            shows="Figures 2 and 3: {scheme}",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_scheme/{scheme}.log",
     benchmark:
@@ -52,7 +58,13 @@ rule draw_noise_impact:
         sources=sources("draw_noise_impact.py"),
     output:
         pdf="reports/figures/fig4.pdf",
-        png="reports/figures/fig4.png",
+        png=shown(
+            "reports/figures/fig4.png",
+            "fig4",
+            "Tables and figures of the paper",
+            shows="Figure 4: impact of noise",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_noise_impact.log",
     benchmark:
@@ -71,7 +83,13 @@ rule draw_stiffness_errors:
         sources=sources("draw_stiffness_errors.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
-        png="reports/figures/fig5{panel}.png",
+        png=shown(
+            "reports/figures/fig5{panel}.png",
+            "fig5_stiffness",
+            "Tables and figures of the paper",
+            shows="Figure 5{panel}: stiffness errors of all strategies",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_stiffness_errors/fig5{panel}.log",
     benchmark:
@@ -94,7 +112,13 @@ rule draw_deviations:
         sources=sources("draw_deviations.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
-        png="reports/figures/fig5{panel}.png",
+        png=shown(
+            "reports/figures/fig5{panel}.png",
+            "fig5_deviation",
+            "Tables and figures of the paper",
+            shows="Figure 5{panel}: deviation by all strategies",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_deviations/fig5{panel}.log",
     benchmark:
@@ -117,7 +141,13 @@ rule draw_bias_and_accuracy:
         sources=sources("draw_bias_and_accuracy.py"),
     output:
         pdf="reports/figures/bias_and_accuracy.pdf",
-        png="reports/figures/bias_and_accuracy.png",
+        png=shown(
+            "reports/figures/bias_and_accuracy.png",
+            "bias_and_accuracy",
+            "Questions beyond the paper",
+            shows="What the paper's scores measure",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_bias_and_accuracy.log",
     benchmark:
@@ -137,7 +167,13 @@ rule draw_accuracy:
         sources=sources("draw_accuracy.py"),
     output:
         pdf="reports/figures/accuracy_of_one_data_set.pdf",
-        png="reports/figures/accuracy_of_one_data_set.png",
+        png=shown(
+            "reports/figures/accuracy_of_one_data_set.png",
+            "accuracy_of_one_data_set",
+            "Questions beyond the paper",
+            shows="Error of one data set by strategy",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_accuracy.log",
     benchmark:
@@ -158,7 +194,13 @@ rule draw_scores:
         sources=sources("draw_scores.py"),
     output:
         pdf="reports/figures/scores_against_paper.pdf",
-        png="reports/figures/scores_against_paper.png",
+        png=shown(
+            "reports/figures/scores_against_paper.png",
+            "scores_against_paper",
+            "Tables and figures of the paper",
+            shows="Table 4 against further studies",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_scores.log",
     benchmark:
@@ -176,7 +218,13 @@ rule draw_table2_samples:
         sources=sources("draw_table2_samples.py"),
     output:
         pdf="reports/figures/table2_samples.pdf",
-        png="reports/figures/table2_samples.png",
+        png=shown(
+            "reports/figures/table2_samples.png",
+            "table2_samples",
+            "Tables and figures of the paper",
+            shows="Table 2 against single data sets",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_table2_samples.log",
     benchmark:
@@ -193,7 +241,9 @@ rule draw_ladder:
         sources=sources("draw_ladder.py"),
     output:
         pdf="reports/figures/ladder.pdf",
-        png="reports/figures/ladder.png",
+        png=shown(
+            "reports/figures/ladder.png", "ladder", "Questions beyond the paper", shows="How many springs (RQ1)", kind="figure"
+        ),
     log:
         "results/logs/draw_ladder.log",
     benchmark:
@@ -208,7 +258,9 @@ rule draw_budget:
         sources=sources("draw_budget.py"),
     output:
         pdf="reports/figures/budget.pdf",
-        png="reports/figures/budget.png",
+        png=shown(
+            "reports/figures/budget.png", "budget", "Questions beyond the paper", shows="Which points (RQ2)", kind="figure"
+        ),
     log:
         "results/logs/draw_budget.log",
     benchmark:
@@ -226,7 +278,13 @@ rule draw_designs:
         sources=sources("draw_designs.py"),
     output:
         pdf="reports/figures/designs.pdf",
-        png="reports/figures/designs.png",
+        png=shown(
+            "reports/figures/designs.png",
+            "designs",
+            "Questions beyond the paper",
+            shows="Which configurations (RQ3)",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_designs.log",
     benchmark:
@@ -245,7 +303,13 @@ rule draw_arm_map:
         sources=sources("draw_arm_map.py"),
     output:
         pdf="reports/figures/arm_map.pdf",
-        png="reports/figures/arm_map.png",
+        png=shown(
+            "reports/figures/arm_map.png",
+            "arm_map",
+            "Questions beyond the paper",
+            shows="A second target anywhere on the arm (RQ2)",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_arm_map.log",
     benchmark:
@@ -263,7 +327,13 @@ rule draw_metrics:
         sources=sources("draw_metrics.py"),
     output:
         pdf="reports/figures/metrics.pdf",
-        png="reports/figures/metrics.png",
+        png=shown(
+            "reports/figures/metrics.png",
+            "metrics",
+            "Questions beyond the paper",
+            shows="Metrics against one another (RQ4)",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_metrics.log",
     benchmark:

@@ -84,14 +84,18 @@ rule tabulate_league:
         published="config/league/published.csv",
         sources=sources("tabulate_league.py"),
     output:
-        league="reports/league/{league}/league.csv",
+        league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),
         costs="reports/league/{league}/costs.csv",
         mechanisms="reports/league/{league}/mechanisms.csv",
         page="reports/league/{league}/league.md",
         picture_pdf="reports/league/{league}/league.pdf",
-        picture_png="reports/league/{league}/league.png",
+        picture_png=shown(
+            "reports/league/{league}/league.png", "league", "League", shows="Methods against one another", kind="figure"
+        ),
         mechanisms_pdf="reports/league/{league}/mechanisms.pdf",
-        mechanisms_png="reports/league/{league}/mechanisms.png",
+        mechanisms_png=shown(
+            "reports/league/{league}/mechanisms.png", "league_mechanisms", "League", shows="Mechanisms found", kind="figure"
+        ),
     log:
         "results/logs/tabulate_league/{league}.log",
     benchmark:

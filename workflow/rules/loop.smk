@@ -113,7 +113,14 @@ rule judge_campaign:
         sources=sources("judge_campaign.py"),
     output:
         verdict="reports/loop/{campaign}/verdict.json",
-        before_after="reports/loop/{campaign}/before_after.csv",
+        before_after=shown(
+            "reports/loop/{campaign}/before_after.csv",
+            "loop_errors",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Errors before and after",
+            kind="table",
+        ),
         splits="reports/loop/{campaign}/splits.csv",
         residuals="reports/loop/{campaign}/residuals.parquet",
     log:
@@ -132,7 +139,14 @@ rule summarize_campaigns:
         residuals=lambda wildcards: expand("reports/loop/{name}/residuals.parquet", name=config["loop"][wildcards.kind]),
         sources=sources("summarize_campaigns.py"),
     output:
-        table="reports/loop/{kind}.csv",
+        table=shown(
+            "reports/loop/{kind}.csv",
+            "loop_overview",
+            "Campaigns",
+            campaign="all of {kind}",
+            shows="All campaigns",
+            kind="table",
+        ),
     log:
         "results/logs/summarize_campaigns/{kind}.log",
     benchmark:

@@ -12,7 +12,14 @@ rule draw_residuals:
         sources=sources("draw_residuals.py"),
     output:
         pdf="reports/loop/{campaign}/figures/residuals.pdf",
-        png="reports/loop/{campaign}/figures/residuals.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/residuals.png",
+            "loop_residuals",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Residuals before and after",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_residuals/{campaign}.log",
     benchmark:
@@ -28,7 +35,14 @@ rule draw_arrows:
         sources=sources("draw_arrows.py"),
     output:
         pdf="reports/loop/{campaign}/figures/arrows.pdf",
-        png="reports/loop/{campaign}/figures/arrows.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/arrows.png",
+            "loop_arrows",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Residuals in space",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_arrows/{campaign}.log",
     benchmark:
@@ -44,7 +58,14 @@ rule draw_candidates:
         sources=sources("draw_candidates.py"),
     output:
         pdf="reports/loop/{campaign}/figures/candidates.pdf",
-        png="reports/loop/{campaign}/figures/candidates.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/candidates.png",
+            "loop_candidates",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Candidates",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_candidates/{campaign}.log",
     benchmark:
@@ -60,7 +81,14 @@ rule draw_confounding:
         sources=sources("draw_confounding.py"),
     output:
         pdf="reports/loop/{campaign}/figures/confounding.pdf",
-        png="reports/loop/{campaign}/figures/confounding.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/confounding.png",
+            "loop_confounding",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="What the poses confuse",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_confounding/{campaign}.log",
     benchmark:
@@ -76,7 +104,14 @@ rule draw_before_after:
         sources=sources("draw_before_after.py"),
     output:
         pdf="reports/loop/{campaign}/figures/before_after.pdf",
-        png="reports/loop/{campaign}/figures/before_after.png",
+        png=shown(
+            "reports/loop/{campaign}/figures/before_after.png",
+            "loop_before_after",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="Errors before and after",
+            kind="figure",
+        ),
     log:
         "results/logs/draw_before_after/{campaign}.log",
     benchmark:
@@ -101,7 +136,14 @@ rule compile_loop_report:
         sources=sources("compile_loop_report.py"),
     output:
         report="reports/loop/{campaign}/report.pdf",
-        page="reports/loop/{campaign}/report.html",
+        page=shown(
+            "reports/loop/{campaign}/report.html",
+            "loop_report",
+            "Campaigns",
+            campaign="{campaign}",
+            shows="The report of the campaign",
+            kind="report",
+        ),
     log:
         "results/logs/compile_loop_report/{campaign}.log",
     benchmark:

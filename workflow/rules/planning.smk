@@ -26,7 +26,9 @@ rule tabulate_planning:
         gains=expand(rules.gain_by_planning.output.gains, robot=config["planning"]["robots"]),
         sources=sources("tabulate_planning.py"),
     output:
-        table="reports/planning/gains.csv",
+        table=shown(
+            "reports/planning/gains.csv", "planning", "Closed loop and planning", shows="Worth of planned poses", kind="table"
+        ),
     log:
         "results/logs/tabulate_planning.log",
     benchmark:

@@ -79,9 +79,17 @@ rule tabulate_budget:
         budgets=expand(rules.compare_point_sets.output.budget, robot=REDUCED),
         sources=sources("tabulate_budget.py"),
     output:
-        budget="reports/tables/budget.csv",
+        budget=shown(
+            "reports/tables/budget.csv", "budget", "Questions beyond the paper", shows="Sets of points (RQ2)", kind="table"
+        ),
         pairs="reports/tables/budget_pairs.csv",
-        lengths="reports/tables/configurations_needed.csv",
+        lengths=shown(
+            "reports/tables/configurations_needed.csv",
+            "configurations_needed",
+            "Questions beyond the paper",
+            shows="Configurations needed (RQ3)",
+            kind="table",
+        ),
     log:
         "results/logs/tabulate_budget.log",
     benchmark:
@@ -100,7 +108,9 @@ rule tabulate_ladder:
         ladders=expand(rules.climb_ladder.output.ladder, robot=EXTENDED),
         sources=sources("tabulate_ladder.py"),
     output:
-        table="reports/tables/ladder.csv",
+        table=shown(
+            "reports/tables/ladder.csv", "ladder", "Questions beyond the paper", shows="Link springs (RQ1)", kind="table"
+        ),
     log:
         "results/logs/tabulate_ladder.log",
     benchmark:
@@ -116,7 +126,9 @@ rule tabulate_designs:
         designs=expand(rules.choose_designs.output.designs, robot=REDUCED),
         sources=sources("tabulate_designs.py"),
     output:
-        table="reports/tables/designs.csv",
+        table=shown(
+            "reports/tables/designs.csv", "designs", "Questions beyond the paper", shows="Optimal designs (RQ3)", kind="table"
+        ),
     log:
         "results/logs/tabulate_designs.log",
     benchmark:
@@ -132,7 +144,13 @@ rule tabulate_observability:
         observabilities=expand(rules.index_observability.output.observability, robot=REDUCED),
         sources=sources("tabulate_observability.py"),
     output:
-        table="reports/tables/observability.csv",
+        table=shown(
+            "reports/tables/observability.csv",
+            "observability",
+            "Questions beyond the paper",
+            shows="Observability indices (RQ3)",
+            kind="table",
+        ),
     log:
         "results/logs/tabulate_observability.log",
     benchmark:
@@ -167,8 +185,12 @@ rule tabulate_assumptions:
         weightings=expand(rules.vary_assumptions.output.weighting, robot=REDUCED),
         sources=sources("tabulate_assumptions.py"),
     output:
-        geometry="reports/tables/geometry.csv",
-        weighting="reports/tables/weighting.csv",
+        geometry=shown(
+            "reports/tables/geometry.csv", "geometry", "Questions beyond the paper", shows="Known geometry", kind="table"
+        ),
+        weighting=shown(
+            "reports/tables/weighting.csv", "weighting", "Questions beyond the paper", shows="Equal weights", kind="table"
+        ),
     log:
         "results/logs/tabulate_assumptions.log",
     benchmark:
@@ -235,7 +257,13 @@ rule tabulate_places:
         places=expand(rules.map_arm.output.places, robot=REDUCED),
         sources=sources("tabulate_places.py"),
     output:
-        table="reports/tables/places.csv",
+        table=shown(
+            "reports/tables/places.csv",
+            "places",
+            "Questions beyond the paper",
+            shows="Places of a second target (RQ2)",
+            kind="table",
+        ),
     log:
         "results/logs/tabulate_places.log",
     benchmark:
@@ -253,7 +281,13 @@ rule tabulate_uses:
         replicates=cells("replicates", REDUCED, TABLE_NOISE),
         sources=sources("tabulate_uses.py"),
     output:
-        scores="reports/tables/strategy_scores.csv",
+        scores=shown(
+            "reports/tables/strategy_scores.csv",
+            "strategy_scores",
+            "Questions beyond the paper",
+            shows="Strategies by metric (RQ4)",
+            kind="table",
+        ),
         pairs="reports/tables/strategy_pairs.csv",
     log:
         "results/logs/tabulate_uses.log",
@@ -272,7 +306,9 @@ rule tabulate_tubes:
         tubes=expand(rules.vary_tubes.output.tubes, robot=EXTENDED),
         sources=sources("tabulate_tubes.py"),
     output:
-        table="reports/tables/tubes.csv",
+        table=shown(
+            "reports/tables/tubes.csv", "tubes", "Questions beyond the paper", shows="Tubes of other diameters", kind="table"
+        ),
     log:
         "results/logs/tabulate_tubes.log",
     benchmark:

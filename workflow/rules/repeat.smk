@@ -61,7 +61,13 @@ rule tabulate_expectations:
         reference="config/paper/reference.csv",
         sources=sources("tabulate_expectations.py"),
     output:
-        table="reports/tables/expectations.csv",
+        table=shown(
+            "reports/tables/expectations.csv",
+            "expectations",
+            "Tables and figures of the paper",
+            shows="Expectations in closed form",
+            kind="table",
+        ),
     log:
         "results/logs/tabulate_expectations.log",
     benchmark:
@@ -79,7 +85,13 @@ rule tabulate_interpretations:
         reference="config/paper/reference.csv",
         sources=sources("tabulate_interpretations.py"),
     output:
-        table="reports/tables/interpretations.csv",
+        table=shown(
+            "reports/tables/interpretations.csv",
+            "interpretations",
+            "Tables and figures of the paper",
+            shows="Other interpretations of the paper",
+            kind="table",
+        ),
     log:
         "results/logs/tabulate_interpretations.log",
     benchmark:

@@ -67,7 +67,9 @@ rule compile_report:
         pages="src/elastocal/report/study.typ",
         sources=sources("compile_report.py"),
     output:
-        report="reports/study.pdf",
+        report=shown(
+            "reports/study.pdf", "study", "Tables and figures of the paper", shows="The report of the study", kind="report"
+        ),
     log:
         "results/logs/compile_report.log",
     benchmark:

@@ -8,7 +8,6 @@ from elastocal.study.tables import headed_rows
 
 from job import Job, origin_of, run
 
-
 TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 
 

@@ -6,7 +6,7 @@ Effects are distinguishable by these dependences, so that all are shown by the s
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -35,7 +35,7 @@ _POSE_DEG = (20.0, 10.0, 15.0, 30.0, 45.0, 20.0, 30.0)
 # A reflector beside the axis of the last joint, so that its turns are seen.
 _REFLECTOR_M = (0.1, 0.0, 0.1)
 # Across all axes of the arm, and over all its links.
-_PULL = np.array([0.5, 0.5, -0.5**0.5])
+_PULL = np.array([0.5, 0.5, -(0.5**0.5)])
 _PULL_N = 1000.0
 # Four hours of a working day; the hall and the motors warm the arm from the temperature at which dimensions are stated.
 _HOURS, _LOWEST_C, _RISE_K = 4.0, 20.0, 10.0
@@ -94,12 +94,13 @@ def signature(name: str, robot: Robot) -> Signature:
     candidate = next((each for each in offered if each.joints[:1] == (_SHOWN_AT,)), offered[0])
     joint = (*candidate.joints, *candidate.turning, _SHOWN_AT)[0]
     limits = np.degrees(robot.joint_limits[joint - 1])
-    angle = np.linspace(*np.clip(limits, -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG), _SAMPLES)
+    first, last = np.clip(limits, -_WIDEST_SWEEP_DEG, _WIDEST_SWEEP_DEG)
+    angle = np.linspace(first, last, _SAMPLES)
     force, time = np.linspace(-_PULL_N, _PULL_N, _SAMPLES), np.linspace(0, _HOURS, _SAMPLES)
     turned = np.tile(np.radians(_POSE_DEG[: robot.joints]), (_SAMPLES, 1))
     turned[:, joint - 1] = np.radians(angle)
 
-    def moved(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: np.ndarray | float) -> np.ndarray:
+    def moved(angles: np.ndarray | None = None, newtons: np.ndarray | float = 0.0, **more: Any) -> np.ndarray:
         return _displacement_mm(candidate, sites, robot.compliance, _states(robot.joints, angles, newtons, **more))
 
     return Signature(

@@ -94,10 +94,19 @@ def jobs_behind(targets: Iterable[str], records: Iterable[JobRecord]) -> list[Jo
     -------
     list of JobRecord
         In the order in which they began.
+
+    Raises
+    ------
+    InputError
+        No record says what made one of the files.
     """
     maker = {file: record for record in records for file in record.outputs}
     found: dict[str, JobRecord] = {}
     left = list(targets)
+    for file in left:
+        if file not in maker:
+            allowed = "a file of which a job of this version left a record (delete it and it is made again)"
+            raise InputError(file, "", f"no record in {RECORDS} of the job that made it", allowed)
     while left:
         record = maker.get(left.pop())
         if record is not None and record.name not in found:

@@ -63,7 +63,7 @@ def loop_page(
     verdict : dict
         Contents of verdict.json.
     table : dict of str to ndarray (N,)
-        Columns of the residuals.
+        Columns of the residuals; joint angles are the model's, as in a campaign, not the controller's.
     candidates : dict of str to ndarray (K,)
         Columns of the candidates table.
     robot : Robot
@@ -95,7 +95,7 @@ def loop_page(
         **{step: values.round(2).tolist() for step, values in off.items()},
         "held_out": some["held_out"].astype(bool).tolist(),
         "against": _against(some, angles, robot),
-        "outlines": corners(robot.chain, robot.model_angles(angles[drawn])).swapaxes(0, 1).round(4).tolist(),
+        "outlines": corners(robot.chain, angles[drawn]).swapaxes(0, 1).round(4).tolist(),
         "poses": [f"{some['pose'][row]}" for row in drawn],
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
         "hypotheses": hypotheses,
@@ -128,18 +128,21 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
 
 
 def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
-    """The leading candidates, worded."""
-    factors = table["log_bayes_factor"]
-    order = np.argsort(-np.nan_to_num(factors, nan=-np.inf), kind="stable")[:_LEADING]
+    """The leading candidates, worded; of one that was tried in several shapes the best."""
+    factors = np.nan_to_num(table["log_bayes_factor"], nan=-np.inf)
+    keys, of_key = np.unique(table["candidate"].astype(str), return_inverse=True)
+    best, probable, chosen = (np.full(len(keys), -np.inf) for _ in range(3))
+    for most, values in ((best, factors), (probable, table["probability"]), (chosen, table["chosen"])):
+        np.fmax.at(most, of_key, np.asarray(values, float))
     return [
         {
-            "name": capital(candidate_words(str(table["candidate"][row]))),
-            "factor": minus(f"{factors[row]:.1f}"),
-            "words": probability_words(table["probability"][row]),
-            "chosen": "yes" if table["chosen"][row] else "",
+            "name": capital(candidate_words(keys[key])),
+            "factor": minus(f"{best[key]:.1f}"),
+            "words": probability_words(probable[key]),
+            "chosen": "yes" if chosen[key] == 1 else "",
         }
-        for row in order
-        if np.isfinite(factors[row])
+        for key in np.argsort(-best, kind="stable")[:_LEADING]
+        if np.isfinite(best[key])
     ]
 
 

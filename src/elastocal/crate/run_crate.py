@@ -1,0 +1,333 @@
+"""A finished run as a Workflow Run RO-Crate, profile Provenance Run Crate: who reads it needs no code of ours.
+
+The folder with the results is the crate: nothing is copied, and each file has its size and SHA-256. Every job is an action with
+script, inputs, outputs, start and end; each rule a step of the workflow. Names of users and machines and absolute paths are not
+in it.
+
+References
+----------
+.. [1] Soiland-Reyes et al., Packaging research artefacts with RO-Crate, Data Science 5, 2022.
+.. [2] Leo et al., Recording provenance of workflow runs with RO-Crate, PLOS ONE 19, 2024.
+"""
+
+from __future__ import annotations
+
+import mimetypes
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rocrate.model.contextentity import ContextEntity
+from rocrate.rocrate import ROCrate
+
+from elastocal.errors import InputError
+from elastocal.io.checksums import checksum
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Mapping, Sequence
+
+    from rocrate.model.entity import Entity
+
+    from elastocal.crate.software import Package
+    from elastocal.io.job_records import JobRecord
+    from elastocal.io.origin import Origin
+
+_VERSION = "1.1"
+_PROFILES = {
+    "process": "Process Run Crate",
+    "workflow": "Workflow Run Crate",
+    "provenance": "Provenance Run Crate",
+}
+_PROFILE_VERSION = "0.5"
+_COMPLETED = "http://schema.org/CompletedActionStatus"
+# What the context of RO-Crate 1.1 does not have.
+_TERMS = {"sha256": "http://schema.org/sha256"}
+_MEDIA_TYPES = {".parquet": "application/vnd.apache.parquet", ".typ": "text/plain", ".smk": "text/plain", ".yaml": "text/yaml"}
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """What is known of a run.
+
+    Attributes
+    ----------
+    jobs : sequence of JobRecord
+        In the order in which they began.
+    origin : Origin
+        Of the sources as they are now; each job has its own.
+    workflow : str
+        The Snakefile.
+    rules : sequence of str
+        Files that the workflow includes.
+    configuration : str
+        File with the resolved configuration, whose SHA-256 is the configuration's.
+    software_list : str
+        File with the packages.
+    packages : sequence of Package
+    python : str
+        Version.
+    others : sequence of str
+        Further files that describe the run.
+    """
+
+    jobs: Sequence[JobRecord]
+    origin: Origin
+    workflow: str
+    rules: Sequence[str]
+    configuration: str
+    software_list: str
+    packages: Sequence[Package]
+    python: str
+    others: Sequence[str] = ()
+
+
+def run_crate(run: FinishedRun, words: Mapping[str, str]) -> dict[str, Any]:
+    """The contents of ro-crate-metadata.json.
+
+    Parameters
+    ----------
+    run : FinishedRun
+        Files by their names in the working directory, which is the crate.
+    words : dict of str to str
+        ``name``, ``description``, ``author``, ``licence`` (SPDX) of the crate.
+
+    Returns
+    -------
+    dict
+        JSON-LD.
+
+    Raises
+    ------
+    InputError
+        No job at all, or a file outside of the crate.
+    """
+    if not run.jobs:
+        raise InputError(run.workflow, "", "no record of any job", "a finished run")
+    crate = ROCrate(version=_VERSION)
+    crate.metadata.extra_terms.update(_TERMS)
+    _describe(crate, run, words)
+    scripts = {job.rule: _script(job) for job in run.jobs}
+    inputs = _outside_inputs(run.jobs)
+    made = [file for job in run.jobs for file in job.outputs]
+    modules = {file for job in run.jobs for file in _sources(job)} - set(scripts.values())
+    for file in sorted({*made, *inputs, *modules, *run.rules, run.configuration, run.software_list, *run.others}):
+        crate.add_file(_inside(file), file, properties=_facts(file))
+    for rule, file in sorted(scripts.items()):
+        required = sorted({source for job in run.jobs if job.rule == rule for source in _sources(job)} - {file})
+        crate.add_file(_inside(file), file, properties=_facts(file) | _tool(rule, run.origin, required))
+    workflow = _workflow(crate, run, scripts)
+    actions = [_job_action(crate, job, number) for number, job in enumerate(run.jobs, 1)]
+    run_action = _run_action(crate, run, workflow, [run.configuration, *inputs], _final(run.jobs))
+    _orchestration(crate, run, actions, run_action)
+    crate.root_dataset["mentions"] = [run_action, *actions]
+    document: dict[str, Any] = crate.metadata.generate()
+    return document
+
+
+def _describe(crate: ROCrate, run: FinishedRun, words: Mapping[str, str]) -> None:
+    root = crate.root_dataset
+    commits = sorted({job.origin.commit for job in run.jobs})
+    root["name"], root["description"] = words["name"], f"{words['description']} Jobs ran at: {', '.join(commits)}."
+    root["datePublished"] = max(job.ended for job in run.jobs)
+    identifier = f"https://spdx.org/licenses/{words['licence']}"
+    root["license"] = _add(crate, identifier, "CreativeWork", name=words["licence"], identifier=identifier)
+    root["author"] = _add(crate, "#authors", "Organization", name=words["author"])
+    profiles = [
+        _add(crate, f"https://w3id.org/ro/wfrun/{key}/{_PROFILE_VERSION}", "CreativeWork", name=name, version=_PROFILE_VERSION)
+        for key, name in _PROFILES.items()
+    ]
+    workflow_profile = "https://w3id.org/workflowhub/workflow-ro-crate/1.0"
+    root["conformsTo"] = [*profiles, _add(crate, workflow_profile, "CreativeWork", name="Workflow RO-Crate", version="1.0")]
+    # Names of users are not recorded, so that a crate can be given away.
+    _add(crate, "#operator", "Person", name="the person who ran the workflow (not recorded)")
+
+
+def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> Entity:
+    python = _add(
+        crate,
+        "https://www.python.org/",
+        "SoftwareApplication",
+        name="Python",
+        version=run.python,
+        url="https://www.python.org/",
+    )
+    packages = [_add(crate, package.url, "SoftwareApplication", **_package_facts(package)) for package in run.packages]
+    snakemake = next((package.version for package in run.packages if package.name == "snakemake"), None)
+    steps = [
+        _add(crate, f"{run.workflow}#{rule}", "HowToStep", name=rule, position=str(number), workExample=_reference(script))
+        for number, (rule, script) in enumerate(scripts.items(), 1)
+    ]
+    parameters = {
+        "input": ("#parameter-configuration", "configuration", run.configuration),
+        "output": ("#parameter-result", "result", _final(run.jobs)[0]),
+    }
+    for identifier, name, file in parameters.values():
+        _add(crate, identifier, "FormalParameter", additionalType="File", name=name, workExample=_reference(file))
+        crate.get(file)["exampleOfWork"] = _reference(identifier)
+    kinds = {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
+    workflow = crate.add_workflow(
+        _inside(run.workflow),
+        run.workflow,
+        main=True,
+        lang="snakemake",
+        lang_version=snakemake,
+        properties=_facts(run.workflow) | kinds,
+    )
+    workflow["version"] = run.origin.commit
+    workflow["step"] = steps
+    workflow["hasPart"] = [_reference(file) for file in sorted({*scripts.values(), *run.rules})]
+    workflow["softwareRequirements"] = [python, *packages]
+    for key, (identifier, _, _) in parameters.items():
+        workflow[key] = _reference(identifier)
+    return workflow
+
+
+def _job_action(crate: ROCrate, job: JobRecord, number: int) -> Entity:
+    data = [file for file in job.inputs if not file.endswith(".py")]
+    return _action(
+        crate,
+        f"#job-{number}",
+        name=job.name,
+        description=f"{job.rule}; {job.origin.words}",
+        started=job.started,
+        ended=job.ended,
+        tool=_script(job),
+        read=data,
+        written=job.outputs,
+    )
+
+
+def _run_action(crate: ROCrate, run: FinishedRun, workflow: Entity, read: Sequence[str], written: Sequence[str]) -> Entity:
+    return _action(
+        crate,
+        "#run",
+        name="run of the workflow",
+        description=f"{len(run.jobs)} jobs; {run.origin.words}",
+        started=min(job.started for job in run.jobs),
+        ended=max(job.ended for job in run.jobs),
+        tool=workflow.id,
+        read=read,
+        written=written,
+    )
+
+
+def _orchestration(crate: ROCrate, run: FinishedRun, actions: Sequence[Entity], run_action: Entity) -> None:
+    """Each rule's step and its jobs, and the engine that called them."""
+    version = next((package.version for package in run.packages if package.name == "snakemake"), "unknown")
+    home = "https://snakemake.github.io/"
+    engine = _add(crate, f"{home}#engine", "SoftwareApplication", name="Snakemake", version=version, url=home)
+    by_rule: dict[str, list[Entity]] = {}
+    for job, action in zip(run.jobs, actions, strict=True):
+        by_rule.setdefault(job.rule, []).append(action)
+    controls = [
+        _add(
+            crate,
+            f"#control-{rule}",
+            "ControlAction",
+            name=f"orchestration of {rule}",
+            instrument=_reference(f"{run.workflow}#{rule}"),
+            object=of_rule,
+        )
+        for rule, of_rule in by_rule.items()
+    ]
+    _add(
+        crate,
+        "#orchestration",
+        "OrganizeAction",
+        name="run of Snakemake",
+        startTime=run_action["startTime"],
+        endTime=run_action["endTime"],
+        agent=_reference("#operator"),
+        instrument=engine,
+        object=controls,
+        result=run_action,
+    )
+
+
+def _action(
+    crate: ROCrate,
+    identifier: str,
+    name: str,
+    description: str,
+    started: str,
+    ended: str,
+    tool: str,
+    read: Iterable[str],
+    written: Iterable[str],
+) -> Entity:
+    return _add(
+        crate,
+        identifier,
+        "CreateAction",
+        name=name,
+        description=description,
+        startTime=started,
+        endTime=ended,
+        agent=_reference("#operator"),
+        actionStatus=_COMPLETED,
+        instrument=_reference(tool),
+        object=[_reference(file) for file in read],
+        result=[_reference(file) for file in written],
+    )
+
+
+def _final(jobs: Sequence[JobRecord]) -> list[str]:
+    """Files that no job reads."""
+    read = {file for job in jobs for file in job.inputs}
+    return [file for job in jobs for file in job.outputs if file not in read]
+
+
+def _outside_inputs(jobs: Sequence[JobRecord]) -> list[str]:
+    """Files that jobs read and none made, but for code."""
+    made = {file for job in jobs for file in job.outputs}
+    return sorted({file for job in jobs for file in job.inputs if not file.endswith(".py")} - made)
+
+
+def _sources(job: JobRecord) -> list[str]:
+    return [file for file in job.inputs if file.endswith(".py")]
+
+
+def _script(job: JobRecord) -> str:
+    """Rules name their script first of all sources."""
+    return _sources(job)[0]
+
+
+def _tool(rule: str, origin: Origin, required: Sequence[str]) -> dict[str, Any]:
+    return {
+        "@type": ["File", "SoftwareSourceCode"],
+        "name": rule,
+        "version": origin.commit,
+        "softwareRequirements": [_reference(file) for file in required],
+    }
+
+
+def _facts(file: str) -> dict[str, Any]:
+    path = Path(file)
+    kind = _MEDIA_TYPES.get(path.suffix) or mimetypes.guess_type(file)[0] or "text/plain"
+    return {"name": path.name, "sha256": checksum(file), "contentSize": str(path.stat().st_size), "encodingFormat": kind}
+
+
+def _inside(file: str) -> str:
+    if Path(file).is_absolute() or ".." in Path(file).parts:
+        raise InputError(file, "", "a file outside of the folder of the results", "a file in it, to which a crate can refer")
+    return file
+
+
+def _package_facts(package: Package) -> dict[str, str]:
+    facts = {"name": package.name, "version": package.version, "identifier": package.url, "url": package.url}
+    return facts | ({"license": package.licence} if package.licence else {})
+
+
+def _add(crate: ROCrate, id_: str, kind: str, /, **properties: Any) -> Entity:
+    references = {key: _linked(value) for key, value in properties.items()}
+    return crate.add(ContextEntity(crate, id_, properties={"@type": kind, **references}))
+
+
+def _linked(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_linked(each) for each in value]
+    return _reference(value.id) if hasattr(value, "id") else value
+
+
+def _reference(identifier: str) -> dict[str, str]:
+    return {"@id": identifier}

@@ -1,0 +1,120 @@
+"""A run described as a crate: rocrate reads it, and finds each job, file and package in it."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import pytest
+from rocrate.rocrate import ROCrate
+
+from elastocal.crate.run_crate import FinishedRun, run_crate
+from elastocal.crate.software import Package
+from elastocal.errors import InputError
+from elastocal.io.job_records import JobRecord
+from elastocal.io.json_files import write_json
+from elastocal.io.origin import Origin
+
+ORIGIN = Origin("c0ffee", "d16e57", 7)
+WORDS = {"name": "a run", "description": "It ran.", "author": "the developers", "licence": "MIT"}
+TEXTS = {
+    "Snakefile": "rule all: input: 'reports/b.csv'\n",
+    "workflow/rules/a.smk": "",
+    "workflow/scripts/simulate.py": "",
+    "workflow/scripts/tabulate.py": "",
+    "src/elastocal/model.py": "",
+    "config/robot.yaml": "name: a\n",
+    "results/a.parquet": "a",
+    "reports/b.csv": "b\n",
+    "reports/configuration.json": "{}",
+    "reports/software.csv": "name\n",
+}
+
+
+def record(rule, hour, inputs, output):
+    sources = [f"workflow/scripts/{rule}.py", "src/elastocal/model.py"]
+    times = (f"2026-01-01T{hour:02}:00:00+00:00", f"2026-01-01T{hour:02}:30:00+00:00")
+    return JobRecord(rule, {"robot": "kuka"}, *times, (*inputs, *sources), (output,), ORIGIN)
+
+
+@pytest.fixture
+def finished(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name, text in TEXTS.items():
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(text, encoding="utf-8")
+    return FinishedRun(
+        jobs=[
+            record("simulate", 1, ["config/robot.yaml"], "results/a.parquet"),
+            record("tabulate", 2, ["results/a.parquet"], "reports/b.csv"),
+        ],
+        origin=ORIGIN,
+        workflow="Snakefile",
+        rules=["workflow/rules/a.smk"],
+        configuration="reports/configuration.json",
+        software_list="reports/software.csv",
+        packages=[Package("numpy", "2.0", "BSD-3-Clause")],
+        python="3.11.2",
+    )
+
+
+@pytest.fixture
+def crate(finished, tmp_path):
+    write_json("ro-crate-metadata.json", run_crate(finished, WORDS))
+    return ROCrate(tmp_path)
+
+
+def test_the_workflow_is_the_main_entity_with_a_step_for_each_rule(crate):
+    assert crate.mainEntity.id == "Snakefile"
+    assert [step["name"] for step in crate.mainEntity["step"]] == ["simulate", "tabulate"]
+    assert crate.mainEntity["version"] == "c0ffee"
+
+
+def test_each_job_is_an_action_with_script_files_and_times(crate):
+    action = crate.dereference("#job-2")
+    assert action["name"] == "tabulate kuka" and action["instrument"].id == "workflow/scripts/tabulate.py"
+    assert [file.id for file in action["object"]] == ["results/a.parquet"]
+    assert [file.id for file in action["result"]] == ["reports/b.csv"]
+    assert action["startTime"] < action["endTime"]
+    assert all(word in action["description"] for word in ("c0ffee", "d16e57", "seed 7"))
+
+
+def test_the_run_as_a_whole_reads_what_nobody_made_and_writes_what_nobody_reads(crate):
+    action = crate.dereference("#run")
+    assert {file.id for file in action["object"]} == {"reports/configuration.json", "config/robot.yaml"}
+    assert [file.id for file in action["result"]] == ["reports/b.csv"]
+    assert (action["startTime"], action["endTime"]) == ("2026-01-01T01:00:00+00:00", "2026-01-01T02:30:00+00:00")
+
+
+def test_every_file_has_its_size_and_digest(crate):
+    described = {entity.id: entity for entity in crate.get_entities() if entity.get("sha256")}
+    assert set(described) == set(TEXTS)
+    for name, text in TEXTS.items():
+        assert described[name]["sha256"] == hashlib.sha256(text.encode()).hexdigest()
+        assert described[name]["contentSize"] == str(len(text))
+
+
+def test_packages_and_python_are_what_the_workflow_requires(crate):
+    assert {(each["name"], each["version"]) for each in crate.mainEntity["softwareRequirements"]} == {
+        ("numpy", "2.0"),
+        ("Python", "3.11.2"),
+    }
+
+
+def test_no_folder_of_the_machine_is_named(crate, tmp_path):
+    assert str(tmp_path) not in Path("ro-crate-metadata.json").read_text(encoding="utf-8")
+
+
+def test_a_file_outside_of_the_folder_is_refused(finished, tmp_path):
+    finished.jobs[0] = record("simulate", 1, [str(tmp_path.parent / "robot.yaml")], "results/a.parquet")
+    with pytest.raises(InputError, match="outside of the folder"):
+        run_crate(finished, WORDS)
+
+
+def test_a_run_without_jobs_is_refused(finished):
+    finished.jobs.clear()
+    with pytest.raises(InputError, match="no record of any job"):
+        run_crate(finished, WORDS)
+
+
+def test_the_same_run_is_the_same_crate(finished):
+    assert json.dumps(run_crate(finished, WORDS)) == json.dumps(run_crate(finished, WORDS))

@@ -1,0 +1,54 @@
+"""What `snakemake --report` shows of a finished study: every figure and table, with a caption that says what it is."""
+
+import re
+
+import pytest
+from study_folder import REPOSITORY
+
+CAPTIONS = REPOSITORY / "workflow" / "report"
+SHOWN = re.compile(r'shown\(\s*"(reports/[^"]+)",\s*"(\w+)",\s*"([^"]+)"')
+RULES = [path.read_text(encoding="utf-8") for path in sorted((REPOSITORY / "workflow" / "rules").glob("*.smk"))]
+
+
+def shown():
+    return [found for text in RULES for found in SHOWN.findall(text)]
+
+
+def test_every_caption_is_there_and_every_page_is_a_caption():
+    assert {caption for _, caption, _ in shown()} | {"workflow"} == {path.stem for path in CAPTIONS.glob("*.rst")}
+
+
+def test_every_picture_of_a_rule_is_shown():
+    pictures = {
+        path for text in RULES for path in re.findall(r'^\s+\w+=(?:shown\(\s*)?"(reports/[^"]+\.png)"', text, re.MULTILINE)
+    }
+    assert pictures - {path for path, _, _ in shown()} == set()
+
+
+@pytest.fixture(scope="module")
+def report(small_study, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    done = small_study.snakemake("--report", str(path))
+    assert done.returncode == 0, done.stderr
+    return path.read_text(encoding="utf-8")
+
+
+def test_the_report_shows_the_papers_tables_and_figures_with_the_graph_of_the_rules(report):
+    for words in (
+        "Figure 4: impact of noise",
+        "Table 4: strategies",
+        "Tables and figures of the paper",
+        "Questions beyond the paper",
+    ):
+        assert words in report
+    assert "compile_report" in report and "rulegraph" in report
+
+
+def test_the_report_names_what_the_run_was_made_from(report, small_study):
+    record = next(iter(sorted(small_study.path("results/jobs").glob("*.json")))).read_text(encoding="utf-8")
+    digest = re.search(r'"configuration_sha256": "(\w+)"', record)[1]
+    assert digest in report
+
+
+def test_the_report_fetches_nothing(report):
+    assert re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="https?://[^"]*"', report) == []
