@@ -13,9 +13,11 @@ def test_each_csv_below_the_folder_has_its_columns_digest_and_origin(tmp_path, m
     Path("reports/tables").mkdir(parents=True)
     text = "robot,rms_um,count,holds\nkuka,1.5,3,True\n"
     Path("reports/tables/Table_1.csv").write_text(text)
-    outputs = ("reports/tables/Table_1.csv", "reports/tables/table1.md", "results/other.csv")
+    Path("reports/empty.csv").write_text("\n")
+    outputs = ("reports/empty.csv", "reports/tables/Table_1.csv", "reports/tables/table1.md", "results/other.csv")
     job = JobRecord("tabulate", {}, "a", "b", (), outputs, Origin("c0ffee", "d16e57", 7))
-    (resource,) = data_package([job], "reports", "MIT")["resources"]
+    empty, resource = data_package([job], "reports", "MIT")["resources"]
+    assert empty["schema"]["fields"] == []
     assert (resource["path"], resource["name"]) == ("tables/Table_1.csv", "tables-table_1")
     assert resource["hash"] == f"sha256:{hashlib.sha256(text.encode()).hexdigest()}" and resource["bytes"] == len(text)
     assert [field["type"] for field in resource["schema"]["fields"]] == ["string", "number", "integer", "boolean"]

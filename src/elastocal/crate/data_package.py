@@ -48,7 +48,8 @@ def data_package(jobs: Iterable[JobRecord], folder: str, licence: str) -> dict[s
 
 def _resource(file: str, folder: str, job: JobRecord) -> dict[str, Any]:
     path = Path(file).relative_to(folder)
-    frame = pd.read_csv(file)
+    # A table of nothing, such as of no campaigns, has no line.
+    frame = pd.read_csv(file) if Path(file).read_text(encoding="utf-8").strip() else pd.DataFrame()
     return {
         "name": re.sub(r"[^a-z0-9._-]+", "-", path.with_suffix("").as_posix().lower()),
         "path": path.as_posix(),
