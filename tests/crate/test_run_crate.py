@@ -3,6 +3,7 @@
 import hashlib
 import json
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 from rocrate.rocrate import ROCrate
@@ -23,7 +24,7 @@ TEXTS = {
     "workflow/scripts/tabulate.py": "",
     "src/elastocal/model.py": "",
     "config/robot.yaml": "name: a\n",
-    "results/a.parquet": "a",
+    "results/3+6DoF.parquet": "a",
     "reports/b.csv": "b\n",
     "reports/configuration.json": "{}",
     "reports/software.csv": "name\n",
@@ -44,8 +45,8 @@ def finished(tmp_path, monkeypatch):
         Path(name).write_text(text, encoding="utf-8")
     return FinishedRun(
         jobs=[
-            record("simulate", 1, ["config/robot.yaml"], "results/a.parquet"),
-            record("tabulate", 2, ["results/a.parquet"], "reports/b.csv"),
+            record("simulate", 1, ["config/robot.yaml"], "results/3+6DoF.parquet"),
+            record("tabulate", 2, ["results/3+6DoF.parquet"], "reports/b.csv"),
         ],
         origin=ORIGIN,
         workflow="Snakefile",
@@ -72,7 +73,7 @@ def test_the_workflow_is_the_main_entity_with_a_step_for_each_rule(crate):
 def test_each_job_is_an_action_with_script_files_and_times(crate):
     action = crate.dereference("#job-2")
     assert action["name"] == "tabulate kuka" and action["instrument"].id == "workflow/scripts/tabulate.py"
-    assert [file.id for file in action["object"]] == ["results/a.parquet"]
+    assert [file.id for file in action["object"]] == ["results/3%2B6DoF.parquet"]
     assert [file.id for file in action["result"]] == ["reports/b.csv"]
     assert action["startTime"] < action["endTime"]
     assert all(word in action["description"] for word in ("c0ffee", "d16e57", "seed 7"))
@@ -86,7 +87,7 @@ def test_the_run_as_a_whole_reads_what_nobody_made_and_writes_what_nobody_reads(
 
 
 def test_every_file_has_its_size_and_digest(crate):
-    described = {entity.id: entity for entity in crate.get_entities() if entity.get("sha256")}
+    described = {unquote(entity.id): entity for entity in crate.get_entities() if entity.get("sha256")}
     assert set(described) == set(TEXTS)
     for name, text in TEXTS.items():
         assert described[name]["sha256"] == hashlib.sha256(text.encode()).hexdigest()
@@ -100,12 +101,26 @@ def test_packages_and_python_are_what_the_workflow_requires(crate):
     }
 
 
+@pytest.mark.usefixtures("crate")
+def test_every_reference_is_to_something_that_the_crate_has():
+    def references(value):
+        if isinstance(value, dict):
+            yield from [value["@id"]] if set(value) == {"@id"} else ()
+        for each in value if isinstance(value, list) else ():
+            yield from references(each)
+
+    graph = json.loads(Path("ro-crate-metadata.json").read_text(encoding="utf-8"))["@graph"]
+    there = {entity["@id"] for entity in graph}
+    missing = {name for entity in graph for value in entity.values() for name in references(value)} - there
+    assert {name for name in missing if not name.startswith("https://")} == set()
+
+
 def test_no_folder_of_the_machine_is_named(crate, tmp_path):
     assert str(tmp_path) not in Path("ro-crate-metadata.json").read_text(encoding="utf-8")
 
 
 def test_a_file_outside_of_the_folder_is_refused(finished, tmp_path):
-    finished.jobs[0] = record("simulate", 1, [str(tmp_path.parent / "robot.yaml")], "results/a.parquet")
+    finished.jobs[0] = record("simulate", 1, [str(tmp_path.parent / "robot.yaml")], "results/3+6DoF.parquet")
     with pytest.raises(InputError, match="outside of the folder"):
         run_crate(finished, WORDS)
 

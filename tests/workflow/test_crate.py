@@ -4,6 +4,7 @@ import hashlib
 import json
 import subprocess
 import sys
+from urllib.parse import unquote
 
 import pandas as pd
 import pytest
@@ -20,7 +21,7 @@ def study(small_study, tmp_path_factory):
 
 def described(study):
     """Digest of each file that the crate describes, by its name."""
-    return {entity.id: entity["sha256"] for entity in ROCrate(study.folder).get_entities() if entity.get("sha256")}
+    return {unquote(entity.id): entity["sha256"] for entity in ROCrate(study.folder).get_entities() if entity.get("sha256")}
 
 
 def test_the_crate_describes_every_result_as_it_is_and_nothing_of_the_machine(study):

@@ -16,6 +16,7 @@ import mimetypes
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
 
 from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
@@ -39,6 +40,7 @@ _PROFILES = {
     "provenance": "Provenance Run Crate",
 }
 _PROFILE_VERSION = "0.5"
+_CODE = {"@type": ["File", "SoftwareSourceCode"]}
 _COMPLETED = "http://schema.org/CompletedActionStatus"
 # What the context of RO-Crate 1.1 does not have.
 _TERMS = {"sha256": "http://schema.org/sha256"}
@@ -110,8 +112,10 @@ def run_crate(run: FinishedRun, words: Mapping[str, str]) -> dict[str, Any]:
     inputs = _outside_inputs(run.jobs)
     made = [file for job in run.jobs for file in job.outputs]
     modules = {file for job in run.jobs for file in _sources(job)} - set(scripts.values())
-    for file in sorted({*made, *inputs, *modules, *run.rules, run.configuration, run.software_list, *run.others}):
+    for file in sorted({*made, *inputs, *modules, run.configuration, run.software_list, *run.others}):
         crate.add_file(_inside(file), file, properties=_facts(file))
+    for file in run.rules:
+        crate.add_file(_inside(file), file, properties=_facts(file) | _CODE)
     for rule, file in sorted(scripts.items()):
         required = sorted({source for job in run.jobs if job.rule == rule for source in _sources(job)} - {file})
         crate.add_file(_inside(file), file, properties=_facts(file) | _tool(rule, run.origin, required))
@@ -154,7 +158,7 @@ def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> E
     packages = [_add(crate, package.url, "SoftwareApplication", **_package_facts(package)) for package in run.packages]
     snakemake = next((package.version for package in run.packages if package.name == "snakemake"), None)
     steps = [
-        _add(crate, f"{run.workflow}#{rule}", "HowToStep", name=rule, position=str(number), workExample=_reference(script))
+        _add(crate, f"{run.workflow}#{rule}", "HowToStep", name=rule, position=str(number), workExample=_file(script))
         for number, (rule, script) in enumerate(scripts.items(), 1)
     ]
     parameters = {
@@ -162,8 +166,8 @@ def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> E
         "output": ("#parameter-result", "result", _final(run.jobs)[0]),
     }
     for identifier, name, file in parameters.values():
-        _add(crate, identifier, "FormalParameter", additionalType="File", name=name, workExample=_reference(file))
-        crate.get(file)["exampleOfWork"] = _reference(identifier)
+        _add(crate, identifier, "FormalParameter", additionalType="File", name=name, workExample=_file(file))
+        crate.get(quote(file))["exampleOfWork"] = _reference(identifier)
     kinds = {"@type": ["File", "SoftwareSourceCode", "ComputationalWorkflow", "HowTo"]}
     workflow = crate.add_workflow(
         _inside(run.workflow),
@@ -175,7 +179,7 @@ def _workflow(crate: ROCrate, run: FinishedRun, scripts: Mapping[str, str]) -> E
     )
     workflow["version"] = run.origin.commit
     workflow["step"] = steps
-    workflow["hasPart"] = [_reference(file) for file in sorted({*scripts.values(), *run.rules})]
+    workflow["hasPart"] = [_file(file) for file in sorted(scripts.values())]
     workflow["softwareRequirements"] = [python, *packages]
     for key, (identifier, _, _) in parameters.items():
         workflow[key] = _reference(identifier)
@@ -265,9 +269,9 @@ def _action(
         endTime=ended,
         agent=_reference("#operator"),
         actionStatus=_COMPLETED,
-        instrument=_reference(tool),
-        object=[_reference(file) for file in read],
-        result=[_reference(file) for file in written],
+        instrument=_file(tool),
+        object=[_file(file) for file in read],
+        result=[_file(file) for file in written],
     )
 
 
@@ -294,10 +298,10 @@ def _script(job: JobRecord) -> str:
 
 def _tool(rule: str, origin: Origin, required: Sequence[str]) -> dict[str, Any]:
     return {
-        "@type": ["File", "SoftwareSourceCode"],
+        **_CODE,
         "name": rule,
         "version": origin.commit,
-        "softwareRequirements": [_reference(file) for file in required],
+        "softwareRequirements": [_file(file) for file in required],
     }
 
 
@@ -331,3 +335,8 @@ def _linked(value: Any) -> Any:
 
 def _reference(identifier: str) -> dict[str, str]:
     return {"@id": identifier}
+
+
+def _file(name: str) -> dict[str, str]:
+    """A reference to a file; a crate has names of files as URIs have them."""
+    return _reference(quote(name))
