@@ -187,14 +187,14 @@ def signature_figure(shown: Signature) -> Figure:
     _lines(force, shown.force_N, shown.by_force_falling, ":", "approached downwards")
     _lines(time, shown.time_h, shown.by_time, "-", "")
     angle.set(xlabel=f"angle of joint {shown.joint} (°)", ylabel="displacement (mm)")
-    force.set(xlabel="force on the end-effector (N)")
+    force.set(xlabel="force on the end-effector (N)", xticks=(-_PULL_N, 0, _PULL_N))
     time.set(xlabel=f"time (h), warming by {_RISE_K:.0f} K")
     for panel in (angle, force):
         panel.legend(handles=_dashes(panel), loc="upper left")
     time.legend(handles=time.lines[:3], labels=["along x", "along y", "along z"], loc="upper left")
     largest = max(np.abs(line.get_ydata()).max() for panel in axes[0] for line in panel.lines)
     # Above the lines is room for the legends.
-    angle.set_ylim(-1.1 * largest, 1.7 * largest)
+    angle.set_ylim(-1.1 * largest, 2.1 * largest)
     return figure
 
 
