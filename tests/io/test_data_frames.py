@@ -5,6 +5,7 @@ import pandas as pd
 from support import refused
 
 from elastocal.io.data_frames import read_frame, read_long, write_csv, write_latex, write_markdown
+from elastocal.io.origin import Origin
 from elastocal.io.storage import Column, TableSchema, write_table
 
 SCHEMA = TableSchema("things", (Column("number", "int32", "", "a number"), Column("length", "float64", "m", "a length")))
@@ -20,6 +21,14 @@ def test_tables_for_people_escape_what_latex_would_take_for_commands(tmp_path):
     assert "| 1.0 ± 0.1" in (tmp_path / "t.md").read_text(encoding="utf-8")
     assert (tmp_path / "t.csv").read_text(encoding="utf-8") == "x\n0.1\ninf\n"
     assert not list(tmp_path.glob("*.partial"))
+
+
+def test_a_table_for_people_names_its_origin_where_its_readers_do_not_see_it(tmp_path):
+    origin = Origin("c0ffee", "d16e57", 7)
+    write_latex(tmp_path / "t.tex", pd.DataFrame({"a": ["1"]}), origin)
+    write_markdown(tmp_path / "t.md", pd.DataFrame({"a": ["1"]}), origin)
+    assert (tmp_path / "t.tex").read_text(encoding="utf-8").splitlines()[-1] == f"% {origin.words}"
+    assert (tmp_path / "t.md").read_text(encoding="utf-8").splitlines()[-2:] == ["", f"<!-- {origin.words} -->"]
 
 
 def test_a_frame_has_the_columns_asked_for_in_the_order_of_the_schema(tmp_path):

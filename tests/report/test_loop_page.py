@@ -10,6 +10,7 @@ import pytest
 from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import candidate_table, residual_table
 
+from elastocal.io.origin import Origin
 from elastocal.mechanics.kinematics import corners
 from elastocal.report import loop_page as module
 from elastocal.report.loop_page import loop_page, write_loop_page
@@ -94,6 +95,11 @@ def test_a_candidate_of_several_shapes_stands_once_at_the_best(kuka):
     twice = {name: np.concatenate([lesser[name], values]) for name, values in table.items()}
     pages = [loop_page(facts_of(verdict), verdict, residual_table(), some, kuka)[0] for some in (table, twice)]
     assert pages[0]["candidates"] == pages[1]["candidates"]
+
+
+def test_the_page_names_its_origin_at_the_foot(kuka, tmp_path):
+    write_loop_page(tmp_path / "report.html", *page_of(kuka), Origin("c0ffee", "d16e57", 7))
+    assert "Made from commit c0ffee, configuration SHA-256 d16e57, seed 7." in (tmp_path / "report.html").read_text("utf-8")
 
 
 def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):

@@ -5,13 +5,13 @@ import pandas as pd
 from elastocal.io.data_frames import write_latex, write_markdown
 from elastocal.study.tables import with_errors_merged
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def typeset_table(job: Job) -> None:
     shown = with_errors_merged(pd.read_csv(job.input.table, keep_default_na=False, na_values=[""]))
-    write_markdown(job.output.markdown, shown)
-    write_latex(job.output.latex, shown)
+    write_markdown(job.output.markdown, shown, origin_of(job))
+    write_latex(job.output.latex, shown, origin_of(job))
 
 
 run(typeset_table, snakemake)

@@ -478,7 +478,7 @@ def printed(run: Audited, file: str, name: str, ending: str) -> list[Finding]:
     columns = [column for column in source.columns if not column.endswith("_std_error")]
     lines = (run.folder / file).read_text("utf-8").splitlines()
     if ending == "md":
-        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
+        rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:] if line.startswith("|")]
     else:
         rows = [[cell.strip() for cell in line.removesuffix(r"\\").split("&")] for line in lines if line.endswith(r"\\")][1:]
     shown = [row for row in rows if len(row) == len(columns)]

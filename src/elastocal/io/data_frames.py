@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
+    from elastocal.io.origin import Origin
     from elastocal.io.storage import TableSchema
 
 
@@ -94,15 +95,17 @@ def write_csv(path: str | Path, frame: pd.DataFrame, digits: int = 9) -> None:
     write_text(path, frame.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
-def write_markdown(path: str | Path, frame: pd.DataFrame) -> None:
-    """Write a frame of strings as a Markdown table."""
-    write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n")
+def write_markdown(path: str | Path, frame: pd.DataFrame, origin: Origin | None = None) -> None:
+    """Write a frame of strings as a Markdown table, with its origin in a comment behind it."""
+    named = f"\n<!-- {origin.words} -->\n" if origin else ""
+    write_text(path, frame.to_markdown(index=False, disable_numparse=True) + "\n" + named)
 
 
-def write_latex(path: str | Path, frame: pd.DataFrame) -> None:
-    """Write a frame of strings as a LaTeX tabular."""
+def write_latex(path: str | Path, frame: pd.DataFrame, origin: Origin | None = None) -> None:
+    """Write a frame of strings as a LaTeX tabular, with its origin in a comment behind it."""
     shown = frame.rename(columns=_latex).map(_latex)
-    write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]))
+    named = f"% {origin.words}\n" if origin else ""
+    write_text(path, shown.to_latex(index=False, column_format="l" * shown.shape[1]) + named)
 
 
 def _latex(text: str) -> str:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
+    from elastocal.io.origin import Origin
     from elastocal.mechanics.robot import Robot
 
 # Measurements that a page shows: more are slow to turn on a phone.
@@ -109,7 +110,7 @@ def loop_page(
     return page, data
 
 
-def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str, Any]) -> None:
+def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str, Any], origin: Origin | None = None) -> None:
     """Write the page of a campaign; the file appears whole or not at all.
 
     Parameters
@@ -118,13 +119,17 @@ def write_loop_page(path: str | Path, page: Mapping[str, Any], data: Mapping[str
         The HTML file.
     page, data : dict
         From `loop_page`.
+    origin : Origin, optional
+        Named at the foot of the page.
     """
     folder = resources.files("elastocal.report")
     template, script = (folder.joinpath(name).read_text(encoding="utf-8") for name in ("loop.html", "loop.js"))
     # Texts come from files of other people: they are escaped, and nothing in the data can end the script that holds it.
     numbers = json.dumps(data, allow_nan=False).replace("<", "\\u003c")
     text = Environment(autoescape=True).from_string(template)
-    write_text(path, text.render(page=page, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs())))
+    write_text(
+        path, text.render(page=page, origin=origin, data=Markup(numbers), script=Markup(script), plotly=Markup(get_plotlyjs()))
+    )
 
 
 def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
