@@ -2,6 +2,8 @@
 PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
+# The pins have every dependency, so none is looked for.
+INSTALL = $(BIN)/uv pip install -q --system-certs --python $(BIN)/python
 
 .PHONY: paper test fuzz soak mutants lint bench pictures site crate lock clean
 
@@ -53,6 +55,7 @@ crate: .venv/ready .venv-crate/ready
 
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
+	uv pip compile --group install --universal --python-version 3.11 --generate-hashes --no-header -o requirements-install.lock
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
 	uv pip compile pyproject.toml --extra build --extra cluster --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements.lock -o requirements-cluster.lock
@@ -63,25 +66,26 @@ lock:
 clean:
 	rm -rf .venv .venv-crate .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json
 
-.venv/bin/python:
+.venv/bin/python: requirements-install.lock
 	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install -q --require-hashes -r requirements-install.lock
 
 .venv/ready: requirements.lock pyproject.toml | .venv/bin/python
-	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements.lock
-	$(BIN)/python -m pip install -q --no-deps --no-build-isolation -e .
+	$(INSTALL) --no-deps --require-hashes -r requirements.lock
+	$(INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
 
 # What a run on a cluster needs besides: docs/cluster.md.
 .venv/ready-for-cluster: requirements-cluster.lock .venv/ready
-	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements-cluster.lock
+	$(INSTALL) --no-deps --require-hashes -r requirements-cluster.lock
 	touch $@
 
 .venv/ready-for-tests: requirements-test.lock .venv/ready
-	$(BIN)/python -m pip install -q --no-deps --require-hashes -r requirements-test.lock
+	$(INSTALL) --no-deps --require-hashes -r requirements-test.lock
 	touch $@
 
 # The validator of crates.
-.venv-crate/ready: requirements-crate.lock
+.venv-crate/ready: requirements-crate.lock | .venv/bin/python
 	$(PYTHON) -m venv .venv-crate
-	.venv-crate/bin/python -m pip install -q --no-deps --require-hashes -r requirements-crate.lock
+	$(BIN)/uv pip install -q --system-certs --python .venv-crate/bin/python --no-deps --require-hashes -r requirements-crate.lock
 	touch $@

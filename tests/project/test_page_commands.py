@@ -66,7 +66,7 @@ ELSEWHERE = {
         "docs/audit.md",
         "sha256sum",
     ),
-    "pip install -e .": ("Makefile", "pip install -q --no-deps --no-build-isolation -e ."),
+    "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
     "python -m pip wheel --no-deps --no-build-isolation -w dist .": (
         "tests/project/test_wheel.py",

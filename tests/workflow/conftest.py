@@ -1,40 +1,37 @@
-"""A small study, run once, and a folder of its own for each test that changes something."""
+"""A small study, run once for all workers, and a folder of its own for each test that changes something."""
 
-import subprocess
+import fcntl
+import os
+import shutil
 
 import pytest
 from study_folder import Study
 
 
-@pytest.fixture(scope="session")
-def _serial_run(request, tmp_path_factory):
-    """The small study on one core, under way behind the other tests where a test asks for it."""
-    if not any("serial_study" in getattr(item, "fixturenames", ()) for item in request.session.items):
-        yield None
-        return
-    study = Study.of_sources(tmp_path_factory.mktemp("serial") / "study")
-    with open(study.path("terminal.txt"), "w", encoding="utf-8") as terminal:
-        process = subprocess.Popen(**study.command("-j1"), stdout=terminal, stderr=subprocess.STDOUT)
-    yield study, process
-    if process.poll() is None:
-        process.terminate()
-        process.wait()
+def _of_all_workers(tmp_path_factory, name, *arguments):
+    """A finished small study: the worker that asks first makes it, another that asks meanwhile waits."""
+    own = tmp_path_factory.getbasetemp()
+    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name)
+    with open(study.folder.with_suffix(".lock"), "w", encoding="utf-8") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = study.folder.with_suffix(".done")
+        if not done.exists():
+            shutil.rmtree(study.folder, ignore_errors=True)
+            Study.of_sources(study.folder).run(*arguments)
+            done.touch()
+    return study
 
 
 @pytest.fixture(scope="session")
-def small_study(_serial_run, tmp_path_factory):
+def small_study(tmp_path_factory):
     """The finished small study on two cores; to be read, not to be changed."""
-    study = Study.of_sources(tmp_path_factory.mktemp("small") / "study")
-    study.run()
-    return study
+    return _of_all_workers(tmp_path_factory, "small")
 
 
 @pytest.fixture(scope="session")
-def serial_study(_serial_run):
+def serial_study(tmp_path_factory):
     """The finished small study on one core; to be read, not to be changed."""
-    study, process = _serial_run
-    assert process.wait(timeout=600) == 0, study.path("terminal.txt").read_text(encoding="utf-8")[-3000:]
-    return study
+    return _of_all_workers(tmp_path_factory, "serial", "-j1")
 
 
 @pytest.fixture
