@@ -66,6 +66,8 @@ ELSEWHERE = {
         "docs/audit.md",
         "sha256sum",
     ),
+    "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
+    "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
     "python -m pip wheel --no-deps --no-build-isolation -w dist .": (
@@ -246,8 +248,7 @@ def test_a_how_to_page_works_from_top_to_bottom(page, tmp_path):
     for name in ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src"):
         (tmp_path / name).symlink_to(ROOT / name)
     binaries = Path(sys.executable).parent
-    (tmp_path / ".venv").mkdir()
-    (tmp_path / ".venv" / "bin").symlink_to(binaries)
+    (tmp_path / ".venv").symlink_to(binaries.parent)
     script = "set -euo pipefail\n" + "\n".join(STORIES[page])
     environment = os.environ | {"PATH": f"{binaries}:{os.environ['PATH']}", "OMP_NUM_THREADS": "1"}
     ran = subprocess.run(["bash", "-c", script], cwd=tmp_path, capture_output=True, text=True, env=environment)

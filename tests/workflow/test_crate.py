@@ -39,7 +39,7 @@ def test_every_job_of_the_study_is_an_action(study):
     records = set(study.files("results/jobs/**/*.json")) - {"results/jobs/write_crate.json"}
     # One more: the run as a whole.
     assert len(actions) == len(records) + 1
-    assert all(action["actionStatus"]["@id"].endswith("CompletedActionStatus") for action in actions)
+    assert all(action["actionStatus"].endswith("CompletedActionStatus") for action in actions)
 
 
 def test_configuration_software_and_tables_stand_beside_it(study):
@@ -61,7 +61,7 @@ def check(folder):
 
 
 def test_an_altered_and_a_missing_file_are_found(study, tmp_path):
-    altered, missing = study.files("results/estimates/**/*.parquet")[:2]
+    altered, missing = study.files("results/identified/**/*.parquet")[:2]
     copy = study.copied_to(tmp_path / "copy")
     copy.path(altered).write_bytes(copy.path(altered).read_bytes() + b" ")
     copy.path(missing).unlink()
