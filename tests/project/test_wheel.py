@@ -26,13 +26,6 @@ LEFT_OUT = (
     "workflow/searches/",
     "config/README.md",
 )
-    "workflow/lint.py",
-    "workflow/check_crate.py",
-    "workflow/validate_crate.py",
-    "workflow/examples/",
-    "workflow/searches/",
-    "config/README.md",
-)
 OUTSIDE = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"} | {"OMP_NUM_THREADS": "1"}
 IGNORED = shutil.ignore_patterns("__pycache__", "*.egg-info")
 
