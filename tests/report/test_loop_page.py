@@ -37,7 +37,7 @@ def data_in(path):
 @pytest.fixture(scope="module")
 def written(kuka, tmp_path_factory):
     path = tmp_path_factory.mktemp("page") / "report.html"
-    write_loop_page(path, *page_of(kuka))
+    write_loop_page(path, *page_of(kuka), Origin("c0ffee" * 7, "d16e57aa" * 8, 7))
     return path
 
 
@@ -100,6 +100,11 @@ def test_a_candidate_of_several_shapes_stands_once_at_the_best(kuka):
 def test_the_page_names_its_origin_at_the_foot(kuka, tmp_path):
     write_loop_page(tmp_path / "report.html", *page_of(kuka), Origin("c0ffee", "d16e57", 7))
     assert "Made from commit c0ffee, configuration SHA-256 d16e57, seed 7." in (tmp_path / "report.html").read_text("utf-8")
+
+
+def test_where_nothing_could_be_tested_no_probabilities_are_stated(kuka):
+    page, data = page_of(kuka, "not_testable")
+    assert page["probabilities"] == "" and page["hypotheses"] == data["hypotheses"] == []
 
 
 def test_data_at_fault_have_no_hypotheses(kuka, tmp_path):

@@ -65,7 +65,8 @@ def loop_facts(
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
         "faulty": faulty,
         "sentences": sentences(verdict),
-        "probabilities": "" if faulty else probability_sentence(verdict["probabilities"]),
+        # Where nothing could be tested, they are those from before the measurements.
+        "probabilities": "" if faulty or verdict["verdict"] == "not_testable" else probability_sentence(verdict["probabilities"]),
         "now": what_to_do(verdict, experiment),
         "warnings": [] if faulty else [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),

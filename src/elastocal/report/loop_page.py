@@ -85,7 +85,7 @@ def loop_page(
     angles = np.column_stack([some[f"q{joint}"] for joint in range(1, robot.joints + 1)])
     first = np.unique(np.column_stack([some["session"], some["pose"]]), axis=0, return_index=True)[1]
     drawn = first[_spread(len(first), _POSES)]
-    sets = (verdict["probabilities"] or {}).get("sets", [])
+    sets = (verdict["probabilities"] or {}).get("sets", []) if facts["probabilities"] else []
     hypotheses = [
         {"name": capital(name), "probability": entry["probability"], "words": probability_words(entry["probability"])}
         for name, entry in zip(hypotheses_words(sets), sets, strict=True)
