@@ -57,6 +57,8 @@ def loop_facts(
         JSON-serialisable; strings ready to print, lists for tables.
     """
     faulty = any(effect["family"] == OF_DATA for effect in verdict["effects"])
+    # Probabilities are then those from before the measurements.
+    untested = verdict["verdict"] == "not_testable"
     floor = verdict["heldout"]["noise_floor_rms_m"]
     return {
         "campaign": verdict["campaign"],
@@ -65,8 +67,7 @@ def loop_facts(
         "verdict": AT_FAULT if faulty else TITLES[verdict["verdict"]],
         "faulty": faulty,
         "sentences": sentences(verdict),
-        # Where nothing could be tested, they are those from before the measurements.
-        "probabilities": "" if faulty or verdict["verdict"] == "not_testable" else probability_sentence(verdict["probabilities"]),
+        "probabilities": "" if faulty or untested else probability_sentence(verdict["probabilities"]),
         "now": what_to_do(verdict, experiment),
         "warnings": [] if faulty else [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
