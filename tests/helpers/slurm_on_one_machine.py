@@ -1,0 +1,127 @@
+"""A Slurm of one machine, for tests: its daemons in a temporary folder, found by a link that stands in /etc/slurm meanwhile."""
+
+import os
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+# Where Slurm's commands look inside of a job, whose environment the plugin clears of Slurm's variables.
+_SYSTEM = Path("/etc/slurm/slurm.conf")
+DAEMONS = ("munged", "slurmctld", "slurmd", "sbatch")
+# A job that takes more memory than it asked for is killed at the next look, each second, as it would be by a cluster's own limits.
+_CONFIGURATION = """\
+ClusterName=one_machine
+SlurmctldHost={host}(127.0.0.1)
+SlurmUser=root
+SlurmctldPort={ports[0]}
+SlurmdPort={ports[1]}
+AuthType=auth/munge
+CredType=cred/munge
+AuthInfo=socket={folder}/munge.socket
+StateSaveLocation={folder}/state
+SlurmdSpoolDir={folder}/spool
+SlurmctldPidFile={folder}/slurmctld.pid
+SlurmdPidFile={folder}/slurmd.pid
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core_Memory
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+MpiDefault=none
+AccountingStorageType=accounting_storage/none
+JobAcctGatherType=jobacct_gather/linux
+JobAcctGatherFrequency=task=1
+JobAcctGatherParams=OverMemoryKill
+SchedulerParameters=sched_min_interval=100000,batch_sched_delay=0,sched_interval=1,bf_interval=1
+MinJobAge=600
+ReturnToService=2
+SlurmdParameters=config_overrides
+NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={megabytes} State=UNKNOWN
+PartitionName=tests Nodes={host} Default=YES MaxTime=60 DefMemPerCPU=500 State=UP
+"""
+
+
+def missing():
+    """Why there can be no Slurm here, or nothing."""
+    absent = [name for name in DAEMONS if not shutil.which(name, path=_path())]
+    if absent:
+        return f"{', '.join(absent)} not found: apt-get install slurmctld slurmd slurm-client munge"
+    if _SYSTEM.exists():
+        return f"{_SYSTEM} is there: this machine has a Slurm of its own"
+    return "" if os.geteuid() == 0 else "Slurm's daemons start jobs as other users, so root must start them"
+
+
+@contextmanager
+def slurm_on_one_machine(cores=4):
+    """Start the daemons, yield the environment of their clients, stop the daemons.
+
+    Parameters
+    ----------
+    cores : int
+        That jobs may have, whatever the machine has.
+    """
+    with ExitStack() as stack:
+        # Names of sockets must be short, and munge asks for a folder that others can read and nobody else can write.
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="slurm", dir="/tmp")))
+        folder.chmod(0o755)
+        host = socket.gethostname().partition(".")[0]
+        megabytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20
+        text = _CONFIGURATION.format(host=host, ports=_free_ports(2), folder=folder, cores=cores, megabytes=megabytes)
+        (folder / "slurm.conf").write_text(text, encoding="utf-8")
+        _SYSTEM.parent.mkdir(exist_ok=True)
+        _SYSTEM.unlink(missing_ok=True)
+        _SYSTEM.symlink_to(folder / "slurm.conf")
+        stack.callback(_SYSTEM.unlink)
+        for name in ("state", "spool"):
+            (folder / name).mkdir()
+        environment = os.environ | {"PATH": _path(), "SLURM_CONF": str(folder / "slurm.conf")}
+        _write_key(folder / "munge.key")
+        munged = ["munged", "--foreground", "--force", f"--key-file={folder}/munge.key", f"--socket={folder}/munge.socket"]
+        munged += [f"--{name}-file={folder}/munge.{name}" for name in ("pid", "log", "seed")]
+        _start(munged, folder, environment, stack)
+        _wait(lambda: (folder / "munge.socket").exists(), "munged")
+        _start(["slurmctld", "-D"], folder, environment, stack)
+        _start(["slurmd", "-D", "-N", host], folder, environment, stack)
+        states = ["sinfo", "--noheader", "--format=%t"]
+        _wait(
+            lambda: subprocess.run(states, env=environment, capture_output=True, text=True).stdout.strip() == "idle", "slurmd"
+        )
+        yield environment
+        subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True)
+
+
+def _path():
+    return f"{os.environ['PATH']}:/usr/sbin"
+
+
+def _free_ports(count):
+    with ExitStack() as stack:
+        sockets = [stack.enter_context(socket.socket()) for _ in range(count)]
+        for each in sockets:
+            each.bind(("127.0.0.1", 0))
+        return [each.getsockname()[1] for each in sockets]
+
+
+def _write_key(file):
+    file.touch(mode=0o400)
+    file.write_bytes(os.urandom(128))
+
+
+def _start(command, folder, environment, stack):
+    log = stack.enter_context(open(folder / f"{command[0]}.log", "wb"))
+    # Of its own session, so that an interrupt of the tests reaches it only through its end here.
+    process = subprocess.Popen(
+        command, cwd=folder, env=environment, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+    )
+    stack.callback(process.wait)
+    stack.callback(process.terminate)
+
+
+def _wait(ready, name, seconds=30):
+    end = time.monotonic() + seconds
+    while not ready():
+        assert time.monotonic() < end, f"{name} has not started within {seconds} s"
+        time.sleep(0.1)
