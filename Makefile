@@ -5,13 +5,17 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for.
 INSTALL = $(BIN)/uv pip install -q --system-certs --python $(BIN)/python
 
-.PHONY: paper test fuzz soak mutants lint bench pictures site crate lock clean
+.PHONY: paper test test-slurm fuzz soak mutants lint bench pictures site crate lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
 
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
+
+# The profile for Slurm on a Slurm of this machine, which the tests start and stop; asks for root.
+test-slurm: .venv/ready-for-tests
+	OMP_NUM_THREADS=1 ELASTOCAL_SLURM=1 $(BIN)/python -m pytest -q -rs tests/workflow/test_slurm.py
 
 # The tests of tests/fuzz with 90 times as many inputs, and others each time: 5 minutes.
 fuzz: .venv/ready-for-tests

@@ -12,7 +12,7 @@ from pathlib import Path
 # Where Slurm's commands look inside of a job, whose environment the plugin clears of Slurm's variables.
 _SYSTEM = Path("/etc/slurm/slurm.conf")
 DAEMONS = ("munged", "slurmctld", "slurmd", "sbatch")
-# A job that takes more memory than it asked for is killed at the next look, each second, as it would be by a cluster's own limits.
+# A job that takes more memory than it asked for is killed at the next look, each second, as by a cluster's own limits.
 _CONFIGURATION = """\
 ClusterName=one_machine
 SlurmctldHost={host}(127.0.0.1)
@@ -111,7 +111,7 @@ def _write_key(file):
 
 
 def _start(command, folder, environment, stack):
-    log = stack.enter_context(open(folder / f"{command[0]}.log", "wb"))
+    log = stack.enter_context((folder / f"{command[0]}.log").open("wb"))
     # Of its own session, so that an interrupt of the tests reaches it only through its end here.
     process = subprocess.Popen(
         command, cwd=folder, env=environment, stdout=log, stderr=subprocess.STDOUT, start_new_session=True

@@ -66,6 +66,7 @@ ELSEWHERE = {
         "docs/audit.md",
         "sha256sum",
     ),
+    "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
     "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
     "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
@@ -76,9 +77,13 @@ ELSEWHERE = {
     ),
 }
 # Minutes of measurement by hand, of which CI has no room: nothing but that they start is tested.
-BY_HAND = ("python benchmarks/run.py", "python benchmarks/interval_coverage.py")
+BY_HAND = (
+    "python benchmarks/cost.py few more proof --data-sets 250 750",
+    "python benchmarks/run.py",
+    "python benchmarks/interval_coverage.py",
+)
 # Not of this project, and with an effect on the machine: of the system's own package manager and of git's hooks.
-NOT_OURS = ("apt-get install", "pre-commit install", "pip show elastocal", "alias elastocal=")
+NOT_OURS = ("docker build", "docker run", "apt-get install", "pre-commit install", "pip show elastocal", "alias elastocal=")
 
 
 def pages():

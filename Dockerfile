@@ -1,0 +1,14 @@
+# The pinned environment and the pipeline: `docker build -t elastocal .`; see docs/cluster.md.
+FROM python:3.11-slim
+WORKDIR /opt/elastocal
+# Pins first, so that an edit of the sources leaves this layer as it is.
+COPY requirements-install.lock requirements-cluster.lock ./
+RUN python -m pip install --no-cache-dir --require-hashes -r requirements-install.lock \
+    && uv pip install --system --no-cache --no-deps --require-hashes -r requirements-cluster.lock
+COPY pyproject.toml README.md LICENSE Snakefile config.yaml ./
+COPY config config
+COPY profiles profiles
+COPY src src
+COPY workflow workflow
+RUN uv pip install --system --no-cache --no-deps --no-build-isolation -e .
+ENTRYPOINT ["snakemake"]

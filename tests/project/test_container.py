@@ -1,0 +1,18 @@
+"""The container recipe copies files that are there, and all that the pipeline needs."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+RECIPE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+
+
+def test_what_it_copies_is_there_and_is_what_the_pipeline_is_made_of():
+    copied = {name for line in re.findall(r"^COPY (.*) \S+$", RECIPE, re.MULTILINE) for name in line.split()}
+    assert [name for name in copied if not (ROOT / name).exists()] == []
+    assert copied >= {"Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "pyproject.toml"}
+
+
+def test_it_installs_by_digest_and_names_no_index():
+    assert RECIPE.count("--require-hashes") == 2
+    assert "http" not in RECIPE and "index" not in RECIPE
