@@ -2,8 +2,8 @@
 PYTHON ?= python3
 BIN = .venv/bin
 CORES ?= 2
-# The pins have every dependency, so none is looked for.
-INSTALL = $(BIN)/uv pip install -q --system-certs --python $(BIN)/python
+# The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
+INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
 .PHONY: paper test test-slurm fuzz soak mutants lint bench pictures site crate lock clean
 
