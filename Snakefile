@@ -37,6 +37,15 @@ include: "workflow/rules/crate.smk"
 watch_sources()
 
 
+onstart:
+    # While Snakemake limits how many jobs start in a time, and by default it does, to 100 a second, each look at what is ready
+    # starts a timer for another look, so a second later there are as many looks as there were, and each job adds one for good.
+    # No machine of ours starts 100 jobs in a second: what limits them is cores, or Slurm.
+    limit = workflow.scheduling_settings.max_jobs_per_timespan
+    if limit is not None and limit.max_jobs >= 100 * limit.timespan:
+        workflow.scheduler.job_rate_limiter = None
+
+
 onsuccess:
     for line in outcome(file for job in workflow.dag.jobs for file in job.output):
         logger.info(line)
