@@ -40,8 +40,9 @@ def test_information_in_the_campaigns_own_states_is_that_of_the_campaign(kuka):
     made = new_states.instrument_of(line, declared, numbers, declared.noise, states, reach, False)
     entries = new_states.Entries(states.joint_angles, states.wrench, states.approach[:, None], np.zeros(len(states), bool))
     total = made.information(entries, [0, 1]).sum(axis=0)
-    at = np.concatenate([np.arange(line.products.declared), line.products.declared + made.columns])
-    expected = line.products.white_gram[np.ix_(at, at)]
+    rows = line.products.rows
+    every = line.products.alike(rows.declared, rows.candidates.dense()[..., made.columns], made.columns)
+    expected = np.tensordot(every, every, ((0, 1), (0, 1)))
     # Declared parameters that measurements do not show have their prior, of information one, and only rounding beside it.
     size = np.sqrt(np.diag(expected) + 1e-6)
     np.testing.assert_allclose(total / np.outer(size, size), expected / np.outer(size, size), atol=1e-6)

@@ -7,8 +7,8 @@ import pytest
 from made_problems import made_rows
 from scipy.stats import chi2, kstest
 
-from elastocal.diagnosis.statistics import normal_equations, null_draws, products_of, statistics_of
-from elastocal.diagnosis.summed import WhiteRows, rows_at_once, summed, triangle_of
+from elastocal.diagnosis.statistics import normal_equations, null_draws, statistics_of
+from elastocal.diagnosis.summed import rows_at_once, summed, triangle_of
 
 TAU = np.array([0.0, 0.1, 0.7])
 
@@ -20,25 +20,16 @@ def in_order(rows):
     return replace(rows, **{name: getattr(rows, name)[order] for name in parts})
 
 
-def blocks_of(rows, poses_each):
+def blocks_of(rows, poses_each, by_pose):
     """`WhiteRows` of so many poses at a time; the poses number from 0 in each."""
     for first in range(0, rows.pose.max() + 1, poses_each):
-        mine = (rows.pose >= first) & (rows.pose < first + poses_each)
-        parts = (getattr(rows, name)[mine] for name in ("declared", "candidates", "residual", "jacobian"))
-        yield WhiteRows(*parts, rows.pose[mine] - first)
+        yield rows.white((rows.pose >= first) & (rows.pose < first + poses_each), by_pose)
 
 
-def sample_of(rows, poses):
-    """Products of the first poses alone."""
-    mine = rows.pose < poses
-    parts = {name: getattr(rows, name)[mine] for name in ("declared", "candidates", "residual", "jacobian", "pose")}
-    return products_of(**parts, prior_std=rows.prior_std, present=rows.present, joint_rad=rows.joint_rad)
-
-
-def summed_of(rows, poses_each=3, sample=5, taus=TAU):
+def summed_of(rows, poses_each=3, taus=TAU, by_pose=False):
     rows = in_order(rows)
     triangle = triangle_of(rows.declared[start : start + 7] for start in range(0, len(rows.declared), 7))
-    return summed(blocks_of(rows, poses_each), triangle, sample_of(rows, sample), rows.prior_std, rows.present, taus)
+    return summed(blocks_of(rows, poses_each, by_pose), triangle, rows.prior_std, rows.present, taus)
 
 
 CASES = {
@@ -48,11 +39,13 @@ CASES = {
 }
 
 
+@pytest.mark.parametrize("by_pose", [False, True])
 @pytest.mark.parametrize("poses_each", [1, 3, 100])
 @pytest.mark.parametrize("case", CASES)
-def test_statistics_of_sums_are_those_of_measurements_that_are_held(case, poses_each):
+def test_statistics_of_sums_are_those_of_measurements_that_are_held(case, poses_each, by_pose):
+    """Whether poses have several states or are one each."""
     rows = made_rows(1, **CASES[case])
-    found, expected = (statistics_of(each, TAU) for each in (summed_of(rows, poses_each), rows.products))
+    found, expected = (statistics_of(each, TAU) for each in (summed_of(rows, poses_each, by_pose=by_pose), rows.products))
     for name in ("gram", "along", "squares"):
         scale = np.abs(getattr(expected, name)).max()
         np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-9, atol=1e-9 * scale, err_msg=name)
@@ -60,27 +53,30 @@ def test_statistics_of_sums_are_those_of_measurements_that_are_held(case, poses_
     assert found.freedom == expected.freedom
 
 
-def test_the_determinant_of_the_pose_error_is_that_of_the_covariance_written_out():
+@pytest.mark.parametrize("by_pose", [False, True])
+def test_the_determinant_of_the_pose_error_is_that_of_the_covariance_written_out(by_pose):
     rows = made_rows(2)
-    sums = summed_of(rows)
+    sums = summed_of(rows, by_pose=by_pose)
     for tau, log_det in zip(TAU, sums.log_dets, strict=True):
         assert log_det == pytest.approx(np.linalg.slogdet(rows.covariance(tau))[1], abs=1e-9)
 
 
-def test_which_poses_are_in_the_sample_does_not_matter():
-    rows = made_rows(3)
-    few, many = (statistics_of(summed_of(rows, sample=poses), TAU) for poses in (2, 8))
-    np.testing.assert_allclose(few.gram, many.gram, rtol=1e-9, atol=1e-9 * np.abs(many.gram).max())
-    np.testing.assert_allclose(few.squares, many.squares, rtol=1e-9)
-
-
-def test_nearly_collinear_candidates_cost_no_precision():
-    """What the declared parameters explain is a million times what is left: squares of it would leave no digit of 1e-12."""
+@pytest.mark.parametrize("by_pose", [False, True])
+def test_what_the_declared_parameters_explain_costs_rounding_of_its_square_alone(by_pose):
+    """A candidate whose share that they explain is ten thousand times what is left, of some noise a row: eight digits stay."""
     rows, rng = made_rows(4, declared=4, candidates=3), np.random.default_rng(5)
     mixed = rows.declared @ rng.standard_normal((4, 3))
-    rows = replace(rows, candidates=1e6 * mixed + rows.candidates, prior_std=np.full(4, 1e5), present=np.zeros(4))
-    found, expected = (statistics_of(each, TAU) for each in (summed_of(rows), rows.products))
-    np.testing.assert_allclose(found.gram, expected.gram, rtol=1e-4, atol=1e-5 * np.abs(expected.gram).max())
+    rows = replace(rows, candidates=1e4 * mixed + rows.candidates, prior_std=np.full(4, 1e5), present=np.zeros(4))
+    dense = [rows.candidates.T @ np.linalg.inv(rows.marginal_covariance(tau)) @ rows.candidates for tau in TAU]
+    for found in (statistics_of(each, TAU) for each in (summed_of(rows, by_pose=by_pose), rows.products)):
+        np.testing.assert_allclose(found.gram, dense, rtol=1e-4, atol=1e-6 * np.abs(dense).max())
+
+
+def test_a_candidate_that_the_declared_parameters_are_is_nothing_at_all():
+    rows = made_rows(12, declared=4, candidates=3, prior=1e8)
+    rows = replace(rows, candidates=np.column_stack([rows.candidates[:, :2], 1e3 * rows.declared @ [1.0, -2.0, 0.5, 3.0]]))
+    for found in (statistics_of(each, TAU) for each in (summed_of(rows), rows.products)):
+        assert not found.gram[0, 2].any() and not found.gram[0, :, 2].any() and not found.along[0, 2]
 
 
 def test_rows_at_other_states_are_in_the_same_parameters():

@@ -9,11 +9,13 @@ from elastocal.diagnosis.other import OWN, Competitor
 from elastocal.diagnosis.search import Problem
 from elastocal.diagnosis.settings import Settings
 from elastocal.diagnosis.statistics import products_of, statistics_of
+from elastocal.diagnosis.summed import WhiteRows
+from elastocal.fitting.factored import Displacements, Factored
 
 
 @dataclass(frozen=True)
 class Rows:
-    """Whitened rows of a made campaign, as `products_of` takes them.
+    """Whitened rows of a made campaign; `white` has them as `products_of` takes them.
 
     Attributes
     ----------
@@ -34,9 +36,22 @@ class Rows:
     present: np.ndarray
     joint_rad: np.ndarray
 
+    def white(self, chosen=slice(None), by_pose=False):
+        """Some of them as observations of one row: every column displaces a coordinate of its own, by one in every state.
+
+        States are the rows themselves, or the poses.
+        """
+        _, pose = np.unique(self.pose[chosen], return_inverse=True)
+        state, columns = pose if by_pose else np.arange(len(pose)), self.candidates.shape[1]
+        laws = [{column: np.ones(int(state.max()) + 1)} for column in range(columns)]
+        displacements = Displacements.of(laws, np.ones(columns), int(state.max()) + 1)
+        declared, jacobian, candidates = (part[chosen][:, None] for part in (self.declared, self.jacobian, self.candidates))
+        candidates = Factored(displacements, candidates, state)
+        return WhiteRows(declared, candidates, self.residual[chosen][:, None], jacobian, pose)
+
     @property
     def products(self):
-        return products_of(**vars(self))
+        return products_of(self.white(), self.prior_std, self.present, self.joint_rad)
 
     def covariance(self, tau):
         """Sigma = I + J Lambda J', dense."""

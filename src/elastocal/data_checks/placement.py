@@ -13,15 +13,14 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from elastocal.fitting.model import declared_model
-from elastocal.fitting.observations import Observations, States
+from elastocal.fitting.observations import Observations, States, select_states
 from elastocal.fitting.prediction import measured_in_base
-from elastocal.fitting.registration import registered
-from elastocal.mechanics.kinematics import poses
+from elastocal.fitting.registration import nominal_poses, registered_to
 from elastocal.mechanics.pose_differences import rotation_vectors
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
-    from elastocal.fitting.model import Estimate
+    from elastocal.fitting.model import Estimate, Model
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -82,7 +81,7 @@ def placed(campaign: Campaign, measurements: Measurements) -> Placement:
     -------
     Placement
     """
-    return placed_by(campaign, measurements, _registered(campaign, measurements))
+    return _Nominal.of(campaign, measurements).placed()
 
 
 def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement:
@@ -105,7 +104,8 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
     .. [1] Rousseeuw, P. J. and Van Driessen, K., Computing LTS regression for large data sets, Data Mining and Knowledge
        Discovery 12, 2006.
     """
-    found = placed(campaign, measurements)
+    nominal = _Nominal.of(campaign, measurements)
+    found = nominal.placed()
     if campaign.frame == "base" and all(target.offset_m is not None for target in campaign.targets):
         return found
     for step in range(_CORE_STEPS + 1):
@@ -115,7 +115,7 @@ def robustly_placed(campaign: Campaign, measurements: Measurements) -> Placement
             if step == _CORE_STEPS:
                 limit = max(limit, _APART * robust_sigma(distance[members], 3))
             kept[members] = distance[members] <= limit
-        found = placed_by(campaign, measurements, _registered(campaign, measurements.select(kept)))
+        found = nominal.placed(kept)
     return found
 
 
@@ -132,14 +132,7 @@ def placed_by(campaign: Campaign, measurements: Measurements, estimate: Estimate
     -------
     Placement
     """
-    predicted, rotation = np.empty((len(measurements), 3)), np.empty((len(measurements), 3, 3))
-    for index, target in enumerate(campaign.targets):
-        mask = measurements.target == index
-        point = replace(campaign.robot.chain.point(target.point), offset_m=tuple(estimate.target_offset[index]))
-        predicted[mask], rotation[mask] = poses(campaign.robot.chain, measurements.joint_angles[mask], point)
-    measured, seen = measured_in_base(estimate, single_observations(measurements))
-    expected = None if seen is None else rotation @ estimate.target_rotation[measurements.target]
-    return Placement(estimate, predicted, measured, expected, seen)
+    return _Nominal.of(campaign, measurements).placed_by(estimate)
 
 
 def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
@@ -221,6 +214,40 @@ def _groups(measurements: Measurements) -> list[np.ndarray]:
     return [np.flatnonzero(number == group) for group in range(number.max() + 1)]
 
 
-def _registered(campaign: Campaign, measurements: Measurements) -> Estimate:
-    model = replace(declared_model(campaign), effects=())
-    return registered(model, single_observations(measurements))
+@dataclass(frozen=True)
+class _Nominal:
+    """Measurements beside the poses of their measuring points on the nominal robot, which every placement shares.
+
+    Attributes
+    ----------
+    model : Model
+        Frames and targets alone.
+    observations : Observations
+        N of them.
+    position, rotation : ndarray (N, 3), (N, 3, 3)
+        As by `registration.nominal_poses`.
+    """
+
+    model: Model
+    observations: Observations
+    position: np.ndarray
+    rotation: np.ndarray
+
+    @classmethod
+    def of(cls, campaign: Campaign, measurements: Measurements) -> _Nominal:
+        model, observations = replace(declared_model(campaign), effects=()), single_observations(measurements)
+        return cls(model, observations, *nominal_poses(model, observations))
+
+    def placed(self, kept: np.ndarray | None = None) -> Placement:
+        """All of them, in frames and targets that are fitted to all, or to those kept, ndarray of bool (N,)."""
+        if kept is None:
+            return self.placed_by(registered_to(self.model, self.observations, self.position, self.rotation))
+        some = select_states(self.observations, kept)
+        return self.placed_by(registered_to(self.model, some, self.position[kept], self.rotation[kept]))
+
+    def placed_by(self, estimate: Estimate) -> Placement:
+        target = self.observations.target
+        predicted = self.position + (self.rotation @ estimate.target_offset[target][..., None])[..., 0]
+        measured, seen = measured_in_base(estimate, self.observations)
+        expected = None if seen is None else self.rotation @ estimate.target_rotation[target]
+        return Placement(estimate, predicted, measured, expected, seen)

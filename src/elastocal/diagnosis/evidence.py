@@ -354,8 +354,8 @@ def evaluate(
         return Evaluated(float(log_sum_exp(values)), np.zeros(0), values - log_sum_exp(values), np.zeros(0))
     nearest = [max(int(np.argmin(np.abs(grid.scales - size))), unit.smallest) for size, unit in zip(start, units, strict=True)]
     present = Joint(statistics, units, grid, base, np.array(nearest))
+    profiles = present.profiles()
     for _ in range(_MOST_ASCENTS):
-        profiles = present.profiles()
         best = np.array([int(np.argmax(profile[1:])) for profile in profiles])
         gains = np.array([p[1:].max() - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
         if gains.max() <= _NO_GAIN:
@@ -368,7 +368,7 @@ def evaluate(
             if moved.log_density <= present.log_density:
                 break
         present = moved
-    profiles = present.profiles()
+        profiles = present.profiles()
     sums = np.array([log_sum_exp(p[1:]) - p[1 + place] for p, place in zip(profiles, present.places, strict=True)])
     without = np.array([profile[0] for profile in profiles]) - sums + sums.sum()
     log_posterior = present.by_pose_error - log_sum_exp(present.by_pose_error)

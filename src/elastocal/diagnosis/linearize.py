@@ -15,7 +15,8 @@ from elastocal.diagnosis.statistics import products_of, statistics_of
 from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
 from elastocal.effects.conditions import at_states, offered
 from elastocal.fitting.displacement import conditions
-from elastocal.fitting.linearization import effect_columns, linearize
+from elastocal.fitting.factored import Displacements, Factored
+from elastocal.fitting.linearization import linearize
 from elastocal.fitting.observations import part_at, parts_of, select_states, spread_poses
 from elastocal.fitting.parameters import nonlinear_parameters as shape_parameters
 from elastocal.fitting.parameters import parameter_values
@@ -137,13 +138,13 @@ def linearized(
     grid = unit_rad * np.array(settings.pose_steps)
     if held:
         (block,) = source.blocks(lines)
-        whole = products_of(**vars(block), prior_std=deviation, present=present, joint_rad=still)
+        whole = products_of(block, deviation, present, still)
         grid = grid[pose_errors_within_reach(statistics_of(whole.without_candidates, grid), settings)]
         products: Products | Sums = whole
     else:
-        sample = products_of(**vars(source.sample()), prior_std=deviation, present=present, joint_rad=still)
+        sample = products_of(source.sample(), deviation, present, still)
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
-        products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], sample, deviation, present, grid)
+        products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], deviation, present, grid)
     statistics = statistics_of(products, grid)
     smallest = smallest_shown(statistics, units, settings)
     shown = tuple(replace(unit, smallest=int(n)) for unit, n in zip(units, smallest, strict=True) if n < len(settings.scales))
@@ -332,15 +333,15 @@ class _Source:
         laws: list[tuple[Displacing, tuple[float, ...]]] = [*self.tested, *((law, ()) for law in self.against)]
         for part in lines:
             line, some = part.line, part.observations
-            made = effect_columns(laws, line.conditions, part.white(line.coordinate_jacobian), some.state)
-            made *= sizes
+            displaced = [law for effect, shapes in laws for law in effect.displacement(line.conditions, *shapes)]
+            displacements = Displacements.of(displaced, sizes, len(some.states))
             residual = line.residual + line.sensitivities[..., self.found] @ self.values[self.found]
             yield WhiteRows(
-                _flat(part.white(line.sensitivities[..., ~self.found])),
-                _flat(made),
-                part.white(residual).T.ravel(),
-                _flat(part.white(part.jacobian)),
-                np.tile(some.cluster, some.rows),
+                part.white(line.sensitivities[..., ~self.found]),
+                Factored(displacements, part.white(line.coordinate_jacobian), some.state),
+                part.white(residual),
+                part.white(part.jacobian),
+                some.cluster,
             )
 
     def sample(self) -> WhiteRows:

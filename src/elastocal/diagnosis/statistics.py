@@ -20,17 +20,17 @@ References
 
 from __future__ import annotations
 
-import contextlib
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.summed import Sums, null_draws_of, rows_alike
+from elastocal.diagnosis.summed import Sums, null_draws_of, off_rounding, rows_alike
 from elastocal.fitting.observations import groups_by_size
 
-# Of a variance of one, or of the largest eigenvalue: what is less is rounding, what is added is not seen.
-_ROUNDING = 1e-9
+if TYPE_CHECKING:
+    from elastocal.diagnosis.summed import WhiteRows
 
 
 @dataclass(frozen=True)
@@ -88,12 +88,10 @@ class Products:
         C_p.
     joint_rad : ndarray (n,)
         Repeatability of the joints, where the measurements of a pose share one approach; else zero.
-    white_gram : ndarray (P + K, P + K)
-        Z'Z without y and without the rows of the declared parameters' priors: covariance of Z'e for white e.
-    rows : int
-        Measurements' components.
+    rows : WhiteRows
+        Of which they are.
     freedom : int
-        The same less what the declared model fits.
+        Measurements' components less what the declared model fits.
     into_basis : ndarray (P, P)
         Turns declared columns into orthonormal ones.
     projected : ndarray (P, K + 1)
@@ -105,8 +103,7 @@ class Products:
     pose_rows: np.ndarray
     pose_gram: np.ndarray
     joint_rad: np.ndarray
-    white_gram: np.ndarray
-    rows: int
+    rows: WhiteRows
     freedom: int
     into_basis: np.ndarray
     projected: np.ndarray
@@ -119,7 +116,6 @@ class Products:
             self,
             gram=self.gram[np.ix_(kept, kept)],
             pose_rows=self.pose_rows[..., kept],
-            white_gram=self.white_gram[: self.declared, : self.declared],
             projected=self.projected[:, -1:],
         )
 
@@ -141,30 +137,12 @@ class Products:
         return rows_alike(self, declared, candidates, columns)
 
 
-def products_of(
-    declared: np.ndarray,
-    candidates: np.ndarray,
-    residual: np.ndarray,
-    jacobian: np.ndarray,
-    pose: np.ndarray,
-    prior_std: np.ndarray,
-    present: np.ndarray,
-    joint_rad: np.ndarray,
-) -> Products:
+def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joint_rad: np.ndarray) -> Products:
     """Gather the products of whitened rows.
 
     Parameters
     ----------
-    declared : ndarray (R, P)
-        Whitened sensitivities to the declared parameters.
-    candidates : ndarray (R, K)
-        Whitened sensitivities to the candidates, in units of their plausible sizes.
-    residual : ndarray (R,)
-        Whitened.
-    jacobian : ndarray (R, n)
-        Whitened, with respect to the joints.
-    pose : ndarray of int (R,)
-        Pose of each row, 0 .. G-1.
+    rows : WhiteRows
     prior_std : ndarray (P,)
         Standard deviation of the prior of each declared parameter; wide ones keep the problem well posed.
     present : ndarray (P,)
@@ -178,48 +156,52 @@ def products_of(
 
     Notes
     -----
-    Projection leaves of the basis what rounding does, and the Schur complement of what is left takes that: projected twice,
-    which restores orthogonality to rounding [1]_. What the declared model fits are its effective degrees of freedom, the trace
-    of its hat matrix [2]_.
+    The declared columns are made orthonormal by QR of the scaled rows, so that no condition number is squared; what candidates
+    have in them is taken off their products by Pythagoras' theorem, which costs 1e-16 of the square of a candidate: nothing
+    beside noise of one. What the declared model fits are its effective degrees of freedom, the trace of its hat matrix [1]_.
 
     References
     ----------
-    .. [1] Giraud, L., Langou, J. and Rozložník, M., The loss of orthogonality in the Gram-Schmidt orthogonalization process,
-       Computers & Mathematics with Applications 50, 2005.
-    .. [2] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
+    .. [1] Hastie, T. J. and Tibshirani, R. J., Generalized Additive Models, Chapman and Hall, 1990.
     """
-    count, width = declared.shape[1], declared.shape[1] + candidates.shape[1] + 1
+    observed, components, count = rows.declared.shape
+    declared = rows.declared.reshape(observed * components, count)
     scaled = np.concatenate([declared, np.diag(1.0 / prior_std)])
-    # Columns come one after the other, and stay so.
-    every = np.zeros((width, len(scaled))).T
-    rows, prior, rest = every[: len(declared)], every[len(declared) :], every[:, count:]
-    rows[:, count:-1], rows[:, -1], prior[:, -1] = candidates, residual, -present / prior_std
     norms = np.linalg.norm(scaled, axis=0)
     basis, triangle = np.linalg.qr(scaled / norms)
-    projected = basis.T @ rest
-    rest.T[:] -= projected.T @ basis.T
-    every[:, :count] = basis
-    joints, poses = jacobian.shape[1], int(pose.max()) + 1
-    pose_rows, pose_gram = np.empty((poses, joints, width)), np.empty((poses, joints, joints))
-    for members in groups_by_size(pose):
-        mine, seen = pose[members[:, 0]], jacobian[members].transpose(0, 2, 1)
-        pose_rows[mine] = seen @ rows.T[:, members].transpose(1, 2, 0)
-        pose_gram[mine] = seen @ seen.transpose(0, 2, 1)
-    white = rows.T @ rows
-    freedom = max(round(len(rows) - (rows[:, :count] ** 2).sum()), 1)
+    seen = basis[: len(declared)]
+    residual = np.concatenate([rows.residual.ravel(), -present / prior_std])
+    beside = np.concatenate([seen, rows.residual.reshape(-1, 1)], axis=1).reshape(observed, components, count + 1)
+    products = rows.candidates.times(beside)
+    projected = np.concatenate([products[:, :-1].T, (basis.T @ residual)[:, None]], axis=1)
+    left = residual - basis @ projected[:, -1]
+    left -= basis @ (basis.T @ left)
+    width = projected.shape[1] + count
+    gram, squares = np.eye(width), rows.candidates.gram()
+    inside = off_rounding(squares, squares - projected[:, :-1].T @ projected[:, :-1], gram[count:-1, count:-1])
+    gram[count:-1, -1] = gram[-1, count:-1] = np.where(inside, 0.0, products[:, -1] - projected[:, :-1].T @ projected[:, -1])
+    gram[-1, -1] = left @ left
+    pose_rows, pose_gram = _by_pose(rows, beside, projected)
+    pose_rows[..., count:-1][..., inside] = 0.0
+    freedom = max(round(len(declared) - (seen**2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
-    return Products(
-        count,
-        white + prior.T @ prior,
-        pose_rows,
-        pose_gram,
-        joint_rad,
-        white[:-1, :-1],
-        len(rows),
-        freedom,
-        into_basis,
-        projected,
-    )
+    return Products(count, gram, pose_rows, pose_gram, joint_rad, rows, freedom, into_basis, projected)
+
+
+def _by_pose(rows: WhiteRows, beside: np.ndarray, projected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """B_p and C_p of `Products`; `beside` are the orthonormal columns and the residual (M, rows, P + 1)."""
+    jacobian, count = rows.jacobian, len(projected)
+    joints, poses = jacobian.shape[2], int(rows.pose.max()) + 1
+    pose_rows, pose_gram = np.empty((poses, joints, count + projected.shape[1])), np.empty((poses, joints, joints))
+    for members in groups_by_size(rows.pose):
+        mine = rows.pose[members[:, 0]]
+        turned = jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
+        together = turned @ beside[members].reshape(len(members), -1, count + 1)
+        pose_rows[mine, :, :count], pose_rows[mine, :, -1] = together[..., :-1], together[..., -1]
+        pose_gram[mine] = turned @ turned.transpose(0, 2, 1)
+    pose_rows[..., count:-1] = rows.candidates.times_by_pose(jacobian, rows.pose)
+    pose_rows[..., count:] -= pose_rows[..., :count] @ projected
+    return pose_rows, pose_gram
 
 
 def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Statistics:
@@ -234,12 +216,23 @@ def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Stat
     -------
     Statistics
     """
-    count = products.gram.shape[0] - products.declared
+    declared = products.declared
+    count = products.gram.shape[0] - declared
     rest, logs = np.empty((len(pose_error_rad), count, count)), np.empty(len(pose_error_rad))
     for number, tau in enumerate(pose_error_rad):
-        total, log_det = normal_equations(products, tau)
-        log_declared = _marginal(total, products.declared, rest[number])
-        logs[number] = -0.5 * log_det - 0.5 * log_declared
+        if isinstance(products, Sums):
+            total, log_det = normal_equations(products, tau)
+            known, rows = total[:declared], np.zeros((0, len(total)))
+        else:
+            total = products.gram
+            rows, log_det = _pose_factor(products, tau)
+            known = total[:declared] - rows[:, :declared].T @ rows
+        factor = np.linalg.cholesky(known[:, :declared])
+        # The Schur complement of the declared columns, and what the pose error takes, at once.
+        taken = np.concatenate([rows[:, declared:], solve_triangular(factor, known[:, declared:], lower=True)])
+        np.matmul(taken.T, taken, out=rest[number])
+        np.subtract(total[declared:, declared:], rest[number], out=rest[number])
+        logs[number] = -0.5 * log_det - np.log(np.diag(factor)).sum()
     return Statistics(np.asarray(pose_error_rad), rest[:, :-1, :-1], rest[:, :-1, -1], rest[:, -1, -1], logs, products.freedom)
 
 
@@ -268,7 +261,7 @@ def null_draws(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Statistics of simulated measurements of the declared model, in which nothing is missing.
 
-    A parametric bootstrap [1]_ of the statistics themselves, without drawing measurements.
+    A parametric bootstrap [1]_; of sums, which have no measurements any more, of the statistics themselves.
 
     Parameters
     ----------
@@ -295,21 +288,16 @@ def null_draws(
         gram = statistics_of(products, np.array([tau])).gram[0]
         along, squares = null_draws_of(products, gram, count, stream)
         return along[None], squares[None]
-    poses, joints, width = products.pose_rows.shape
+    rows, (poses, joints, width) = products.rows, products.pose_rows.shape
     flat = products.pose_rows.reshape(poses * joints, width)[:, :-1]
-    # White e is not drawn itself: of each pose what its joints' error would look like, J'e, and then of Z'e what that leaves.
-    kept, inverse_root, root = _pseudo_inverse(products.pose_gram)
-    white = stream.standard_normal((poses, joints, count)) * kept[..., None]
-    seen = root @ white
-    known = (inverse_root @ products.pose_rows[..., :-1]).reshape(flat.shape)
-    scale = np.sqrt(np.clip(np.diag(products.white_gram), 1e-300, None))
-    left = (products.white_gram - known.T @ known) / np.outer(scale, scale)
-    factor = _root(left, products.rows)
-    rest = stream.standard_normal((factor.shape[1], count))
-    along = known.T @ white.reshape(-1, count)
-    along += scale[:, None] * (factor @ rest)
-    freedom = max(products.rows - int(kept.sum()) - len(rest), 1)
-    squares = (white**2).sum(axis=(0, 1)) + (rest**2).sum(axis=0) + stream.chisquare(freedom, count)
+    white = stream.standard_normal((*rows.residual.shape, count))
+    fitted = np.tensordot(rows.declared @ products.into_basis, white, ((0, 1), (0, 1)))
+    along = np.concatenate([fitted, rows.candidates.times(white) - products.projected[:, :-1].T @ fitted])
+    seen = np.empty((poses, joints, count))
+    for members in groups_by_size(rows.pose):
+        turned = rows.jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
+        seen[rows.pose[members[:, 0]]] = turned @ white[members].reshape(len(members), -1, count)
+    squares = (white**2).sum(axis=(0, 1))
     common = _joint_deviations(products, tau)[None, :, None] * stream.standard_normal((poses, joints, count))
     squares = squares + 2 * (common * seen).sum(axis=(0, 1))
     moved = products.pose_gram @ common
@@ -322,42 +310,14 @@ def null_draws(
         solved = _pose_inverse(products, size_rad) @ seen
         these = along - flat.T @ solved.reshape(-1, count)
         left = squares - (seen * solved).sum(axis=(0, 1))
-        rows, _ = _pose_factor(products, size_rad)
-        total = products.gram[: products.declared, :-1] - rows[:, : products.declared].T @ rows[:, :-1]
+        factor_rows, _ = _pose_factor(products, size_rad)
+        total = products.gram[: products.declared, :-1] - factor_rows[:, : products.declared].T @ factor_rows[:, :-1]
         factor = np.linalg.cholesky(total[:, : products.declared])
         fitted = solve_triangular(factor, these[: products.declared], lower=True)
         cross = solve_triangular(factor, total[:, products.declared :], lower=True)
         np.subtract(these[products.declared :], cross.T @ fitted, out=found_along[number])
         found_squares[number] = left - (fitted**2).sum(axis=0)
     return found_along, found_squares
-
-
-def _root(covariance: np.ndarray, rows: int) -> np.ndarray:
-    """A matrix whose product with its transpose is the covariance of products, of size about one, of so many white rows.
-
-    The Cholesky factor where there are more rows than products, which is nine times as fast; else by eigenvectors, since the
-    matrix has no more rank than there are rows.
-    """
-    size = len(covariance)
-    if rows > 2 * size:
-        # Where columns are alike, rounding may leave the difference of two products just below zero.
-        with contextlib.suppress(np.linalg.LinAlgError):
-            return np.linalg.cholesky(covariance + _ROUNDING * np.eye(size))
-    values, vectors = np.linalg.eigh(covariance)
-    kept = values > _ROUNDING * size
-    return vectors[:, kept] * np.sqrt(values[kept])
-
-
-def _pseudo_inverse(grams: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of symmetric positive matrices: directions that are not rounding (G, n), and two matrices (G, n, n) of each.
-
-    One times its transpose is the matrix, the transpose of the other times that is the Moore-Penrose inverse.
-    """
-    values, vectors = np.linalg.eigh(grams)
-    kept = values > _ROUNDING * np.maximum(values[:, -1:], np.finfo(float).tiny)
-    values = np.where(kept, values, 1.0)
-    inverse_root = (kept / np.sqrt(values))[..., None] * vectors.transpose(0, 2, 1)
-    return kept, inverse_root, vectors * (kept * np.sqrt(values))[:, None]
 
 
 def _joint_deviations(products: Products, tau: float) -> np.ndarray:
@@ -382,12 +342,3 @@ def _pose_factor(products: Products, tau: float) -> tuple[np.ndarray, float]:
     rows = np.linalg.solve(factor, deviation[:, None] * products.pose_rows)
     log_det = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
     return rows.reshape(-1, width), float(log_det)
-
-
-def _marginal(total: np.ndarray, declared: int, rest: np.ndarray) -> float:
-    """Schur complement of the declared columns, [W'MW W'My; y'MW y'My], into `rest`; and ln |X'Sigma^-1 X|."""
-    factor = np.linalg.cholesky(total[:declared, :declared])
-    cross = solve_triangular(factor, total[:declared, declared:], lower=True)
-    np.matmul(cross.T, cross, out=rest)
-    np.subtract(total[declared:, declared:], rest, out=rest)
-    return float(2.0 * np.log(np.diag(factor)).sum())

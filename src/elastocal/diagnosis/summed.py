@@ -1,14 +1,13 @@
 """Sufficient statistics of measurements that are too many to be held whitened: one pass over blocks of whole poses.
 
 Z'Sigma(tau)^-1 Z is summed at every size of the pose error that is likely, in memory that does not grow with the measurements.
-The condition number of the declared part is not squared: candidates and residual come with what the declared parameters explain
-of them in a sample of the measurements taken off, so that what is summed is of the size of what is left; the rest is exact
-algebra.
+The condition number of the declared part is not squared: its columns come nearly orthonormal, by the triangular factor of all
+of them. What they explain of candidates and residual is taken off the sums, as in `statistics.products_of`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -16,7 +15,9 @@ import numpy as np
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable
+
+    from elastocal.fitting.factored import Factored
 
 # Beyond this many values of whitened columns a problem is summed: as many as take 60 MB, of which there are ten copies.
 MOST_HELD = 8_000_000
@@ -40,22 +41,44 @@ class InBasis(Protocol):
 
 @dataclass(frozen=True)
 class WhiteRows:
-    """Whitened rows of some whole poses, as the arguments of `statistics.products_of`; the poses number from 0 in each block.
+    """Whitened rows of M observations in some whole poses; states and poses number from 0 in each block.
 
     Attributes
     ----------
-    declared : ndarray (R, P)
-    candidates : ndarray (R, K)
-    residual : ndarray (R,)
-    jacobian : ndarray (R, n)
-    pose : ndarray of int (R,)
+    declared : ndarray (M, rows, P)
+        Sensitivities to the declared parameters.
+    candidates : Factored
+        Sensitivities to the K columns of all candidates, in units of their plausible sizes.
+    residual : ndarray (M, rows)
+    jacobian : ndarray (M, rows, n)
+        With respect to the joints.
+    pose : ndarray of int (M,)
     """
 
     declared: np.ndarray
-    candidates: np.ndarray
+    candidates: Factored
     residual: np.ndarray
     jacobian: np.ndarray
     pose: np.ndarray
+
+    @property
+    def one_state_each(self) -> bool:
+        """Whether every pose is one state: an error of the pose is one of the state then."""
+        return len(np.unique(self.pose)) == len(np.unique(self.candidates.state))
+
+    def whitened(self, tau: float) -> WhiteRows:
+        """Rows with (I + tau^2 J J')^-1/2 applied, of poses that are one state each."""
+        parts = self.declared, self.candidates.jacobian, self.residual[..., None], self.jacobian
+        edges = np.cumsum([part.shape[2] for part in parts])[:-1]
+        together = np.concatenate(parts, axis=2)
+        white = np.empty(together.shape)
+        for members in groups_by_size(self.pose):
+            flat = together[members].reshape(*(len(members), -1), together.shape[2])
+            seen = tau * flat[..., edges[-1] :]
+            factor = np.linalg.cholesky(np.eye(seen.shape[1]) + seen @ seen.transpose(0, 2, 1))
+            white[members] = np.linalg.solve(factor, flat).reshape(*members.shape, *together.shape[1:])
+        declared, coordinates, residual, jacobian = np.split(white, edges, axis=2)
+        return WhiteRows(declared, replace(self.candidates, jacobian=coordinates), residual[..., 0], jacobian, self.pose)
 
 
 @dataclass(frozen=True)
@@ -136,22 +159,16 @@ def _triangular_factor(rows: np.ndarray) -> np.ndarray:
 
 
 def summed(
-    blocks: Iterable[WhiteRows],
-    triangle: np.ndarray,
-    sample: InBasis,
-    prior_std: np.ndarray,
-    present: np.ndarray,
-    pose_error_rad: np.ndarray,
+    blocks: Iterable[WhiteRows], triangle: np.ndarray, prior_std: np.ndarray, present: np.ndarray, pose_error_rad: np.ndarray
 ) -> Sums:
     """Sum the products of whitened rows.
 
     Parameters
     ----------
     blocks : iterable of WhiteRows
+        One at least, all of the same candidates.
     triangle : ndarray (P, P)
         R of the declared columns of all rows.
-    sample : Products
-        Of a sample of them.
     prior_std, present : ndarray (P,)
         As in `statistics.products_of`.
     pose_error_rad : ndarray (T,)
@@ -165,46 +182,120 @@ def summed(
     factor = _triangular_factor(np.concatenate([triangle, prior]))
     norms = np.linalg.norm(factor, axis=0)
     into_basis = np.linalg.inv(factor / norms) / norms[:, None]
-    explained = sample.into_basis @ sample.projected
-    count, width = len(prior), explained.shape[1] + len(prior)
-    totals, log_dets = np.zeros((len(pose_error_rad), width, width)), np.zeros(len(pose_error_rad))
-    rows = 0
+    known, rows = np.concatenate([prior @ into_basis, (-present / prior_std)[:, None]], axis=1), 0
+    sums = [_Sum() for _ in pose_error_rad]
     for block in blocks:
-        every = np.empty((len(block.residual), width))
-        np.matmul(block.declared, into_basis, out=every[:, :count])
-        np.matmul(block.declared, -explained, out=every[:, count:])
-        every[:, count:-1] += block.candidates
-        every[:, -1] += block.residual
-        rows += len(every)
-        poses = groups_by_size(block.pose)
-        for number, tau in enumerate(pose_error_rad):
-            if not tau:
-                totals[number] += every.T @ every
-                continue
-            for white, log_det in _whitened(every, block.jacobian, poses, tau):
-                totals[number] += white.T @ white
-                log_dets[number] += log_det
-    rest = -prior @ explained
-    rest[:, -1] -= present / prior_std
-    every = np.concatenate([prior @ into_basis, rest], axis=1)
-    totals += every.T @ every
-    declared = totals[0, :count, :count]
+        rows += block.residual.size
+        for tau, total in zip(pose_error_rad, sums, strict=True):
+            total.add(block, into_basis, tau)
+    count = len(prior)
     # Of the measurements, not of the priors: the trace of the hat matrix.
-    hat = np.trace(np.linalg.solve(declared, declared - every[:, :count].T @ every[:, :count]))
-    projected = np.linalg.solve(into_basis, explained)
+    measured = sums[0].beside
+    hat = np.trace(np.linalg.solve((measured + known.T @ known)[:count, :count], measured[:count, :count]))
+    every = [total.products(known.T @ known) for total in sums]
+    first = every[0]
+    projected = np.linalg.solve(first[:count, :count], first[:count, count:])
+    totals, inside = np.empty((len(every), *first.shape)), np.zeros(first.shape[0] - count - 1, bool)
+    for number, raw in enumerate(every):
+        rest = raw[:count, count:] - raw[:count, :count] @ projected
+        twice = projected.T @ rest
+        left = raw[count:, count:] - twice - twice.T - projected.T @ raw[:count, :count] @ projected
+        if not number:
+            inside = np.diag(left)[:-1] <= _INSIDE * np.diag(raw)[count:-1]
+        rest[:, :-1][:, inside], left[:-1][inside], left[:, :-1][:, inside] = 0.0, 0.0, 0.0
+        totals[number] = np.block([[raw[:count, :count], rest], [rest.T, left]])
+    log_dets = np.array([total.log_det for total in sums])
     freedom = max(round(rows - hat), 1)
     return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
 
 
-def _whitened(
-    every: np.ndarray, jacobian: np.ndarray, poses: Iterable[np.ndarray], tau: float
-) -> Iterator[tuple[np.ndarray, float]]:
-    """Rows with (I + tau^2 J J')^-1/2 applied, and ln |I + tau^2 J J'|, for each number of rows in a pose."""
-    for members in poses:
-        seen = tau * jacobian[members]
-        factor = np.linalg.cholesky(np.eye(members.shape[1]) + seen @ seen.transpose(0, 2, 1))
-        white = np.linalg.inv(factor) @ every[members]
-        yield white.reshape(-1, every.shape[1]), 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()
+class _Sum:
+    """[Q W y]'Sigma(tau)^-1 [Q W y] at one size of the pose error, added up over blocks; Q are the orthonormal columns."""
+
+    def __init__(self) -> None:
+        self.beside: np.ndarray = np.zeros(())
+        self.cross: np.ndarray = np.zeros(())
+        self.entries: np.ndarray = np.zeros(())
+        self.taken: np.ndarray = np.zeros(())
+        self.log_det = 0.0
+        self.candidates: Factored | None = None
+
+    def add(self, block: WhiteRows, into_basis: np.ndarray, tau: float) -> None:
+        """Add a block; where a pose is one state its error is whitened away, else taken off by Woodbury's identity."""
+        if tau:
+            self.log_det += _log_det(block, tau)
+        one_state_each = bool(tau) and block.one_state_each
+        if one_state_each:
+            block = block.whitened(tau)
+        beside = np.concatenate([block.declared @ into_basis, block.residual[..., None]], axis=2)
+        flat = beside.reshape(-1, beside.shape[2])
+        self.beside = self.beside + flat.T @ flat
+        self.cross = self.cross + block.candidates.times(beside)
+        self.entries = self.entries + block.candidates.gram_of_entries()
+        self.candidates = block.candidates
+        if tau and not one_state_each:
+            taken = _taken(block, beside, tau)
+            self.taken = self.taken + taken.T @ taken
+
+    def products(self, prior: np.ndarray) -> np.ndarray:
+        """All of them, with those of the priors' rows [Q y] (P + 1, P + 1), ndarray (P + K + 1, P + K + 1)."""
+        assert self.candidates is not None
+        count = len(self.beside) - 1
+        width = count + self.candidates.columns + 1
+        at = np.append(np.arange(count), width - 1)
+        found = np.empty((width, width))
+        found[np.ix_(at, at)] = self.beside
+        found[count:-1, count:-1] = self.candidates.folded_gram(self.entries)
+        found[count:-1, at] = self.cross
+        found[at, count:-1] = self.cross.T
+        found -= self.taken
+        found[np.ix_(at, at)] += prior
+        return found
+
+
+def _log_det(block: WhiteRows, tau: float) -> float:
+    """ln |I + tau^2 J J'|."""
+    total = 0.0
+    for members in groups_by_size(block.pose):
+        seen = tau * block.jacobian[members].reshape(len(members), -1, block.jacobian.shape[2])
+        inner = np.eye(seen.shape[2]) + seen.transpose(0, 2, 1) @ seen
+        total += float(np.linalg.slogdet(inner)[1].sum())
+    return total
+
+
+def _taken(block: WhiteRows, beside: np.ndarray, tau: float) -> np.ndarray:
+    """Rows [Q W y] whose squares an error of the poses takes from the products, ndarray (G n, P + K + 1)."""
+    jacobian, joints = block.jacobian, block.jacobian.shape[2]
+    poses, count = int(block.pose.max()) + 1, beside.shape[2] - 1
+    rows, inner = np.empty((poses, joints, count + block.candidates.columns + 1)), np.empty((poses, joints, joints))
+    for members in groups_by_size(block.pose):
+        mine, seen = block.pose[members[:, 0]], tau * jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
+        together = seen @ beside[members].reshape(len(members), -1, count + 1)
+        rows[mine, :, :count], rows[mine, :, -1] = together[..., :-1], together[..., -1]
+        inner[mine] = np.eye(joints) + seen @ seen.transpose(0, 2, 1)
+    rows[..., count:-1] = tau * block.candidates.times_by_pose(jacobian, block.pose)
+    return np.linalg.solve(np.linalg.cholesky(inner), rows).reshape(-1, rows.shape[2])
+
+
+def off_rounding(before: np.ndarray, after: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """Products of columns after something is taken off, zero where nothing but rounding is left of a column.
+
+    Parameters
+    ----------
+    before, after : ndarray (K, K)
+    out : ndarray (K, K)
+        Overwritten.
+
+    Returns
+    -------
+    ndarray of bool (K,)
+        Columns of which nothing is left.
+    """
+    inside = np.diag(after) <= _INSIDE * np.diag(before)
+    out[:] = after
+    out[inside] = 0.0
+    out[:, inside] = 0.0
+    return inside
 
 
 def null_draws_of(sums: Sums, gram: np.ndarray, count: int, stream: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -239,5 +330,5 @@ def null_draws_of(sums: Sums, gram: np.ndarray, count: int, stream: np.random.Ge
     return along, (white**2).sum(axis=0) + stream.chisquare(max(sums.freedom - len(white), 1), count)
 
 
-# Eigenvalues below this share of the largest are rounding.
-_ROUNDING = 1e-9
+# Eigenvalues below this share of the largest are rounding; of a square from which another one was taken, this share.
+_ROUNDING, _INSIDE = 1e-9, 1e-12

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.fitting.model import Estimate
 from elastocal.fitting.observations import sample_of
-from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.kinematics import poses_of_points
 
 if TYPE_CHECKING:
     from elastocal.fitting.model import Model
@@ -45,14 +45,49 @@ def registered(model: Model, observations: Observations) -> Estimate:
        Dynamics 30, 2007.
     """
     observations = sample_of(observations, _MOST)
+    return registered_to(model, observations, *nominal_poses(model, observations))
+
+
+def nominal_poses(model: Model, observations: Observations) -> tuple[np.ndarray, np.ndarray]:
+    """Poses of the measuring points of some observations on the nominal robot without loads.
+
+    Parameters
+    ----------
+    model : Model
+    observations : Observations
+        M of them.
+
+    Returns
+    -------
+    position : ndarray (M, 3)
+        m, base axes.
+    rotation : ndarray (M, 3, 3)
+    """
     chain, states = model.sites.chain, observations.states
     coordinates = np.zeros((len(states), chain.coordinates))
     coordinates[:, : model.sites.joints] = states.joint_angles
-    nominal_position, nominal_rotation = np.empty((len(observations), 3)), np.empty((len(observations), 3, 3))
-    for index, target in enumerate(model.targets):
-        mask = observations.target == index
-        found = poses(chain, coordinates[observations.state[mask]], chain.point(target.point))
-        nominal_position[mask], nominal_rotation[mask] = found
+    position, rotation = poses_of_points(chain, coordinates, [chain.point(target.point) for target in model.targets])
+    seen = observations.target, observations.state
+    return position[seen], rotation[seen]
+
+
+def registered_to(
+    model: Model, observations: Observations, nominal_position: np.ndarray, nominal_rotation: np.ndarray
+) -> Estimate:
+    """As `registered`, to nominal poses that are known.
+
+    Parameters
+    ----------
+    model : Model
+    observations : Observations
+    nominal_position, nominal_rotation : ndarray (M, 3), (M, 3, 3)
+        Of them, as by `nominal_poses`.
+
+    Returns
+    -------
+    Estimate
+    """
+    states = observations.states
     sessions = np.unique(states.session)
     session = np.searchsorted(sessions, states.session[observations.state])
     frames = np.tile(np.eye(3), (len(sessions), 1, 1)), np.zeros((len(sessions), 3))

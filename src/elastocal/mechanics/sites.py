@@ -14,7 +14,7 @@ References
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -208,9 +208,32 @@ def sites_of(holder: Robot | Chain) -> Sites:
     Sites
     """
     if isinstance(holder, Robot):
-        known = ("masses", "gravity_m_s2", "gear_ratio", "compensator", "payload_kg")
-        return replace(sites_of(holder.chain), **{name: getattr(holder, name) for name in known})
-    chain = holder
+        known = (holder.masses, holder.gravity_m_s2, holder.gear_ratio, holder.compensator, holder.payload_kg)
+        return _sites_of(holder.chain, *known)
+    return _sites_of_chain(holder)
+
+
+# Every part of a diagnosis asks for the sites of its robot; what a run has to do with are a few robots.
+@lru_cache(maxsize=64)
+def _sites_of(
+    chain: Chain,
+    masses: tuple[Mass, ...],
+    gravity_m_s2: tuple[float, ...],
+    gear_ratio: tuple[float | None, ...] | None,
+    compensator: Compensator | None,
+    payload_kg: float | None,
+) -> Sites:
+    return replace(
+        _sites_of_chain(chain),
+        masses=masses,
+        gravity_m_s2=gravity_m_s2,
+        gear_ratio=gear_ratio,
+        compensator=compensator,
+        payload_kg=payload_kg,
+    )
+
+
+def _sites_of_chain(chain: Chain) -> Sites:
     springs = _Springs(chain.coordinates)
     base = springs.add("TTTRRR")
     tilt: list[tuple[int, ...]] = []

@@ -1,0 +1,204 @@
+"""Columns of sensitivities in two factors, and their products without the columns.
+
+An effect displaces coordinates of the sites, by an amount that belongs to the state; how a coordinate moves what is measured
+belongs to the measurement. In row r of state s a column is the sum over coordinates c of
+
+    J[r, c] f_c(s),
+
+so that products of two columns are sums over states of f_c(s) g_d(s) H_cd(s), with H = J'J of the rows of one state: as many
+terms as states, where the columns themselves have a term for each component of each target in it. Two columns differ by what
+they have in common times the rounding of one, as differences of squares do: 1e-16 of the larger.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from elastocal.fitting.observations import groups_by_size
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+
+@dataclass(frozen=True)
+class Displacements:
+    """What columns do to coordinates, entry by entry; entries of one coordinate lie side by side.
+
+    Attributes
+    ----------
+    columns : int
+        K.
+    values : ndarray (E, S)
+        Displacement of one coordinate by one column, in each state.
+    coordinate, column : ndarray of int (E,)
+        The former rising.
+    """
+
+    columns: int
+    values: np.ndarray
+    coordinate: np.ndarray
+    column: np.ndarray
+
+    @classmethod
+    def of(cls, laws: Sequence[Mapping[int, np.ndarray]], sizes: np.ndarray, states: int) -> Displacements:
+        """Gather laws, each a displacement of some coordinates.
+
+        Parameters
+        ----------
+        laws : sequence of dict of int to ndarray (S,)
+            One for each column.
+        sizes : ndarray (K,)
+            By which columns are multiplied.
+        states : int
+            S.
+
+        Returns
+        -------
+        Displacements
+        """
+        entries = sorted((coordinate, column) for column, law in enumerate(laws) for coordinate in law)
+        values = np.empty((len(entries), states))
+        for place, (coordinate, column) in zip(values, entries, strict=True):
+            np.multiply(laws[column][coordinate], sizes[column], out=place)
+        return cls(len(laws), values, *np.array(entries, int).reshape(-1, 2).T)
+
+    @cached_property
+    def spans(self) -> list[tuple[int, slice]]:
+        """Coordinates that are displaced, and the entries of each."""
+        used, first = np.unique(self.coordinate, return_index=True)
+        edges = [*first.tolist(), len(self.coordinate)]
+        return [(int(c), slice(*edges[n : n + 2])) for n, c in enumerate(used)]
+
+    @cached_property
+    def _fold(self) -> csr_array:
+        """Ones where an entry is of a column, sparse (K, E)."""
+        entries = len(self.column)
+        return csr_array((np.ones(entries), (self.column, np.arange(entries))), (self.columns, entries))
+
+    def folded(self, values: np.ndarray) -> np.ndarray:
+        """Sum over the entries of each column, of ndarray (E, q): ndarray (K, q)."""
+        return self._fold @ values
+
+
+@dataclass(frozen=True)
+class Factored:
+    """Rows of columns that displace coordinates.
+
+    Attributes
+    ----------
+    displacements : Displacements
+        K columns in S states.
+    jacobian : ndarray (M, rows, C)
+        Of each observation with respect to the coordinates, whitened or not.
+    state : ndarray of int (M,)
+        Its state.
+    """
+
+    displacements: Displacements
+    jacobian: np.ndarray
+    state: np.ndarray
+
+    @property
+    def columns(self) -> int:
+        """K."""
+        return self.displacements.columns
+
+    @cached_property
+    def _by_state(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each number of observations in a state, these and their rows for the coordinates used, (G, k rows, C')."""
+        used = [coordinate for coordinate, _ in self.displacements.spans]
+        rows = self.jacobian[..., used]
+        groups = groups_by_size(self.state)
+        height = rows.shape[1]
+        return [(members, rows[members].reshape(len(members), members.shape[1] * height, len(used))) for members in groups]
+
+    def _products_by_state(self, right: np.ndarray | None = None) -> np.ndarray:
+        """J' times some rows (M, rows, q), or times J itself, summed over each state: ndarray (C', S, q)."""
+        spans, states = self.displacements.spans, self.displacements.values.shape[1]
+        width = len(spans) if right is None else right.shape[2]
+        found = np.zeros((len(spans), states, width))
+        for members, rows in self._by_state:
+            other = rows if right is None else right[members].reshape(*rows.shape[:2], width)
+            found[:, self.state[members[:, 0]]] = (rows.transpose(0, 2, 1) @ other).transpose(1, 0, 2)
+        return found
+
+    def gram(self) -> np.ndarray:
+        """Products of the columns with each other, ndarray (K, K)."""
+        return self.folded_gram(self.gram_of_entries())
+
+    def gram_of_entries(self) -> np.ndarray:
+        """The same of the entries, ndarray (E, E): what adds up over parts of the measurements before it is folded."""
+        values, spans = self.displacements.values, self.displacements.spans
+        pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
+        place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
+        found = np.empty((len(values), len(values)))
+        for number, (_, span) in enumerate(spans):
+            # Coordinates from this one on; the others are alike by symmetry.
+            rest = slice(span.start, None)
+            found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
+            found[rest, span] = found[span, rest].T
+        return found
+
+    def folded_gram(self, gram_of_entries: np.ndarray) -> np.ndarray:
+        """Products of columns from those of entries, ndarray (K, K)."""
+        fold = self.displacements.folded
+        return fold(fold(gram_of_entries).T)
+
+    def times(self, right: np.ndarray) -> np.ndarray:
+        """Products of the columns with other rows.
+
+        Parameters
+        ----------
+        right : ndarray (M, rows, q)
+
+        Returns
+        -------
+        ndarray (K, q)
+        """
+        values, seen = self.displacements.values, self._products_by_state(right)
+        found = np.empty((len(values), right.shape[2]))
+        for number, (_, span) in enumerate(self.displacements.spans):
+            np.matmul(values[span], seen[number], out=found[span])
+        return self.displacements.folded(found)
+
+    def times_by_pose(self, right: np.ndarray, pose: np.ndarray) -> np.ndarray:
+        """Products of the columns with other rows, of the measurements of each pose.
+
+        Parameters
+        ----------
+        right : ndarray (M, rows, n)
+        pose : ndarray of int (M,)
+            0 .. G-1; all measurements of a state are of one pose.
+
+        Returns
+        -------
+        ndarray (G, n, K)
+        """
+        values, states = self.displacements.values, self.displacements.values.shape[1]
+        seen, poses = self._products_by_state(right), int(pose.max()) + 1
+        of_state = np.full(states, -1)
+        of_state[self.state] = pose
+        found = np.zeros((len(values), poses, right.shape[2]))
+        taken = np.flatnonzero(of_state >= 0)
+        for members in groups_by_size(of_state[taken]):
+            mine = taken[members]
+            at = of_state[mine[:, 0]]
+            for number, (_, span) in enumerate(self.displacements.spans):
+                some = values[span][:, mine].transpose(1, 0, 2)
+                found[span, at] = (some @ seen[number][mine]).transpose(1, 0, 2)
+        folded = self.displacements.folded(found.reshape(len(values), poses * right.shape[2]))
+        return np.ascontiguousarray(folded.T).reshape(poses, right.shape[2], self.columns)
+
+    def dense(self) -> np.ndarray:
+        """The columns themselves, ndarray (M, rows, K); the observations of each lie side by side."""
+        displacements, jacobian = self.displacements, self.jacobian.transpose(2, 1, 0)
+        found = np.zeros((self.columns, jacobian.shape[1], len(self.state)))
+        entries = zip(displacements.coordinate, displacements.column, displacements.values, strict=True)
+        for coordinate, column, values in entries:
+            found[column] += jacobian[coordinate] * values[self.state]
+        return found.transpose(2, 1, 0)
