@@ -1,5 +1,7 @@
 """Columns in two factors: products as of the columns written out, whatever states, targets and coordinates there are."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -43,7 +45,8 @@ MADE = st.builds(
 @given(MADE)
 def test_written_out_they_are_the_columns_that_effects_make(given_columns):
     columns, laws, sizes = given_columns
-    expected = effect_columns([(Laws(laws), ())], None, columns.jacobian, columns.state) * sizes
+    around = SimpleNamespace(joint_angles=np.zeros((columns.displacements.values.shape[1], 1)))
+    expected = effect_columns([(Laws(laws), ())], around, columns.jacobian, columns.state) * sizes
     np.testing.assert_allclose(columns.dense(), expected, atol=1e-12)
 
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.evidence import Joint
+from elastocal.diagnosis.evidence import Joint, inverses
 from elastocal.diagnosis.refit import mean_square_left
 from elastocal.diagnosis.search import UNLIKELY
 from elastocal.diagnosis.statistics import normal_equations
@@ -161,7 +161,7 @@ def _moments(
     information = equations[np.ix_(chosen, chosen)].copy()
     places = np.arange(declared, len(chosen))
     information[places, places] += deviations**-2.0
-    inverse = np.linalg.inv(information)
+    (inverse,), _ = inverses(information[None])
     covariance, mean = inverse * max(mean_square_left(linearized.problem, model), 1.0), inverse @ equations[chosen, -1]
     # Declared parameters from the orthonormal basis, less what the candidates' columns have in it.
     back = products.into_basis @ np.concatenate([np.eye(declared), -products.projected[:, columns]], axis=1)

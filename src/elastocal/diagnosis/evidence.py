@@ -383,12 +383,22 @@ _MOST_ASCENTS, _NO_GAIN = 30, 1e-9
 _MANY_COLUMNS = 30
 
 
-def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Inverses and log determinants of symmetric positive matrices (T, D, D)."""
+def inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Invert symmetric positive matrices.
+
+    Parameters
+    ----------
+    matrices : ndarray (T, D, D)
+
+    Returns
+    -------
+    inverses : ndarray (T, D, D)
+    log_determinants : ndarray (T,)
+    """
     if matrices.shape[1] < _MANY_COLUMNS:
         factors = np.linalg.cholesky(matrices)
         return np.linalg.inv(matrices), 2.0 * np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-    inverses, log_dets = np.empty_like(matrices), np.empty(len(matrices))
+    found, log_dets = np.empty_like(matrices), np.empty(len(matrices))
     for number, matrix in enumerate(matrices):
         # The transpose is laid out as LAPACK wants it.
         factor, failed = lapack.dpotrf(matrix.T, lower=0, clean=1)
@@ -396,8 +406,8 @@ def _inverses(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             raise np.linalg.LinAlgError("a matrix that is not positive definite")
         log_dets[number] = 2.0 * np.log(np.diag(factor)).sum()
         upper = lapack.dpotri(factor, lower=0, overwrite_c=1)[0]
-        inverses[number] = np.triu(upper) + np.triu(upper, 1).T
-    return inverses, log_dets
+        found[number] = np.triu(upper) + np.triu(upper, 1).T
+    return found, log_dets
 
 
 class Joint:
@@ -423,7 +433,7 @@ class Joint:
         self.starts = np.concatenate([[0], np.cumsum([len(unit.columns) for unit in units])])
         deviations = np.repeat(self.scales, np.diff(self.starts))
         inner = deviations[:, None] * statistics.gram[:, columns[:, None], columns] * deviations + np.eye(len(columns))
-        self.covariance, self.log_det = _inverses(inner)
+        self.covariance, self.log_det = inverses(inner)
         along = deviations * statistics.along[:, columns]
         self.mean = (self.covariance @ along[..., None])[..., 0]
         self.squares = statistics.squares - (along * self.mean).sum(axis=1)

@@ -6,6 +6,7 @@ orders) that differ in their law are variants, of which a model holds one at mos
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -107,8 +108,7 @@ class Prior:
         """
         units = list(units)
         total = sum(unit.log_prior for unit in units)
-        for mechanism in {unit.mechanism for unit in units}:
-            count = sum(unit.mechanism == mechanism for unit in units)
+        for mechanism, count in Counter(unit.mechanism for unit in units).items():
             total += self.log_odds[mechanism] + self.log_counts[mechanism][count]
         return float(total)
 

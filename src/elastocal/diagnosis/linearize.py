@@ -12,7 +12,15 @@ from elastocal.diagnosis import other
 from elastocal.diagnosis.hypotheses import prior_of, units_of
 from elastocal.diagnosis.search import Problem, likely_pose_errors, pose_errors_within_reach
 from elastocal.diagnosis.statistics import products_of, statistics_of
-from elastocal.diagnosis.summed import MOST_HELD, SAMPLE_ROWS, WhiteRows, rows_at_once, summed, triangle_of
+from elastocal.diagnosis.summed import (
+    MOST_HELD,
+    OBSERVATIONS_AT_ONCE,
+    SAMPLE_ROWS,
+    WhiteRows,
+    rows_at_once,
+    summed,
+    triangle_of,
+)
 from elastocal.effects.conditions import at_states, offered
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.factored import Displacements, Factored
@@ -125,7 +133,7 @@ def linearized(
     source = _Source(fitted, observations, around, tested, laws, units, found, values)
     width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
     held = len(observations) * observations.rows * width <= MOST_HELD
-    parts = parts_of(observations, len(observations) if held else rows_at_once(width) // observations.rows)
+    parts = parts_of(observations, len(observations) if held else OBSERVATIONS_AT_ONCE)
     parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
     # Held, one linearisation serves the declared part and the candidates; else the declared part alone takes larger parts.
     larger_parts = parts if held else parts_of(observations, rows_at_once(len(owners) + 60) // observations.rows)
@@ -142,7 +150,8 @@ def linearized(
         grid = grid[pose_errors_within_reach(statistics_of(whole.without_candidates, grid), settings)]
         products: Products | Sums = whole
     else:
-        sample = products_of(source.sample(), deviation, present, still)
+        some = source.sample()
+        sample = summed([some], triangle_of([_flat(some.declared)]), deviation, present, grid)
         grid = grid[likely_pose_errors(statistics_of(sample, grid), units, settings)]
         products = summed(source.blocks(source.lines(parts)), triangle[:-1, :-1], deviation, present, grid)
     statistics = statistics_of(products, grid)

@@ -15,6 +15,7 @@ References
 from __future__ import annotations
 
 from bisect import bisect
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from heapq import nlargest
@@ -257,7 +258,7 @@ class _Searcher:
         if not model:
             self.keep_likely_pose_errors(by_pose_error, total)
         prior, here = self.problem.prior, self.met[model]
-        mechanisms = {units[n].mechanism: sum(units[m].mechanism == units[n].mechanism for m in model) for n in open_units}
+        mechanisms = Counter(units[n].mechanism for n in model)
         best, gained = self.grid.scales[found.argmax(axis=1)], (total + (here - alone)).tolist()
         for number in open_units:
             odds = gained[number] + prior.added(units[number], mechanisms[units[number].mechanism])
@@ -280,17 +281,18 @@ class _Searcher:
             start = np.full(len(model), self.problem.settings.scale_center)
         found = self.evaluated(model, start)
         units, prior = self.problem.units, self.problem.prior
-        odds = found.log_evidence - self.empty.log_evidence + prior.log_odds_of(units[n] for n in model)
+        whole, counts = prior.log_odds_of(units[n] for n in model), Counter(units[n].mechanism for n in model)
+        odds = found.log_evidence - self.empty.log_evidence + whole
         self.met[model], self.sizes[model] = odds, found.scales
         self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
         if odds == max(self.met.values()):
             kept = np.flatnonzero(found.log_pose > _OUT_OF_QUESTION)
             self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
-        for place, _number in enumerate(model):
+        for place, number in enumerate(model):
             smaller = model[:place] + model[place + 1 :]
             if smaller not in self.met:
                 left = found.without[place] - self.empty.log_evidence
-                self.met[smaller] = left + prior.log_odds_of(units[n] for n in smaller)
+                self.met[smaller] = left + whole - prior.added(units[number], counts[units[number].mechanism] - 1)
                 self.sizes[smaller] = np.delete(found.scales, place)
         return self.measured[model]
 

@@ -23,8 +23,9 @@ if TYPE_CHECKING:
 MOST_HELD = 8_000_000
 # Rows of the sample: several for each declared parameter, and enough to see which sizes of the pose error are out of question.
 SAMPLE_ROWS = 6000
-# Values of whitened columns in a block.
+# Values of whitened columns in a block of declared ones, and observations in a block of candidates, which come in factors.
 _BLOCK_VALUES = 1_500_000
+OBSERVATIONS_AT_ONCE = 500
 
 
 class InBasis(Protocol):

@@ -12,8 +12,10 @@ they have in common times the rounding of one, as differences of squares do: 1e-
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -25,9 +27,13 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
 
+# Entries of a coordinate that make a product of their own worth its call.
+_MANY_ENTRIES = 16
+
+
 @dataclass(frozen=True)
 class Displacements:
-    """What columns do to coordinates, entry by entry; entries of one coordinate lie side by side.
+    """What columns do to coordinates, entry by entry; entries of one coordinate lie side by side, those of many first.
 
     Attributes
     ----------
@@ -36,7 +42,6 @@ class Displacements:
     values : ndarray (E, S)
         Displacement of one coordinate by one column, in each state.
     coordinate, column : ndarray of int (E,)
-        The former rising.
     """
 
     columns: int
@@ -61,18 +66,18 @@ class Displacements:
         -------
         Displacements
         """
-        entries = sorted((coordinate, column) for column, law in enumerate(laws) for coordinate in law)
+        count = Counter(coordinate for law in laws for coordinate in law)
+        entries = sorted((-count[coordinate], coordinate, column) for column, law in enumerate(laws) for coordinate in law)
         values = np.empty((len(entries), states))
-        for place, (coordinate, column) in zip(values, entries, strict=True):
+        for place, (_, coordinate, column) in zip(values, entries, strict=True):
             np.multiply(laws[column][coordinate], sizes[column], out=place)
-        return cls(len(laws), values, *np.array(entries, int).reshape(-1, 2).T)
+        return cls(len(laws), values, *np.array(entries, int).reshape(-1, 3).T[1:])
 
     @cached_property
     def spans(self) -> list[tuple[int, slice]]:
         """Coordinates that are displaced, and the entries of each."""
-        used, first = np.unique(self.coordinate, return_index=True)
-        edges = [*first.tolist(), len(self.coordinate)]
-        return [(int(c), slice(*edges[n : n + 2])) for n, c in enumerate(used)]
+        first = np.flatnonzero(np.diff(self.coordinate, prepend=-1)).tolist()
+        return [(int(self.coordinate[a]), slice(a, b)) for a, b in pairwise([*first, len(self.coordinate)])]
 
     @cached_property
     def _fold(self) -> csr_array:
@@ -137,11 +142,15 @@ class Factored:
         pairs = np.ascontiguousarray(self._products_by_state().transpose(0, 2, 1))
         place = np.repeat(np.arange(len(spans)), [span.stop - span.start for _, span in spans])
         found = np.empty((len(values), len(values)))
+        large = sum(span.stop - span.start >= _MANY_ENTRIES for _, span in spans)
         for number, (_, span) in enumerate(spans):
-            # Coordinates from this one on; the others are alike by symmetry.
-            rest = slice(span.start, None)
+            # Coordinates from this one on, for the others are alike: those of many entries one by one, those of few together.
+            for other in range(number, large):
+                beside = spans[other][1]
+                np.matmul(values[span] * pairs[number, other], values[beside].T, out=found[span, beside])
+            rest = slice(spans[max(number, large)][1].start if max(number, large) < len(spans) else len(values), None)
             found[span, rest] = values[span] @ (values[rest] * pairs[number][place[rest]]).T
-            found[rest, span] = found[span, rest].T
+            found[span.start :, span] = found[span, span.start :].T
         return found
 
     def folded_gram(self, gram_of_entries: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,11 +11,12 @@ import numpy as np
 from elastocal.effects import declared_weight
 from elastocal.effects.conditions import Conditions, with_springs, with_total
 from elastocal.fitting.displacement import displaced_coordinates, joint_compliances, mass_corrections, with_springs_of
+from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.prediction import differences, measured_in_base, target_points
 from elastocal.mechanics.motion import motion
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping
 
     from elastocal.effects.protocol import Candidate, Displacing
     from elastocal.fitting.model import Estimate, Model
@@ -38,16 +40,32 @@ class Linearization:
         Measured less predicted, base axes, m and rad.
     coordinate_jacobian : ndarray (M, rows, C)
         Of each target with respect to the coordinates of the sites.
-    sensitivities : ndarray (M, rows, P)
-        With respect to `parameters`.
+    displacements : Displacements
+        What each of the P `parameters` does to the coordinates; nothing by those of targets.
+    target_columns : ndarray (M, rows, Q)
+        Sensitivities to the parameters of targets.
+    of_targets : ndarray of int (Q,)
+        Which parameters these are.
+    state : ndarray of int (M,)
+        State of each observation.
     conditions : Conditions
         Where the robot has yielded to, by this estimate.
     """
 
     residual: np.ndarray
     coordinate_jacobian: np.ndarray
-    sensitivities: np.ndarray
+    displacements: Displacements
+    target_columns: np.ndarray
+    of_targets: np.ndarray
+    state: np.ndarray
     conditions: Conditions
+
+    @cached_property
+    def sensitivities(self) -> np.ndarray:
+        """With respect to `parameters`, ndarray (M, rows, P)."""
+        found = Factored(self.displacements, self.coordinate_jacobian, self.state).dense()
+        found[..., self.of_targets] = self.target_columns
+        return found
 
 
 def linearize(model: Model, estimate: Estimate, observations: Observations, conditions: Conditions) -> Linearization:
@@ -82,29 +100,27 @@ def linearize(model: Model, estimate: Estimate, observations: Observations, cond
         measured_in_base(estimate, observations), position, rotation @ estimate.target_rotation[observations.target]
     )
     jacobian = np.moveaxis(jacobian, -1, 0)
-    columns = []
+    laws: list[Mapping[int, np.ndarray]] = []
     if model.fitted_frames:
-        at_base = jacobian[..., list(model.sites.base)]
         for session in estimate.sessions:
-            in_session = observations.states.session[observations.state] == session
-            columns.append(at_base * in_session[:, None, None])
-    for index, target in enumerate(model.targets):
-        if target.offset_m is None:
-            columns.append(_target_columns(rotation, observations.target == index, rows))
+            in_session = (observations.states.session == session).astype(float)
+            laws += [{coordinate: in_session} for coordinate in model.sites.base]
+    unknown = [index for index, target in enumerate(model.targets) if target.offset_m is None]
+    of_targets = len(laws) + np.arange(rows * len(unknown))
+    target_columns = np.zeros((count, rows, len(of_targets)))
+    for number, index in enumerate(unknown):
+        mask = observations.target == index
+        target_columns[mask, :, number * rows : (number + 1) * rows] = _target_columns(rotation[mask], rows)
+    laws += [{} for _ in of_targets]
     for effect, values, shapes in zip(model.effects, estimate.coefficients, estimate.shapes, strict=True):
-        if effect.effect in _SPRINGS:
-            laws = _spring_laws(effect, model, estimate, around)
-        else:
-            laws = effect.displacement(around, *shapes)
-        columns.append(_columns(laws, jacobian, observations.state))
-        columns.append(_shape_columns(effect, values, shapes, around, jacobian, observations.state))
-    # The observations of each column lie side by side here, too.
-    sensitivities = np.empty((sum(part.shape[2] for part in columns), rows, count))
-    first = 0
-    for part in columns:
-        sensitivities[first : first + part.shape[2]] = part.transpose(2, 1, 0)
-        first += part.shape[2]
-    return Linearization(residual, jacobian, sensitivities.transpose(2, 1, 0), replace(around, motion=moved))
+        laws += (
+            _spring_laws(effect, model, estimate, around) if effect.effect in _SPRINGS else effect.displacement(around, *shapes)
+        )
+        laws += _shape_laws(effect, values, shapes, around)
+    displacements = Displacements.of(laws, np.ones(len(laws)), len(observations.states))
+    return Linearization(
+        residual, jacobian, displacements, target_columns, of_targets, observations.state, replace(around, motion=moved)
+    )
 
 
 def effect_columns(
@@ -129,31 +145,21 @@ def effect_columns(
     ndarray (M, rows, D)
     """
     laws = [law for effect, shapes in effects for law in effect.displacement(conditions, *shapes)]
-    return _columns(laws, coordinate_jacobian, state)
+    displacements = Displacements.of(laws, np.ones(len(laws)), len(conditions.joint_angles))
+    return Factored(displacements, coordinate_jacobian, state).dense()
 
 
-def _columns(laws: Sequence[Mapping[int, np.ndarray]], coordinate_jacobian: np.ndarray, state: np.ndarray) -> np.ndarray:
-    # The observations of each column lie side by side.
-    columns = np.zeros((len(laws), coordinate_jacobian.shape[1], len(state)))
-    jacobian = coordinate_jacobian.transpose(2, 1, 0)
-    for column, law in zip(columns, laws, strict=True):
-        for coordinate, values in law.items():
-            column += jacobian[coordinate] * values[state]
-    return columns.transpose(2, 1, 0)
-
-
-def _target_columns(rotation: np.ndarray, mask: np.ndarray, rows: int) -> np.ndarray:
+def _target_columns(rotation: np.ndarray, rows: int) -> np.ndarray:
     """Shift of a target along the axes of its measuring point and, for poses, its turn about them."""
-    columns = np.zeros((len(mask), rows, rows))
+    columns = np.zeros((len(rotation), rows, rows))
     for first in range(0, rows, 3):
-        columns[mask, first : first + 3, first : first + 3] = rotation[mask]
+        columns[:, first : first + 3, first : first + 3] = rotation
     return columns
 
 
-def _shape_columns(
-    effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions, jacobian: np.ndarray, state: np.ndarray
-) -> np.ndarray:
-    columns = np.zeros((*jacobian.shape[:2], len(shapes)))
+def _shape_laws(
+    effect: Candidate, values: np.ndarray, shapes: np.ndarray, conditions: Conditions
+) -> Iterator[dict[int, np.ndarray]]:
     for number in range(len(shapes)):
         shape = effect.shapes[number]
         step = _SHAPE_STEP * max(abs(shapes[number]), shape.lowest, 0.1 * shape.highest)
@@ -161,9 +167,9 @@ def _shape_columns(
         for sign in (1, -1):
             moved = shapes.copy()
             moved[number] += sign * step
-            sides.append(effect_columns([(effect, moved)], conditions, jacobian, state) @ values)
-        columns[..., number] = (sides[0] - sides[1]) / (2 * step)
-    return columns
+            sides.append(_displaced_by([(effect, values, moved)], conditions))
+        above, below = sides
+        yield {c: (above.get(c, 0.0) - below.get(c, 0.0)) / (2 * step) for c in {*above, *below}}
 
 
 def _spring_laws(spring: Candidate, model: Model, estimate: Estimate, around: Conditions) -> list[dict[int, np.ndarray]]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from elastocal.effects.conditions import at_states, with_springs
 from elastocal.fitting.displacement import conditions, displaced_coordinates, joint_compliances, mass_corrections
+from elastocal.fitting.factored import Factored
 from elastocal.fitting.fit_result import Fit
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import held_at_once, kept_conditions, observations_at_once
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
     from elastocal.fitting.noise import Noise
     from elastocal.fitting.observations import Observations
     from elastocal.fitting.whitening import Scaling, Whitening
+
+
+# Columns for each coordinate from which on products by factors cost less than those of the columns written out.
+_COLUMNS_A_COORDINATE = 4
 
 
 class Parts:
@@ -103,11 +108,16 @@ class Parts:
         for number, (part, (_, seen)) in enumerate(zip(self.parts, self.slices, strict=True)):
             line = self._linearized(number, part) if self.line is None else self.line
             whitener, mine = self.whiteners[number], root[seen]
-            right = whitener.apply(line.residual * mine[:, None]).reshape(-1)
+            right = whitener.apply(line.residual * mine[:, None])
             turned = whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
-            left = turned.apply(line.sensitivities).reshape(len(right), size)
-            gram += left.T @ left
-            along += left.T @ right
+            if size > _COLUMNS_A_COORDINATE * len(line.displacements.spans):
+                part_gram, part_along = _products(line, turned, right)
+                gram += part_gram
+                along += part_along
+            else:
+                left = turned.apply(line.sensitivities).reshape(right.size, size)
+                gram += left.T @ left
+                along += left.T @ right.reshape(-1)
         return gram * np.outer(self.plausible, self.plausible), along * self.plausible
 
     def distance(self) -> np.ndarray:
@@ -178,6 +188,20 @@ class Parts:
     def _whitened(self, residual: np.ndarray) -> list[np.ndarray]:
         pairs = zip(self.whiteners.values(), self.slices, strict=True)
         return [whitener.apply(residual[seen]) for whitener, (_, seen) in pairs]
+
+
+def _products(line: Linearization, turned: Whitening | Scaling, right: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Gram matrix of the whitened sensitivities and their products with the whitened residual, without the sensitivities."""
+    columns = Factored(line.displacements, turned.apply(line.coordinate_jacobian), line.state)
+    beside = np.concatenate([turned.apply(line.target_columns), right[..., None]], axis=2)
+    gram, cross, at = columns.gram(), columns.times(beside), line.of_targets
+    own = np.tensordot(beside, beside, ((0, 1), (0, 1)))
+    gram[:, at] += cross[:, :-1]
+    gram[at] += cross[:, :-1].T
+    gram[np.ix_(at, at)] += own[:-1, :-1]
+    along = cross[:, -1]
+    along[at] += own[:-1, -1]
+    return gram, along
 
 
 def _of_rotation_vectors(residual: np.ndarray) -> np.ndarray:

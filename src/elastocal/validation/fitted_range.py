@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.linalg import blas
 
 from elastocal.campaigns.joint_space import beyond_range
 from elastocal.fitting.displacement import conditions
@@ -170,7 +171,7 @@ def predictive_variances(
 
 def _variances_left_out(wanted: np.ndarray, whitened: np.ndarray, root: np.ndarray, cluster: np.ndarray) -> np.ndarray:
     """Variance (M,) of each position with the measurements of its own pose left out of the fit, by Woodbury's identity."""
-    projected, own = wanted @ root.T, whitened @ root.T
+    projected, own = _through(root, wanted), _through(root, whitened)
     variance = (projected**2).sum(axis=(1, 2))
     order, size = np.argsort(cluster, kind="stable"), np.bincount(cluster)
     start = np.concatenate([[0], np.cumsum(size)[:-1]])
@@ -183,6 +184,13 @@ def _variances_left_out(wanted: np.ndarray, whitened: np.ndarray, root: np.ndarr
         gained = (across * np.linalg.solve(left, across.transpose(0, 2, 1)).transpose(0, 2, 1)).sum(axis=-1)
         variance[members] += gained.reshape(len(members), count, -1).sum(axis=-1)
     return variance
+
+
+def _through(root: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Rows (M, r, P) times the transpose of a lower triangular matrix (P, P), without its zeros."""
+    # Transposes are laid out as BLAS wants them.
+    turned = blas.dtrmm(1.0, root.T, rows.reshape(-1, rows.shape[2]).T, lower=0, trans_a=1)
+    return turned.T.reshape(rows.shape)
 
 
 def _largest(values: np.ndarray, group: np.ndarray) -> np.ndarray:
