@@ -189,6 +189,14 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         legend, plot = (page.query_selector(f"#scatter {part}").bounding_box() for part in (".legend", ".nsewdrag"))
         assert legend["y"] + legend["height"] <= plot["y"]
 
+        # What is fitted and what validates are not thrown together.
+        table = residual_table()
+        for part, held_out in (("fitted", False), ("validation", True)):
+            off = 1e6 * np.column_stack([table[f"before_d{axis}"] for axis in "xyz"])[table["held_out"] == held_out]
+            root = np.sqrt((off**2).sum(axis=1).mean())
+            stated = re.search(rf"before .*?([\d.]+) µm \({part}\)", page.inner_text("#scatter-words"))
+            assert float(stated[1]) == pytest.approx(root, rel=6e-3), part
+
         def drawn(plot):
             return page.evaluate(f"JSON.stringify(document.getElementById('{plot}').data)")
 

@@ -170,15 +170,18 @@ function drawScatter() {
   const sums = [];
   for (const step of chosen(find("step").value)) {
     const values = data[step.name].map(of);
-    const root = Math.sqrt(values.reduce((sum, value) => sum + value * value, 0) / values.length);
-    sums.push(`${step.name} ${root.toPrecision(3)} µm`);
-    for (const [held, suffix, symbol] of [[false, ", fitted", step.symbol], [true, ", validation", "diamond"]]) {
+    const parts = [];
+    for (const [held, suffix, symbol] of [[false, " (fitted)", step.symbol], [true, " (validation)", "diamond"]]) {
       const rows = values.map((_, number) => number).filter((number) => data.held_out[number] === held);
+      if (!rows.length) continue;
+      const root = Math.sqrt(rows.reduce((sum, number) => sum + values[number] ** 2, 0) / rows.length);
+      parts.push(`${root < 1000 ? root.toPrecision(3) : root.toFixed(0)} µm${suffix}`);
       traces.push({
         type: "scatter", mode: "markers", name: step.name + suffix, x: rows.map((n) => against.values[n]),
         y: rows.map((n) => values[n]), marker: { color: step.color, symbol, size: 5, opacity: 0.7 },
       });
     }
+    sums.push(`${step.name} ${parts.join(" and ")}`);
   }
   const axis = { gridcolor: ink.grid, zerolinecolor: ink.ink };
   Plotly.react("scatter", traces, {
@@ -186,7 +189,7 @@ function drawScatter() {
     xaxis: { ...axis, title: { text: `${against.name} (${against.unit})` } },
     yaxis: { ...axis, title: { text: `residual, ${words} (µm)` } },
   }, SETTINGS);
-  find("scatter-words").textContent = `Root mean square, ${words}: ${sums.join(", ")}.`;
+  find("scatter-words").textContent = `Root mean square of what is shown, ${words}: ${sums.join("; ")}.`;
 }
 
 for (const [key, [words]] of Object.entries(COMPONENTS)) find("component").add(new Option(words, key));

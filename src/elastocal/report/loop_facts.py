@@ -58,6 +58,7 @@ def loop_facts(
     """
     faulty = any(effect["family"] == OF_DATA for effect in verdict["effects"])
     # Probabilities are then those from before the measurements.
+    searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     untested = verdict["verdict"] == "not_testable"
     floor = verdict["heldout"]["noise_floor_rms_m"]
     return {
@@ -85,7 +86,7 @@ def loop_facts(
         "experiment": experiment_facts(experiment, verdict.get("next_experiment")),
         "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
         "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
-        "held": held_rows([*verdict["held"], *left_to_priors(parameters)]),
+        "held": held_rows([*(name for name in verdict["held"] if name not in searched), *left_to_priors(parameters)]),
         "untestable": untestable_rows(verdict["untestable"]),
         "others": other_parameters(verdict, parameters),
         "method": method(verdict, descriptions),
