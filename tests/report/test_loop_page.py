@@ -103,6 +103,13 @@ def test_validation_poses_of_another_campaign_are_drawn_too_and_the_rings_are_at
             np.testing.assert_allclose(outline, corners(kuka.chain, joints[[row]])[:, 0], atol=1e-4)
 
 
+def test_where_nothing_was_added_the_page_says_so(kuka):
+    verdict = CAMPAIGNS["adequate"]
+    for found, said in ((True, ""), (False, "Nothing was added to the declared model: after is the same as before.")):
+        page, data = loop_page(facts_of(verdict), verdict, residual_table(found=found), candidate_table(), kuka)
+        assert page["same_sentence"] == said and data["changed"] is found
+
+
 def test_of_many_measurements_some_are_shown_evenly_spread_and_the_page_says_so(kuka, monkeypatch):
     monkeypatch.setattr(module, "_MOST_SHOWN", 11)
     page, data = page_of(kuka)
@@ -189,6 +196,9 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
         legend, plot = (page.query_selector(f"#scatter {part}").bounding_box() for part in (".legend", ".nsewdrag"))
         assert legend["y"] + legend["height"] <= plot["y"]
 
+        # One bar among few is no wall.
+        bars = page.query_selector_all("#causes .bars .point path")
+        assert bars and all(bar.bounding_box()["height"] < 80 for bar in bars)
         # What is fitted and what validates are not thrown together.
         table = residual_table()
         for part, held_out in (("fitted", False), ("validation", True)):

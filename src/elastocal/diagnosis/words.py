@@ -210,7 +210,7 @@ def alternative_words(name: str) -> str:
 
 
 def in_words(text: str) -> str:
-    """A text with every name of the catalogue and every key of a candidate in words.
+    """A text with every name of the catalogue, every key of a candidate and the parameter stated after it in words.
 
     Parameters
     ----------
@@ -224,10 +224,16 @@ def in_words(text: str) -> str:
 
     def worded(found: re.Match[str]) -> str:
         # Names that are common words, such as payload, are meant only as keys or where something is stated of them.
-        plain = "_" not in found["effect"] and not (found["joints"] or found["detail"] or text[found.end() :].startswith(":"))
-        return found.group() if plain else candidate_words(found.group())
+        plain = "_" not in found["effect"] and not (
+            found["joints"] or found["detail"] or text[found.end("key") :].startswith(":")
+        )
+        if plain:
+            return found.group()
+        stated = f": {parameter_words(found['effect'], found['parameter'])} is " if found["parameter"] else ""
+        return candidate_words(found["key"]) + stated
 
-    return re.sub(r"(?<![\w@])" + _KEY.format(names=names) + r"(?!\w)", worded, text)
+    key = r"(?<![\w@])(?P<key>" + _KEY.format(names=names) + r")(?!\w)"
+    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", worded, text)
 
 
 def _where(effect: str, locations: Iterable[tuple[tuple[int, ...], str]]) -> str:

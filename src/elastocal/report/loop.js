@@ -19,7 +19,7 @@ const sheet = () => ({ paper_bgcolor: ink.paper, plot_bgcolor: ink.paper, font: 
 
 // The robot in space.
 const VIEWS = { corner: [1, -1, 0.5], front: [1, 0, 0.1], side: [0, -1, 0.1], above: [0.01, 0, 1] };
-const eye = { x: 1, y: -1, z: 0.5 };
+const camera = { eye: { x: 1, y: -1, z: 0.5 }, center: { x: 0, y: 0, z: 0 } };
 // Plots in space lie above their legend; of the angle under which plotly looks this is the tangent of half.
 const [DOMAIN, HALF_ANGLE] = [{ x: [0, 1], y: [0.07, 1] }, Math.tan(Math.PI / 8)];
 // Numbers of axes stand beside what is drawn.
@@ -77,7 +77,7 @@ function ranges(places) {
   });
 }
 
-// As far away as it takes to see everything from there.
+// As far away as it takes to see everything from there, and at a height that leaves as much room above as below.
 function fit(direction) {
   const [range, size] = [ranges(ends()), Math.hypot(...direction)];
   const towards = direction.map((value) => value / size);
@@ -87,13 +87,21 @@ function fit(direction) {
   const up = [-towards[2] * right[1], towards[2] * right[0], towards[0] * right[1] - towards[1] * right[0]];
   const along = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   const shape = find("robot").clientWidth / (find("robot").clientHeight * (DOMAIN.y[1] - DOMAIN.y[0]));
-  let far = 0;
-  for (const corner of [0, 1, 2, 3, 4, 5, 6, 7]) {
-    const at = range.map(([low, high], k) => (((corner >> k) % 2 ? 1 : -1) * (high - low)) / 2 / longest);
-    const across = Math.max(Math.abs(along(at, right)) / shape, Math.abs(along(at, up)));
-    far = Math.max(far, along(at, towards) + (BESIDE * across) / HALF_ANGLE);
+  const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((corner) =>
+    range.map(([low, high], k) => (((corner >> k) % 2 ? 1 : -1) * (high - low)) / 2 / longest));
+  let [far, height] = [0, 0];
+  // Some rounds: how high the corners are seen depends on how far away they are, and the other way round.
+  for (let round = 0; round < 8; round += 1) {
+    const seen = corners.map((at) => [at[0], at[1], at[2] - height]);
+    far = Math.max(...seen.map((at) => {
+      const across = Math.max(Math.abs(along(at, right)) / shape, Math.abs(along(at, up)));
+      return along(at, towards) + (BESIDE * across) / HALF_ANGLE;
+    }));
+    const ups = seen.map((at) => along(at, up) / (far - along(at, towards)));
+    height += (up[2] * far * (Math.max(...ups) + Math.min(...ups))) / 2;
   }
-  return towards.map((value) => far * value);
+  const [x, y, z] = towards.map((value) => far * value);
+  return { eye: { x, y, z: z + height }, center: { x: 0, y: 0, z: height } };
 }
 
 function drawRobot() {
@@ -106,7 +114,7 @@ function drawRobot() {
   const layout = {
     ...sheet(), margin: { l: 0, r: 0, t: 0, b: 0 }, uirevision: "kept", legend: { orientation: "h", y: 0 },
     scene: {
-      domain: DOMAIN, aspectmode: "manual", camera: { eye: { ...eye } },
+      domain: DOMAIN, aspectmode: "manual", camera: structuredClone(camera),
       aspectratio: { x: spans[0] / longest, y: spans[1] / longest, z: spans[2] / longest },
       ...Object.fromEntries(["x", "y", "z"].map((name, k) => [
         `${name}axis`, { ...axis, range: range[k], nticks: spans[k] < longest / 2 ? 4 : 8, title: { text: `${name} (m)` } },
@@ -116,35 +124,38 @@ function drawRobot() {
   Plotly.react("robot", [robot(), targets(), ...chosen(find("which").value).map(arrows)], layout, SETTINGS);
 }
 
-function look(x, y, z) {
-  Object.assign(eye, { x, y, z });
-  Plotly.relayout("robot", { "scene.camera.eye": { ...eye } });
+function look(at) {
+  Object.assign(camera, at);
+  Plotly.relayout("robot", { "scene.camera": structuredClone(camera) });
 }
 
 function present() {
   // Where the mouse has turned it to.
   const scene = find("robot")._fullLayout && find("robot")._fullLayout.scene;
-  return scene && scene._scene ? scene._scene.getCamera().eye : eye;
+  return scene && scene._scene ? scene._scene.getCamera() : camera;
 }
 
 document.querySelectorAll("[data-view]").forEach((button) =>
-  button.addEventListener("click", () => look(...fit(VIEWS[button.dataset.view]))));
+  button.addEventListener("click", () => look(fit(VIEWS[button.dataset.view]))));
 document.querySelectorAll("[data-turn]").forEach((button) =>
   button.addEventListener("click", () => {
-    const [at, angle] = [present(), Number(button.dataset.turn)];
+    const [{ eye, center }, angle] = [present(), Number(button.dataset.turn)];
     const [c, s] = [Math.cos(angle), Math.sin(angle)];
-    look(c * at.x - s * at.y, s * at.x + c * at.y, at.z);
+    const [x, y] = [eye.x - center.x, eye.y - center.y];
+    look({ eye: { x: center.x + c * x - s * y, y: center.y + s * x + c * y, z: eye.z }, center });
   }));
 document.querySelectorAll("[data-zoom]").forEach((button) =>
   button.addEventListener("click", () => {
-    const [at, by] = [present(), Number(button.dataset.zoom)];
-    look(by * at.x, by * at.y, by * at.z);
+    const [{ eye, center }, by] = [present(), Number(button.dataset.zoom)];
+    const nearer = (name) => center[name] + by * (eye[name] - center[name]);
+    look({ eye: { x: nearer("x"), y: nearer("y"), z: nearer("z") }, center });
   }));
 
 // Probabilities of hypotheses.
 function drawCauses() {
   if (!data.hypotheses.length) return;
   const rows = data.hypotheses.slice().reverse();
+  find("causes").style.height = `${70 + 75 * rows.length}px`;
   // A number stays with its joint.
   const wrapped = (text) => text.replace(/ (?=\d)/g, "\u00a0").replace(/(.{1,34})( |$)/g, "$1<br>").replace(/<br>$/, "");
   Plotly.react("causes", [{
@@ -197,7 +208,9 @@ data.against.forEach((entry, number) => find("against").add(new Option(entry.nam
 find("pose").max = data.outlines.length - 1;
 find("pose").value = 0;
 find("factor").value = 50;
-if (data.outlines.length) [eye.x, eye.y, eye.z] = fit(VIEWS.corner);
+// Where nothing was added one of two equal pictures is enough.
+if (!data.changed) for (const id of ["which", "step"]) find(id).value = "before";
+if (data.outlines.length) Object.assign(camera, fit(VIEWS.corner));
 for (const id of ["which", "factor", "pose"]) find(id).addEventListener("input", drawRobot);
 for (const id of ["component", "against", "step"]) find(id).addEventListener("input", drawScatter);
 function drawAll() {

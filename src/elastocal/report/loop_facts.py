@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from elastocal.diagnosis.words import in_words
@@ -20,7 +21,7 @@ from elastocal.report.loop_experiment import experiment_facts
 from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
 from elastocal.report.loop_method import method, setting_rows, untestable_rows
 from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
-from elastocal.report.wording import as_sentence, length
+from elastocal.report.wording import as_sentence, length, minus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,7 +71,7 @@ def loop_facts(
         "sentences": sentences(verdict),
         "probabilities": "" if faulty or untested else probability_sentence(verdict["probabilities"]),
         "now": what_to_do(verdict, experiment),
-        "warnings": [] if faulty else [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
+        "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
@@ -93,3 +94,8 @@ def loop_facts(
         "settings": setting_rows(verdict["settings"]),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
+
+
+def _with_minus(text: str) -> str:
+    """A sentence whose numbers have a true minus sign."""
+    return re.sub(r"(?<= )-(?=\d)", minus("-"), text)

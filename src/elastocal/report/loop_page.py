@@ -104,10 +104,12 @@ def loop_page(
         "targets": [_targets(some, np.flatnonzero(of_pose.ravel() == place)) for place in places],
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
         "hypotheses": hypotheses,
+        "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
     page = {name: facts[name] for name in _FACTS}
     page |= {"hypotheses": hypotheses, "candidates": _candidates(candidates), "effects": facts["effects"]}
     page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
+    page["same_sentence"] = "" if data["changed"] else "Nothing was added to the declared model: after is the same as before."
     page["shown_sentence"] = (
         "" if len(shown) == count else f"{grouped(len(shown))} of {grouped(count)} measurements are shown, evenly spread."
     )
