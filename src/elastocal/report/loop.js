@@ -160,7 +160,7 @@ function drawCauses() {
   const wrapped = (text) => text.replace(/ (?=\d)/g, "\u00a0").replace(/(.{1,34})( |$)/g, "$1<br>").replace(/<br>$/, "");
   Plotly.react("causes", [{
     type: "bar", orientation: "h", x: rows.map((row) => 100 * row.probability), y: rows.map((row) => wrapped(row.name)),
-    text: rows.map((row) => row.words), textposition: "auto", textangle: 0, marker: { color: AFTER.color }, hoverinfo: "skip",
+    text: rows.map((row) => row.words), textposition: "auto", textangle: 0, insidetextfont: { color: ink.paper }, marker: { color: AFTER.color }, hoverinfo: "skip",
   }], {
     ...sheet(), margin: { l: 10, r: 10, t: 10, b: 40 },
     xaxis: { title: { text: "posterior probability (%)" }, range: [0, 105], gridcolor: ink.grid },
@@ -200,7 +200,7 @@ function drawScatter() {
     xaxis: { ...axis, title: { text: `${against.name} (${against.unit})` } },
     yaxis: { ...axis, title: { text: `residual, ${words} (µm)` } },
   }, SETTINGS);
-  find("scatter-words").textContent = `Root mean square of what is shown, ${words}: ${sums.join("; ")}.`;
+  find("scatter-words").textContent = `Root mean square of the single measurements shown, ${words}: ${sums.join("; ")}.`;
 }
 
 for (const [key, [words]] of Object.entries(COMPONENTS)) find("component").add(new Option(words, key));
