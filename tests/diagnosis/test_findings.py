@@ -71,6 +71,18 @@ def test_parameters_have_their_values_errors_and_priors(found):
     assert entry["value"] == pytest.approx(3.1e-4) and entry["std_error"] == 4e-5
 
 
+def test_what_a_search_has_chosen_is_marked_as_such(kuka):
+    campaign = planted(kuka, {}, seed=1)
+    step = campaign.candidates["setup_step"]
+    model, start = campaign.declared.model.with_effects([step]), campaign.declared.estimate.with_effects([step])
+    count = len(campaign.declared.parameters) + len(step.parameters) + len(step.shapes)
+    fitted = replace(
+        campaign.declared, model=model, estimate=start, covariance=np.eye(count), held=np.arange(count) == count - 1
+    )
+    entries = parameter_entries(step, fitted, Averaged({}, {}))
+    assert [entry.get("shape", False) for entry in entries] == [False] * 6 + [True] and entries[-1]["name"] == "setup_step when"
+
+
 def declared_springs(fitted, compliance):
     """The same fit of a campaign that takes the compliances from the robot file."""
     kept = [n for n, effect in enumerate(fitted.model.effects) if effect.effect != "joint_compliance"]

@@ -204,17 +204,19 @@ def test_a_maximum_that_grows_is_a_warning(made):
     wrong = spoilt(fitted_of(steps, "effect"), -2 * OFFSET)
     found = judged([*steps[:2], Step("+ joint_offset", "effect", wrong)], case, held_out)
     assert found.document["heldout"]["after"]["max_m"] > found.document["heldout"]["before"]["max_m"]
-    grown = [warning for warning in found.document["warnings"] if warning.startswith("the held-out max grew from ")]
+    grown = [
+        warning for warning in found.document["warnings"] if warning.startswith("the largest error of the validation poses ")
+    ]
     figures = [1e3 * found.document["heldout"][stage]["max_m"] for stage in ("before", "after")]
-    assert grown == [f"the held-out max grew from {figures[0]:.3f} to {figures[1]:.3f} mm"]
-    assert "the step '+ joint_offset' raised the held-out RMS" in found.document["warnings"]
+    assert grown == [f"the largest error of the validation poses grew from {figures[0]:.3f} to {figures[1]:.3f} mm"]
+    assert "the step '+ joint_offset' raised the RMS error of the validation poses" in found.document["warnings"]
 
 
 def test_one_step_of_several_that_harms_is_named(made):
     case, held_out, steps = made
     worse = Step("+ other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))
     found = judged([*steps[:3], worse], case, held_out)
-    assert "the step '+ other' raised the held-out RMS" in found.document["warnings"]
+    assert "the step '+ other' raised the RMS error of the validation poses" in found.document["warnings"]
     assert not any("'+ joint_offset'" in warning for warning in found.document["warnings"])
 
 

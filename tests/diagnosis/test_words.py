@@ -12,6 +12,7 @@ from elastocal.diagnosis.words import (
     hypotheses_words,
     hypothesis_words,
     in_words,
+    parameter_words,
     physical_name,
 )
 from elastocal.effects.catalogue import effects
@@ -44,6 +45,27 @@ def test_an_effect_without_words_falls_back_on_its_name():
 )
 def test_locations_are_gathered(effect, locations, expected):
     assert effect_words(effect, locations).endswith(expected)
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "expected"),
+    [
+        ("setup_step", "dx", "shift along x"),
+        ("frame 0", "rz", "rotation about z"),
+        ("setup_step", "when", "share of the measurements before it"),
+        ("transmission_harmonic", "cos_12q", "cos(12q)"),
+        ("bearing_runout", "radial_x_sin_1q", "radial x sin(q)"),
+        ("joint_dependent_stiffness", "cos_q", "cos(q)"),
+        ("motor_eccentricity", "cos_1_motor", "cos(motor angle)"),
+        ("motor_eccentricity", "sin_2_motor", "sin(2 × motor angle)"),
+        ("transmission_ratio", "per_q4", "per movement of joint 4"),
+        ("link_weight", "compliance_times_moment_z_of_link_6", "compliance times first moment z of link 6"),
+        ("link_elasticity", "bending_1_over_EI", "bending 1/(EI)"),
+        ("lost_motion", "half_play", "half play"),
+    ],
+)
+def test_parameters_are_named_as_an_engineer_names_them(effect, name, expected):
+    assert parameter_words(effect, name) == expected
 
 
 def test_locations_are_read_as_findings_write_them():
@@ -95,4 +117,6 @@ def test_hypotheses_that_hold_the_first_are_told_by_what_they_add():
 def test_keys_in_a_sentence_become_words_and_common_words_stay():
     said = in_words("link_weight@2: mass is 4 kg, beyond the rated payload of 3 kg; the step '+ joint_offset' raised it")
     assert said == "gravity sag of joint 2: mass is 4 kg, beyond the rated payload of 3 kg; the step '+ zero offset' raised it"
-    assert in_words("payload: mass is -3 kg").startswith("weight of an undeclared payload: mass")
+    assert in_words("payload: mass is -3 kg") == "weight of an undeclared payload: mass is -3 kg"
+    said = in_words("transmission_ratio@3: per_q3 is -0.0042 rad/rad, more than 3 times what such an effect reaches")
+    assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")

@@ -18,6 +18,6 @@ def test_what_was_measured_is_told_apart_for_fitted_and_held_out_poses():
 
 def test_a_report_says_of_which_robot_it_is_when_it_was_measured_and_by_which_version():
     assert made({"serial_number": "4711", "measured_on": "2026-11-20"}) == (
-        f"serial number 4711, measured on 2026-11-20, by elastocal {__version__}"
+        f"Serial number 4711, measured on 2026-11-20, report by elastocal {__version__}"
     )
-    assert made({}) == f"by elastocal {__version__}"
+    assert made({}) == f"Report by elastocal {__version__}"

@@ -8,7 +8,7 @@ from elastocal.report.loop_parameters import held_rows
 
 def test_held_parameters_are_gathered_by_owner():
     rows = held_rows(["joint_offset@1 offset", "link_geometry@1 dz", "link_geometry@1 ry"])
-    assert rows == [["Zero offset of joint 1", "offset"], ["Geometric error of link 1", "dz, ry"]]
+    assert rows == [["Zero offset of joint 1", "offset"], ["Geometric error of link 1", "shift along z, rotation about y"]]
 
 
 def test_what_only_the_prior_determines_is_listed_as_not_identified():

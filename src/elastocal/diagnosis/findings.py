@@ -12,6 +12,7 @@ from elastocal.diagnosis.verdict import location_probabilities
 from elastocal.diagnosis.words import part_of
 from elastocal.effects import payload
 from elastocal.effects.full_load import lever_m
+from elastocal.effects.protocol import Shape
 from elastocal.fitting.linearization import effect_columns
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from elastocal.diagnosis.averaging import Averaged
     from elastocal.diagnosis.search import Posterior, Problem
     from elastocal.diagnosis.verdict import Conclusion
-    from elastocal.effects.protocol import Candidate, Parameter, Shape
+    from elastocal.effects.protocol import Candidate, Parameter
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Model
     from elastocal.fitting.observations import Observations
@@ -175,6 +176,8 @@ def parameter_entries(member: Candidate, final: Fit, averages: Averaged) -> list
             "prior_std": getattr(parameter, "prior_std", None),
             "held": bool(final.held[index]),
         }
+        # Where a shape has no slope, such as the row of a step, a search has chosen it.
+        | ({"shape": True} if isinstance(parameter, Shape) else {})
         for parameter, value, index in zip(unknowns, values, mine, strict=True)
     ]
     as_masses = final.model.identifies_compliance or member.family != "gravity"

@@ -20,6 +20,19 @@ RELATED = "a related mechanism"
 _KEY = r"(?P<effect>{names})(?:@(?P<joints>\d+(?:\+\d+)*))?(?:\[(?P<detail>[^\]]*)\])?"
 _ANY_KEY = _KEY.format(names=r"[^@\[]+") + "$"
 _LOCATION = re.compile(r"^(?:(?P<kind>joint|link)s? (?P<numbers>\d+(?: and \d+)*))? ?(?P<detail>.*)$")
+# What names of parameters are short for.
+_PARAMETER_WORDS = (
+    (r"^d([xyz])$", r"shift along \1"),
+    (r"^r([xyz])$", r"rotation about \1"),
+    (r"\b(cos|sin) (\d+|k)q\b", r"\1(\2q)"),
+    (r"\b(cos|sin) q\b", r"\1(q)"),
+    (r"\b(cos|sin) (\d+) motor\b", r"\1(\2 × motor angle)"),
+    (r"\(1q\)", "(q)"),
+    (r"\(1 × motor angle\)", "(motor angle)"),
+    (r"\bper q(\d+)\b", r"per movement of joint \1"),
+    (r"\bmoment\b", "first moment"),
+    (r"\b1 over ([EG])([IJ])\b", r"1/(\1\2)"),
+)
 # Locations that have no joint: what stands there in the place of one.
 _PARTS = ("column", "base")
 # Bands of orders, variants and the like are given for as many locations; of more only their joints.
@@ -43,6 +56,25 @@ def physical_name(effect: str) -> str:
 def detail_words(effect: str, detail: str) -> str:
     """Which variant of an effect, in words where its module has some."""
     return getattr(effects().get(effect), "DETAIL_WORDS", {}).get(detail, detail)
+
+
+def parameter_words(effect: str, name: str) -> str:
+    """A parameter of an effect as an engineer would call it: shift along x for dx, cos(2q) for cos_2q.
+
+    Parameters
+    ----------
+    effect : str
+        By its name in the catalogue; what is not there, such as a frame, has no words of its own.
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    text = getattr(effects().get(effect), "PARAMETER_WORDS", {}).get(name, name.replace("_", " "))
+    for pattern, instead in _PARAMETER_WORDS:
+        text = re.sub(pattern, instead, text)
+    return text
 
 
 def part_of(effect: str) -> str:
@@ -178,7 +210,7 @@ def alternative_words(name: str) -> str:
 
 
 def in_words(text: str) -> str:
-    """A text with every name of the catalogue and every key of a candidate in words.
+    """A text with every name of the catalogue, every key of a candidate and the parameter stated after it in words.
 
     Parameters
     ----------
@@ -192,10 +224,16 @@ def in_words(text: str) -> str:
 
     def worded(found: re.Match[str]) -> str:
         # Names that are common words, such as payload, are meant only as keys or where something is stated of them.
-        plain = "_" not in found["effect"] and not (found["joints"] or found["detail"] or text[found.end() :].startswith(":"))
-        return found.group() if plain else candidate_words(found.group())
+        plain = "_" not in found["effect"] and not (
+            found["joints"] or found["detail"] or text[found.end("key") :].startswith(":")
+        )
+        if plain:
+            return found.group()
+        stated = f": {parameter_words(found['effect'], found['parameter'])} is " if found["parameter"] else ""
+        return candidate_words(found["key"]) + stated
 
-    return re.sub(r"(?<![\w@])" + _KEY.format(names=names) + r"(?!\w)", worded, text)
+    key = r"(?<![\w@])(?P<key>" + _KEY.format(names=names) + r")(?!\w)"
+    return re.sub(key + r"(?:: (?P<parameter>\w+) is )?", worded, text)
 
 
 def _where(effect: str, locations: Iterable[tuple[tuple[int, ...], str]]) -> str:

@@ -31,7 +31,7 @@ NAME, FAMILY = "link_weight", "gravity"
 MOVES_ROBOT = True
 WORDS = "gravity sag"
 _OFF_THE_LINE, _ALL_LINKS = "off the line", "all links"
-DETAIL_WORDS = {_OFF_THE_LINE: "centre off the line"}
+DETAIL_WORDS = {_OFF_THE_LINE: "centres of mass off the links' axes"}
 _LINKS = 2
 # Some 200 kg on a joint of 1 urad/(N m), and their centre 0.2 m off the line of the link. Of the arm, where it is known what it
 # may carry, which is about a sixth of its own mass, a quarter of that at the end of a link.

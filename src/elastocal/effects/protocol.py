@@ -4,8 +4,8 @@ An effect is a module of this package with
 
 - ``NAME``, by which keys and tables call it, and ``FAMILY``, the kind of its physics, such as elastic or gearbox;
 - ``WORDS``, its physical name in words that precede "of joint 2", or stand alone where it has no joint;
-  ``DETAIL_WORDS``, if the detail of a candidate alone says too little; ``PART = "link"``, if its joints stand for the links
-  behind them;
+  ``DETAIL_WORDS`` and ``PARAMETER_WORDS``, if the detail of a candidate or the name of a parameter alone says too little;
+  ``PART = "link"``, if its joints stand for the links behind them;
 - ``MOVES_ROBOT``, whether it moves the robot, so that its tasks feel it, or only what was measured of it: instruments, targets,
   the set-up;
 - ``candidates(sites)``, which lists where on this robot the effect can act.

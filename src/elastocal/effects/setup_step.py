@@ -21,6 +21,7 @@ NAME, FAMILY = "setup_step", "drift"
 # Tracker and foot step alike in the measurements, and a task counts from where the foot stands.
 MOVES_ROBOT = False
 WORDS = "shift of the set-up between rows"
+PARAMETER_WORDS = {"when": "share of the measurements before it"}
 _PARAMETERS = (
     *(Parameter(f"d{axis}", "m", 5e-4) for axis in "xyz"),
     *(Parameter(f"r{axis}", "rad", 2e-4) for axis in "xyz"),

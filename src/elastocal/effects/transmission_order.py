@@ -27,6 +27,7 @@ NAME, FAMILY = "transmission_order", "transmission"
 MOVES_ROBOT = True
 WORDS = "non-integer gear transmission error"
 _HIGHEST = 18
+DETAIL_WORDS = {f"order {above}-{above + 1}": f"order between {above} and {above + 1}" for above in range(1, _HIGHEST)}
 # Nearer to an integer than this an order is not distinguishable from it.
 _MARGIN = 0.25
 _SAMPLES_PER_PERIOD = 4

@@ -23,6 +23,7 @@ NAME, FAMILY = "transmission_ratio", "transmission"
 MOVES_ROBOT = True
 WORDS = "gear ratio or coupling error"
 _WRIST = 3
+DETAIL_WORDS = {f"from {number}": f"coupling from joint {number} alone" for number in range(1, 10)}
 
 
 def candidates(sites: Sites) -> list[Candidate]:

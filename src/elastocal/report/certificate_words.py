@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from elastocal.diagnosis.words import candidate_words, listed, physical_name
+from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
+from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import TITLES
-from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled, words
+from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -225,7 +226,8 @@ def _change(change: Mapping[str, Any]) -> list[str]:
             (change["after"] - change["before"], change["std_error"]),
         )
     ]
-    return [f"{capital(where)}: {words(change['name'])}", *numbers, plain(change["p_value"], 2)]
+    what = parameter_words(effect_of(change["owner"]), change["name"])
+    return [f"{capital(where)}: {what}", *numbers, plain(change["p_value"], 2)]
 
 
 def _with_interval(step: Mapping[str, Any], metric: str) -> str:

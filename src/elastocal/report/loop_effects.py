@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from elastocal.diagnosis.words import alternative_words, listed, physical_name
+from elastocal.diagnosis.words import alternative_words, listed, parameter_words, physical_name
 from elastocal.effects.catalogue import effects
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import LEAST_SHOWN, MOST_NAMES, OF_DATA, location_words
@@ -37,7 +37,7 @@ _MOST_PARAMETERS, _SHOWN_PARAMETERS = 16, 10
 
 def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
     """Facts of one effect or fault of the data."""
-    known = [entry for entry in effect["parameters"] if not entry.get("held")]
+    known = [entry for entry in effect["parameters"] if not entry.get("held") or entry.get("shape")]
     rest = ""
     shown = known
     if len(known) > _MOST_PARAMETERS:
@@ -47,6 +47,9 @@ def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
             "steps.parquet has them all."
         )
     members = effect["members"]
+    rows = [_parameter_row(entry, members) for entry in shown]
+    if any("q)" in row[0] for row in rows):
+        rest = f"{rest} In these, q is the angle of the joint.".strip()
     held = len(effect["parameters"]) - len(known)
     gain, of_data = effect["heldout_gain"], effect["family"] == OF_DATA
     locations = effect["locations"]
@@ -63,7 +66,7 @@ def effect_facts(effect: Mapping[str, Any]) -> dict[str, Any]:
         ]
         if len(locations) > 1
         else [],
-        "parameters": [_parameter_row(entry, members) for entry in shown],
+        "parameters": rows,
         "with_prior": any(entry.get("prior_std") for entry in shown),
         "rest": rest,
         "held": f"{counted(held, 'of its parameters', 'of its parameters')} cannot be identified from these measurements."
@@ -102,7 +105,7 @@ def _of_data_joints(effect: Mapping[str, Any]) -> str:
 
 
 def _gain(gain: float) -> str:
-    return f"lowers the held-out RMS by {100 * gain:.0f} %" if gain >= 0 else f"raises the held-out RMS by {-100 * gain:.0f} %"
+    return f"{'lowers' if gain >= 0 else 'raises'} the RMS error of the validation poses by {100 * abs(gain):.0f} %"
 
 
 def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str]:
@@ -110,7 +113,7 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     member = max((key for key in members if entry["name"].startswith(f"{key} ")), key=len, default=None)
     # What belongs to an effect as a whole, such as its largest sag, is no member's; faults of the data have none.
     owner = member or (effect_of(members[0]) if members else "")
-    name = words(entry["name"].removeprefix(f"{owner} "))
+    name = parameter_words(effect_of(owner), entry["name"].removeprefix(f"{owner} ")) if owner else words(entry["name"])
     where = f"{members_words([member])}: " if member and len(members) > 1 else ""
     row = [where + name, *scaled(entry["value"], entry["std_error"], entry["unit"])]
     if entry["unit"] == "–" and float(entry["value"]).is_integer():
@@ -118,7 +121,8 @@ def _parameter_row(entry: Mapping[str, Any], members: Sequence[str]) -> list[str
     prior = entry.get("prior_std")
     if prior and mostly_prior(entry["std_error"], prior):
         return [*row, "mostly the prior"]
-    return [*row, "measurements" if entry["std_error"] else ""]
+    searched = "the best of those tried" if entry.get("shape") else ""
+    return [*row, "measurements" if entry["std_error"] else searched]
 
 
 def _distance_from_zero(entry: Mapping[str, Any]) -> float:

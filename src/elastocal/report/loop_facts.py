@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from elastocal.diagnosis.words import in_words
@@ -20,7 +21,7 @@ from elastocal.report.loop_experiment import experiment_facts
 from elastocal.report.loop_measurements import NOISE_SOURCES, made, measured, misfit_sentence, noise_rows
 from elastocal.report.loop_method import method, setting_rows, untestable_rows
 from elastocal.report.loop_parameters import compliance_rows, held_rows, left_to_priors, other_parameters
-from elastocal.report.wording import as_sentence, length
+from elastocal.report.wording import as_sentence, length, minus
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -58,6 +59,7 @@ def loop_facts(
     """
     faulty = any(effect["family"] == OF_DATA for effect in verdict["effects"])
     # Probabilities are then those from before the measurements.
+    searched = {entry["name"] for effect in verdict["effects"] for entry in effect["parameters"] if entry.get("shape")}
     untested = verdict["verdict"] == "not_testable"
     floor = verdict["heldout"]["noise_floor_rms_m"]
     return {
@@ -69,7 +71,7 @@ def loop_facts(
         "sentences": sentences(verdict),
         "probabilities": "" if faulty or untested else probability_sentence(verdict["probabilities"]),
         "now": what_to_do(verdict, experiment),
-        "warnings": [] if faulty else [as_sentence(in_words(warning)) for warning in verdict["warnings"]],
+        "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
@@ -85,10 +87,15 @@ def loop_facts(
         "experiment": experiment_facts(experiment, verdict.get("next_experiment")),
         "compliances": compliance_rows(verdict["compliance_urad_per_Nm"]),
         "compliances_identified": any(verdict["compliance_urad_per_Nm"]["std_error"]),
-        "held": held_rows([*verdict["held"], *left_to_priors(parameters)]),
+        "held": held_rows([*(name for name in verdict["held"] if name not in searched), *left_to_priors(parameters)]),
         "untestable": untestable_rows(verdict["untestable"]),
         "others": other_parameters(verdict, parameters),
         "method": method(verdict, descriptions),
         "settings": setting_rows(verdict["settings"]),
         "found": [effect["name"] for effect in verdict["effects"]],
     }
+
+
+def _with_minus(text: str) -> str:
+    """A sentence whose numbers have a true minus sign."""
+    return re.sub(r"(?<= )-(?=\d)", minus("-"), text)

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal import __version__
 from elastocal.diagnosis.words import listed
-from elastocal.report.wording import MICRO, counted, grouped, length, percent, plain
+from elastocal.report.wording import MICRO, capital, counted, grouped, length, percent, plain
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -35,7 +35,8 @@ def made(campaign: Mapping[str, Any]) -> str:
     str
     """
     stated = {"serial number ": campaign.get("serial_number"), "measured on ": campaign.get("measured_on")}
-    return ", ".join([*(name + value for name, value in stated.items() if value), f"by elastocal {__version__}"])
+    parts = [*(name + value for name, value in stated.items() if value), f"report by elastocal {__version__}"]
+    return capital(", ".join(parts))
 
 
 def measured(table: Mapping[str, np.ndarray], descriptions: Mapping[str, Any]) -> list[list[str]]:

@@ -83,8 +83,11 @@ def loop_page(
     position = np.column_stack([some[name] for name in "xyz"])
     off = {step: MICRO * np.column_stack([some[f"{step}_d{axis}"] for axis in "xyz"]) for step in ("before", "after")}
     angles = np.column_stack([some[f"q{joint}"] for joint in range(1, robot.joints + 1)])
-    first = np.unique(np.column_stack([some["session"], some["pose"]]), axis=0, return_index=True)[1]
-    drawn = first[_spread(len(first), _POSES)]
+    # Validation poses of another campaign have numbers of their own.
+    pose = np.column_stack([some["held_out"], some["session"], some["pose"]])
+    first, of_pose = np.unique(pose, axis=0, return_index=True, return_inverse=True)[1:]
+    places = np.argsort(first)[_spread(len(first), _POSES)]
+    drawn = first[places]
     sets = (verdict["probabilities"] or {}).get("sets", []) if facts["probabilities"] else []
     hypotheses = [
         {"name": capital(name), "probability": entry["probability"], "words": probability_words(entry["probability"])}
@@ -97,13 +100,16 @@ def loop_page(
         "held_out": some["held_out"].astype(bool).tolist(),
         "against": _against(some, angles, robot),
         "outlines": corners(robot.chain, angles[drawn]).swapaxes(0, 1).round(4).tolist(),
-        "poses": [f"{some['pose'][row]}" for row in drawn],
+        "poses": [f"{some['pose'][row]}" + (", validation" if some["held_out"][row] else "") for row in drawn],
+        "targets": [_targets(some, np.flatnonzero(of_pose.ravel() == place)) for place in places],
         "usual_factor": float(_ARROW * np.ptp(position, axis=0).max() / max(middle, 1e-9)),
         "hypotheses": hypotheses,
+        "changed": not np.allclose(off["before"], off["after"], rtol=0, atol=0.01),
     }
     page = {name: facts[name] for name in _FACTS}
     page |= {"hypotheses": hypotheses, "candidates": _candidates(candidates), "effects": facts["effects"]}
     page["compliances"] = facts["compliances"] if facts["compliances_identified"] else []
+    page["same_sentence"] = "" if data["changed"] else "Nothing was added to the declared model: after is the same as before."
     page["shown_sentence"] = (
         "" if len(shown) == count else f"{grouped(len(shown))} of {grouped(count)} measurements are shown, evenly spread."
     )
@@ -149,6 +155,11 @@ def _candidates(table: Mapping[str, np.ndarray]) -> list[dict[str, str]]:
         for key in np.argsort(-best, kind="stable")[:_LEADING]
         if np.isfinite(best[key])
     ]
+
+
+def _targets(some: Mapping[str, np.ndarray], rows: np.ndarray) -> list[int]:
+    """Of some rows the first of each target."""
+    return [int(row) for row in rows[np.unique(some["target"][rows], return_index=True)[1]]]
 
 
 def _spread(count: int, most: int) -> np.ndarray:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, overload
 
 import numpy as np
 
-from elastocal.diagnosis.words import candidate_words, listed
-from elastocal.report.wording import capital, scaled, words
+from elastocal.diagnosis.words import candidate_words, listed, parameter_words
+from elastocal.effects.protocol import effect_of
+from elastocal.report.wording import capital, scaled
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -59,7 +60,7 @@ def other_parameters(verdict: Mapping[str, Any], parameters: Mapping[str, np.nda
         kind = owner.split(" ")[0] if owner.startswith(("frame ", "target ")) else "declared"
         counts[kind] += 1
         if kind == "declared":
-            rows.append([capital(candidate_words(owner)), words(name), *scaled(value, error, unit)])
+            rows.append([capital(candidate_words(owner)), parameter_words(effect_of(owner), name), *scaled(value, error, unit)])
     placed = counts["frame"] + counts["target"]
     return {
         "rows": rows[:_MOST_OTHERS],
@@ -73,7 +74,7 @@ def held_rows(held: Iterable[str]) -> list[list[str]]:
     owners: dict[str, list[str]] = {}
     for name in held:
         owner, parameter = name.rsplit(" ", 1)
-        owners.setdefault(owner, []).append(words(parameter))
+        owners.setdefault(owner, []).append(parameter_words(effect_of(owner), parameter))
     return [[capital(candidate_words(owner)), ", ".join(names)] for owner, names in owners.items()]
 
 
