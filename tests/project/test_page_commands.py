@@ -67,6 +67,11 @@ ELSEWHERE = {
         "sha256sum",
     ),
     "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
+    "snakemake -j2 store --config store=s3://BUCKET/FOLDER": ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),
+    "python -m zipfile -e reports/sources.zip .": (
+        "tests/workflow/test_store.py",
+        '("-m", "zipfile", "-e", "reports/sources.zip", ".")',
+    ),
     "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
     "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
