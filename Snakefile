@@ -32,6 +32,7 @@ include: "workflow/rules/league.smk"
 include: "workflow/rules/signatures.smk"
 include: "workflow/rules/audit.smk"
 include: "workflow/rules/crate.smk"
+include: "workflow/rules/store.smk"
 
 
 watch_sources()

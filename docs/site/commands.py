@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+
+import typer.main
+
+from elastocal.command.main import app
 
 HEAD = """# Commands
 
@@ -19,4 +24,17 @@ def page() -> str:
     """
     called = [sys.executable, "-m", "typer", "elastocal.command.main", "utils", "docs", "--name", "elastocal"]
     written = subprocess.run(called, capture_output=True, text=True, check=True).stdout
-    return HEAD + written.replace("\n# ", "\n## ").removeprefix("# `elastocal`\n")
+    return HEAD + _with_whole_summaries(written).replace("\n# ", "\n## ").removeprefix("# `elastocal`\n")
+
+
+def _with_whole_summaries(written: str) -> str:
+    """The lists of commands with the first sentence of each, which typer cuts off to fit a terminal."""
+    commands = [typer.main.get_command(app)]
+    for command in commands:
+        commands += getattr(command, "commands", {}).values()
+    for command in commands[1:]:
+        summary = " ".join((command.help or "").partition("\n\n")[0].split())
+        written = re.sub(
+            rf"^\* `{command.name}`: .*\.\.\.$", lambda _, c=command.name, s=summary: f"* `{c}`: {s}", written, flags=re.M
+        )
+    return written

@@ -40,7 +40,7 @@ MinJobAge=600
 ReturnToService=2
 SlurmdParameters=config_overrides
 NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={megabytes} State=UNKNOWN
-PartitionName=tests Nodes={host} Default=YES MaxTime=60 DefMemPerCPU=500 State=UP
+PartitionName=tests Nodes={host} Default=YES MaxTime=1440 DefMemPerCPU=500 State=UP
 """
 
 

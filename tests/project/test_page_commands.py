@@ -63,10 +63,15 @@ ELSEWHERE = {
     "mkdir -p campaigns/cell7": (".ci/run", "mkdir -p campaigns/cell7"),
     "snakemake -j2 diagnose --config campaign=PATH": (".ci/run", "snakemake -j2 diagnose --config campaign=campaigns/cell7"),
     "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet": (
-        "docs/audit.md",
-        "sha256sum",
+        "tests/workflow/test_crate.py",
+        "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet",
     ),
     "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
+    "snakemake -j2 store --config store=s3://BUCKET/FOLDER": ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),
+    "python -m zipfile -e reports/sources.zip .": (
+        "tests/workflow/test_store.py",
+        '("-m", "zipfile", "-e", "reports/sources.zip", ".")',
+    ),
     "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
     "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
@@ -76,7 +81,7 @@ ELSEWHERE = {
         '[*pip, "wheel", *alone, ".", "-w", "dist"]',
     ),
 }
-# Minutes of measurement by hand, of which CI has no room: nothing but that they start is tested.
+# Minutes of measurement by hand, of which CI has no room: nothing but that they compile is tested.
 BY_HAND = (
     "python benchmarks/cost.py few more proof --data-sets 250 750",
     "python benchmarks/run.py",

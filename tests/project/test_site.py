@@ -76,6 +76,13 @@ def test_every_effect_has_a_formula_and_a_picture(pages):
     assert set(formulas) == set(effects())
 
 
+def test_no_command_is_described_by_half_a_sentence():
+    """As a terminal shows them, and typer in its pages."""
+    page = (SITE / "reference" / "commands.html").read_text(encoding="utf-8")
+    assert "Find what the model of a robot lacks" in page
+    assert re.findall(r"…\s*</p>", page) == []
+
+
 def test_every_page_of_the_repository_is_a_page_of_the_site(pages):
     missing = [page.name for page in (ROOT / "docs").rglob("*.md") if page.name != "index.md" and not _of_site(page).is_file()]
     assert missing == []

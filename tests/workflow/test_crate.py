@@ -11,6 +11,9 @@ import pytest
 from rocrate.rocrate import ROCrate
 from study_folder import REPOSITORY
 
+# As the pages have it.
+CHECK_ALL = "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet"
+
 
 @pytest.fixture(scope="module")
 def study(small_study, tmp_path_factory):
@@ -60,6 +63,10 @@ def check(folder):
     return subprocess.run(checked, capture_output=True, text=True)
 
 
+def check_in_a_shell(folder):
+    return subprocess.run(CHECK_ALL, shell=True, cwd=folder, capture_output=True, text=True)
+
+
 def test_an_altered_and_a_missing_file_are_found(study, tmp_path):
     altered, missing = study.files("results/identified/**/*.parquet")[:2]
     copy = study.copied_to(tmp_path / "copy")
@@ -69,3 +76,7 @@ def test_an_altered_and_a_missing_file_are_found(study, tmp_path):
     found = check(copy.folder)
     assert found.returncode == 1
     assert found.stdout.splitlines() == [f"{missing}: missing", f"{altered}: other bytes than the crate describes"]
+    assert check_in_a_shell(study.folder).returncode == 0
+    found = check_in_a_shell(copy.folder)
+    assert found.returncode == 1
+    assert set(found.stdout.splitlines()) == {f"{missing}: FAILED open or read", f"{altered}: FAILED"}

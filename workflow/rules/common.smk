@@ -5,6 +5,7 @@ import hashlib
 import re
 import sys
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 
 import elastocal
@@ -65,9 +66,10 @@ try:
 except InputError as error:
     sys.exit(str(error))
 
-# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for decides nothing.
+# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, and on which store
+# results are put, decides nothing.
 RESOLVED = {
-    "config": {key: value for key, value in config.items() if key not in ("campaign", "origin")},
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
@@ -98,7 +100,7 @@ AUDITED = [
     *("interpretations", "identification", "evaluation", "tables", "questions"),
 ]
 # Files that jobs make.
-MADE = re.compile("(data|results|reports)/")
+MADE = re.compile("(data|results|reports)/|ro-crate-metadata.json$")
 NAMES = {name: document["name"] for name, document in STUDY.strategies.items()}
 EXTENDED = [name for name in config["robots"] if "links" in STUDY.robots[name]]
 REDUCED = [name for name in config["robots"] if name not in EXTENDED]
@@ -153,6 +155,15 @@ def files_behind(targets):
         found.update(map(str, maker.expand_output(wildcards)[0]))
         left += map(str, maker.expand_input(wildcards)[0])
     return sorted(found)
+
+
+def in_store(file):
+    """A file's object on the object store, which the configuration names."""
+    if "store" not in config:
+        sys.exit("store: found no object store; allowed: snakemake -j2 store --config store=s3://BUCKET/FOLDER")
+    if find_spec("snakemake_storage_plugin_s3") is None:
+        sys.exit("store: found no snakemake-storage-plugin-s3; allowed: after make .venv/ready-for-cluster")
+    return storage.s3(f"{config['store']}/{file}")
 
 
 def robot_document(wildcards):

@@ -1,0 +1,112 @@
+"""A finished study on an object store, for which moto stands in: what is fetched is whole; only what changed goes up again."""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from urllib.parse import unquote
+
+import boto3
+import pytest
+from moto.server import ThreadedMotoServer
+
+BUCKET, FOLDER = "results", "of/study/"
+STORE = ("store", "--config", f"store=s3://{BUCKET}/{FOLDER.rstrip('/')}")
+# Python imports this before all else: nothing finds the plugin.
+WITHOUT_PLUGIN = """
+import pkgutil, sys
+name, listed = "snakemake_storage_plugin_s3", pkgutil.iter_modules
+sys.modules[name] = None
+pkgutil.iter_modules = lambda *arguments: (found for found in listed(*arguments) if found.name != name)
+"""
+
+
+@pytest.fixture(scope="module")
+def bucket():
+    """A bucket that Snakemake finds by variables of its environment."""
+    server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    server.start()
+    endpoint = "http://{}:{}".format(*server.get_host_and_port())
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in (("ENDPOINT_URL", endpoint), ("ACCESS_KEY", "any"), ("SECRET_KEY", "any")):
+            patch.setenv(f"SNAKEMAKE_STORAGE_S3_{name}", value)
+        keys = {"aws_access_key_id": "any", "aws_secret_access_key": "any"}
+        bucket = boto3.resource("s3", endpoint_url=endpoint, region_name="us-east-1", **keys).Bucket(BUCKET)
+        bucket.create()
+        yield bucket
+    server.stop()
+
+
+@pytest.fixture(scope="module")
+def study(small_study, bucket, tmp_path_factory):
+    study = small_study.copied_to(tmp_path_factory.mktemp("store") / "study")
+    study.run(*STORE)
+    return study
+
+
+def uploaded(bucket):
+    """When each object was uploaded, by the name that its file has here."""
+    return {item.key.removeprefix(FOLDER): item.last_modified for item in bucket.objects.all()}
+
+
+def test_what_is_fetched_from_the_store_is_the_run_that_its_crate_describes(study, bucket, tmp_path):
+    for name in uploaded(bucket):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        bucket.download_file(FOLDER + name, str(tmp_path / name))
+    for arguments in (("-m", "zipfile", "-e", "reports/sources.zip", "."), ("workflow/check_crate.py",)):
+        done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stdout
+    crate = json.loads((tmp_path / "ro-crate-metadata.json").read_text(encoding="utf-8"))
+    described = {unquote(entity["@id"]) for entity in crate["@graph"] if "sha256" in entity}
+    made = study.files("data/**/*.parquet", "results/**/*.parquet", "reports/tables/*", "reports/figures/*", "reports/*.pdf")
+    assert len(made) > 60 and set(made) <= described
+    # The store keeps no second copy here.
+    assert study.files(".snakemake/storage/s3/**/*.parquet") == []
+
+
+def test_nothing_is_uploaded_twice(study):
+    assert study.planned(*STORE) == set()
+
+
+def test_only_what_is_made_again_here_or_missing_there_is_uploaded_again(study, bucket):
+    missing, before, start = "results/initial/kuka.parquet", uploaded(bucket), time.time()
+    bucket.Object(FOLDER + missing).delete()
+    study.append("workflow/scripts/typeset_table.py", "# Tables look as they did.\n")
+    # Objects know whole seconds.
+    time.sleep(1)
+    study.run(*STORE)
+    after = uploaded(bucket)
+    assert set(after) == set(before)
+    made_again = {name for name in after if study.path(name).stat().st_mtime > start}
+    assert {"reports/tables/table1.tex", "reports/sources.zip", "ro-crate-metadata.json"} <= made_again
+    assert len(made_again) < 20
+    assert {name for name in after if after[name] != before[name]} == {missing} | made_again
+
+
+def test_a_file_that_is_not_as_its_job_wrote_it_is_not_uploaded(study, bucket):
+    name = "reports/tables/table1.tex"
+    whole = study.path(name).read_bytes()
+    study.path(name).write_bytes(whole + b"% A line of mine.\n")
+    done = study.snakemake("-j1", "--config", STORE[-1], "--allowed-rules", "upload", "store", "--", "store")
+    study.path(name).write_bytes(whole)
+    assert done.returncode != 0
+    assert study.path(f"results/logs/upload/{name}.log").read_text(encoding="utf-8").startswith(f"{name}: FAILED")
+    assert name not in uploaded(bucket)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "refusal"),
+    [
+        ((), "store: found no object store; allowed: snakemake -j2 store --config store=s3://BUCKET/FOLDER"),
+        (STORE[1:], "store: found no snakemake-storage-plugin-s3; allowed: after make .venv/ready-for-cluster"),
+    ],
+    ids=["no store", "no plugin"],
+)
+def test_one_line_says_what_the_target_lacks(arguments, refusal, study, tmp_path):
+    (tmp_path / "sitecustomize.py").write_text(WITHOUT_PLUGIN, encoding="utf-8")
+    command = study.command("-n", "store", *arguments)
+    command["env"] = command["env"] | {"PYTHONPATH": os.pathsep.join([str(tmp_path), command["env"]["PYTHONPATH"]])}
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=600)
+    assert done.returncode != 0
+    assert done.stderr.splitlines()[-1] == refusal

@@ -1,0 +1,52 @@
+"""A finished run on an object store: `snakemake -j2 store --config store=s3://BUCKET/FOLDER`.
+
+Makes what is not made yet, then uploads the crate, every file that it describes and a job made, and the other files that it
+describes, sources and configuration, as one archive. What is on the store and has not changed here since stays as it is.
+"""
+
+
+rule pack_sources:
+    input:
+        crate=rules.write_crate.output.crate,
+        check=placed(ROOT / "workflow" / "check_crate.py"),
+        sources=sources("pack_sources.py"),
+    output:
+        archive="reports/sources.zip",
+    log:
+        "results/logs/pack_sources.log",
+    benchmark:
+        "results/timings/pack_sources.tsv"
+    script:
+        "../scripts/pack_sources.py"
+
+
+# Only with a store, whose plugin is not among what a run on one machine installs.
+if "store" in config:
+
+    localrules:
+        upload,
+
+    # A file that is no longer what its job wrote does not replace the one on the store.
+    rule upload:
+        input:
+            file="{stored}",
+        output:
+            file=in_store("{stored}"),
+        log:
+            "results/logs/upload/{stored}.log",
+        benchmark:
+            "results/timings/upload/{stored}.tsv"
+        wildcard_constraints:
+            stored="((data|results|reports)/.+)|ro-crate-metadata.json",
+        params:
+            record="results/checksums/{stored}.sha256",
+        shell:
+            "test ! -f {params.record:q} || sha256sum --check --quiet {params.record:q} &> {log:q} &&"
+            " cp {input.file:q} {output.file:q} &>> {log:q}"
+
+
+rule store:
+    input:
+        lambda wildcards: [
+            in_store(file) for file in files_behind([*rules.study.input, *rules.loop.input, *rules.pack_sources.output])
+        ],
