@@ -223,7 +223,7 @@ def budget_pairs(run: Audited) -> pd.DataFrame:
             row["difference_um"] = 1e6 * (roots[0] - roots[1])
             row["difference_um_std_error"] = 1e6 * stats.sem(ours / (2 * roots[0]) - theirs / (2 * roots[1]))
             rows.append(row | dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(ours, theirs), strict=True)))
-    return pd.DataFrame(rows, columns=["robot", "points"]) if not rows else pd.DataFrame(rows)
+    return pd.DataFrame(rows) if rows else pd.DataFrame(columns=["robot", "points"])
 
 
 def configurations_needed(run: Audited) -> pd.DataFrame:
@@ -440,7 +440,7 @@ def table(run: Audited, file: str, name: str) -> list[Finding]:
             one = held(file, f"column {column}", "pandas", not off, ", ".join(off[:1]), len(right))
         found.append(one)
     followed = len(right) * len(columns)
-    rest = [column for column in stored.columns if column not in (*columns, *keys)]
+    rest = [column for column in stored.columns if column not in (*columns, *keys)] if len(stored) else []
     words = f"{followed} of {len(stored) * (len(columns) + len(rest))} cells followed" + (
         f"; not {', '.join(rest)}" if rest else ""
     )
