@@ -21,7 +21,25 @@ def test_what_does_not_hold_is_shown_and_nothing_of_it_is_run():
     assert "http" not in text
 
 
+def test_what_was_not_worked_out_again_is_named_apart():
+    bytes_alone = Finding("reports/figures/fig3.pdf", "bytes as its job wrote them", "hashlib, SHA-256", 1, 0.0)
+    again, apart = page(as_table([GOOD, bytes_alone]), {}).split("What was not worked out again")
+    assert "scores of each strategy" in again
+    assert "reports/figures/*.pdf" in apart
+    assert "reports/figures/*.pdf" not in again
+    assert "In <strong>1 files</strong>" in again
+    assert "What was not worked out again" not in page(as_table([GOOD]), {})
+
+
+def test_columns_of_a_table_that_are_not_followed_are_named():
+    followed = Finding("reports/tables/comparison.csv", "765 of 850 cells followed; not interpretation", "counting", 765, 0.0)
+    text = page(as_table([GOOD, followed]), {})
+    assert ">765<" in text
+    assert ">interpretation<" in text
+
+
 def test_files_that_are_made_alike_are_one_row():
     assert kind_of(GOOD.file) == "results/metrics/*.parquet"
     assert kind_of("data/simulated/kuka/200um/measured.parquet") == "data/simulated/*/measured.parquet"
     assert kind_of("results/loop/cell/models.parquet") == "results/loop/*/models.parquet"
+    assert kind_of("reports/loop/campaigns.csv") == "reports/loop/*.csv"

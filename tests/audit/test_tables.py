@@ -32,6 +32,13 @@ def test_a_row_that_is_missing_is_found(run):
     assert failed(tables.table(run, "reports/tables/table1.csv", "table1")) == ["rows"]
 
 
+@pytest.mark.parametrize("name", ["two", "other"])
+def test_a_row_that_is_there_twice_or_too_many_is_found(run, name):
+    file = run.folder / "reports/tables/table1.csv"
+    file.write_text(file.read_text("utf-8") + f"{name},0.5,0.8\n", encoding="utf-8")
+    assert failed(tables.table(run, "reports/tables/table1.csv", "table1")) == ["rows"]
+
+
 @pytest.mark.parametrize(("value", "holds"), [("0.8", True), ("0.7", False), ("0.80 ± 0.01", True), ("0.81 ± 0.01", False)])
 @pytest.mark.parametrize("ending", ["md", "tex"])
 def test_a_printed_value_is_that_of_the_csv_to_its_digits(run, value, holds, ending):

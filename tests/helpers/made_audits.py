@@ -68,7 +68,8 @@ def altered(run, file, column, row, by):
     frame = pd.read_parquet(run.folder / file)
     frame.loc[row, column] += by
     frame.to_parquet(run.folder / file)
-    run.table.cache_clear()
+    for kept in (run.table, run.experiments, run.deflections):
+        kept.cache_clear()
 
 
 def failed(findings):

@@ -9,14 +9,19 @@ from elastocal.audit.whole import as_table, audit
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
 
-from job import Job, run
+from job import Job, origin_of, run
 
 
 def audit_files(job: Job) -> None:
     settings = job.params
     finished = Audited(Path(), settings.configuration, settings.robots, settings.strategies, settings.rows)
     table = as_table(audit(finished))
-    facts = {"seed": str(finished.seed), "rows of each file": str(settings.rows), "version": __version__}
+    facts = {
+        "Seed of the random numbers": str(finished.seed),
+        "Rows sampled of a large file": str(settings.rows),
+        "Version of elastocal": __version__,
+        "Origin": origin_of(job).words,
+    }
     write_text(job.output.page, page(table, facts))
     write_csv(job.output.table, table)
 

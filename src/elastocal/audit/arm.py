@@ -133,6 +133,18 @@ class Arm:
         self.coordinates = 1 + max(coordinate for _, coordinate in self._moved)
         self.springs = self._spring_compliance(diameter)
 
+    @cached_property
+    def links(self) -> list[np.ndarray]:
+        """Rigid stretches behind which an arm with elastic links has six springs each, as vectors (m)."""
+        found, vector = [], np.zeros(3)
+        for step in self.steps:
+            if step.kind == "T" and step.coordinate is None:
+                vector[step.axis] += step.amount
+            elif step.kind != "point" and vector.any():
+                found.append(vector)
+                vector = np.zeros(3)
+        return found
+
     @property
     def end_effector(self) -> str:
         """Name of the last measuring point."""
@@ -231,15 +243,11 @@ class Arm:
         found[: self.joints, : self.joints] = np.diag(self.compliance)
         if self.coordinates == self.joints:
             return found
-        vector, number, links = np.zeros(3), 0, self.document["links"]
-        for step in self.steps:
-            if step.kind == "T" and step.coordinate is None:
-                vector[step.axis] += step.amount
-            elif step.kind != "point" and vector.any():
-                tube = links["tubes"][number if len(links["tubes"]) > 1 else 0]
-                block = slice(self.joints + 6 * number, self.joints + 6 * number + 6)
-                found[block, block] = _tube(vector, tube, diameter, links)
-                vector, number = np.zeros(3), number + 1
+        links = self.document["links"]
+        for number, vector in enumerate(self.links):
+            tube = links["tubes"][number if len(links["tubes"]) > 1 else 0]
+            block = slice(self.joints + 6 * number, self.joints + 6 * number + 6)
+            found[block, block] = _tube(vector, tube, diameter, links)
         return found
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 COMPONENTS = ("dx", "dy", "dz", "rx", "ry", "rz")
-_KEPT_TABLES = 40
+_KEPT_TABLES, _KEPT_ARRAYS = 40, 8
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
@@ -50,6 +50,9 @@ class Audited:
         self.robots, self.strategies = robots, strategies
         # Of a whole study all tables together are too large for a small machine.
         self.table = lru_cache(_KEPT_TABLES)(self._read)
+        # Every regressor and residual of a sample looks into them.
+        self.experiments = lru_cache(_KEPT_ARRAYS)(self._experiments)
+        self.deflections = lru_cache(_KEPT_ARRAYS)(self._deflections)
         self._arms: dict[tuple[str, float], Arm] = {}
         self._regressors: dict[tuple[str, int, int, str, bool], np.ndarray] = {}
 
@@ -72,6 +75,21 @@ class Audited:
     def strategy_named(self) -> dict[str, Mapping[str, Any]]:
         """Strategies by the names that they print."""
         return {document["name"]: document for document in self.strategies.values()}
+
+    @property
+    def reduced(self) -> list[str]:
+        """Robots of the study without elastic links."""
+        return [name for name in self.configuration["robots"] if "links" not in self.robots[name]]
+
+    @property
+    def extended(self) -> list[str]:
+        """Robots of the study with elastic links."""
+        return [name for name in self.configuration["robots"] if "links" in self.robots[name]]
+
+    def cell(self, kind: str, robot: str, key: str, noise_um: float | None = None) -> pd.DataFrame:
+        """Results of one kind, robot and strategy, at the noise of the tables where no other is named."""
+        noise = self.configuration["tables"]["noise_um"] if noise_um is None else noise_um
+        return self.table(f"results/{kind}/{robot}/{noise:g}um/{key}.parquet")
 
     def chance(self, file: str) -> np.random.Generator:
         """What draws the sample of a file: the seed and the file's name."""
@@ -103,7 +121,7 @@ class Audited:
             self._arms[robot, diameter] = Arm(self.robots[robot], tool, diameter)
         return self._arms[robot, diameter]
 
-    def experiments(self, robot: str, test: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    def _experiments(self, robot: str, test: bool = False) -> tuple[np.ndarray, np.ndarray]:
         """Joint angles (sets, configurations, n) and wrenches (sets, configurations, 6) as the file has them."""
         frame = self.table(f"data/simulated/{robot}{'/test' if test else ''}/experiments.parquet")
         joints = self.arm(robot).joints
@@ -112,7 +130,7 @@ class Audited:
         wrench = frame[list(WRENCH)].to_numpy().reshape(sets, -1, 6)
         return angles, wrench
 
-    def deflections(self, file: str, point: str) -> np.ndarray:
+    def _deflections(self, file: str, point: str) -> np.ndarray:
         """Deflections (sets, configurations, 6) of a measuring point as a file has them."""
         frame = self.table(file)
         rows = frame[frame["point"] == point]

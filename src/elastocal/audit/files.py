@@ -20,6 +20,14 @@ if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
 
 _RECORDS = "results/checksums"
+# What is asked of every file, whatever it holds; other checks work something out again.
+OF_EVERY_FILE = frozenset(
+    {
+        *("the file is there", "bytes as its job wrote them", "a table that is known", "columns", "units and meanings"),
+        *("finite and within range", "row groups", "digest of every column of every row group", "digest of its configuration"),
+        *("version of the package", "made for where it lies", "made by what is configured"),
+    }
+)
 # Facts of a file's own provenance that its path states too.
 _PLACES = (
     re.compile(r"data/simulated/(?P<robot>[^/]+)/(?P<noise>[^/]+)um/\w+\.parquet"),

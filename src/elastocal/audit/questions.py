@@ -1,6 +1,6 @@
 """The research questions' files: data sets drawn again from their streams, estimated by statsmodels, judged by pinocchio.
 
-Files that keep no estimate, such as a choice of designs, are held against what must be true of them.
+Of places on the arm only the end-effector's part is worked out again; the rest is held against what must be true of it.
 """
 
 from __future__ import annotations
@@ -23,16 +23,24 @@ if TYPE_CHECKING:
 _CLOSE = 1e-6
 
 
-def drawn(run: Audited, robot: str, data_set: int, count: int, diameter: float = 1.0) -> tuple[list[Any], list[Any]]:
+def drawn(
+    run: Audited,
+    robot: str,
+    data_set: int,
+    count: int,
+    diameter: float = 1.0,
+    purpose: str = "identification",
+    joint_range: str = "",
+) -> tuple[list[Any], list[Any]]:
     """Joint angles and wrenches of a data set from its streams, whether or not a file has them."""
     arm, settings = run.arm(robot, diameter), run.configuration
     low, high = np.full(arm.joints, -np.pi), np.full(arm.joints, np.pi)
-    if settings["interpretations"]["joint_range"] == "limits":
+    if (joint_range or settings["interpretations"]["joint_range"]) == "limits":
         low, high = np.deg2rad(run.robots[robot]["joint_limits_deg"]).T
     total = settings["configurations"]
     # A stream gives the first configurations whatever their number.
-    turns = numbers(run.seed, robot, "identification/joint angles", data_set).random((max(count, total), arm.joints))[:count]
-    normal = numbers(run.seed, robot, "identification/force", data_set).standard_normal((max(count, total), 3))[:count]
+    turns = numbers(run.seed, robot, f"{purpose}/joint angles", data_set).random((max(count, total), arm.joints))[:count]
+    normal = numbers(run.seed, robot, f"{purpose}/force", data_set).standard_normal((max(count, total), 3))[:count]
     angles = low + (high - low) * turns
     force = settings["loading"]["force_N"] * normal / np.linalg.norm(normal, axis=1)[:, None]
     lever = np.array(settings["loading"]["offset_m"], float)
@@ -144,7 +152,7 @@ def observability(run: Audited, file: str, robot: str) -> list[Finding]:
 
 
 def uses(run: Audited, file: str, robot: str) -> list[Finding]:
-    """Errors on the test configurations of sampled rows; quantiles in order elsewhere.
+    """Errors on the test configurations: of all data sets from the identified compliances, of sampled rows by statsmodels.
 
     Parameters
     ----------
@@ -174,9 +182,33 @@ def uses(run: Audited, file: str, robot: str) -> list[Finding]:
     found.append(
         held(file, "mean square below the largest", "pandas", ordered, "a mean square above the square of the largest")
     )
-    same = bool((frame.groupby("strategy")["pooled_p95"].nunique() == 1).all())
-    found.append(held(file, "one pooled quantile a strategy", "pandas", same, "several"))
+    for key, strategy in run.strategies.items():
+        mine = frame[frame["strategy"] == strategy["name"]].sort_values("data_set")
+        identified = run.cell("identified", robot, key)
+        compliance = identified[identified["length"] == length].sort_values("data_set").filter(regex=r"^c\d+$").to_numpy(float)
+        if np.isnan(compliance).any():
+            continue
+        for name, scores in _pooled(errors_of(run, robot, compliance)).items():
+            checked, by = f"{name} of all data sets, {strategy['name']}", "numpy on the identified compliances"
+            found.append(compared(file, checked, by, mine[name], scores, _CLOSE))
     return found
+
+
+def _pooled(errors: np.ndarray) -> dict[str, np.ndarray]:
+    """Scores of every data set from its errors (sets, tests), its part in the quantile of all errors among them.
+
+    A quantile moves with a data set by the share of its errors beyond it less that of all, over the density there, which is the
+    share between two quantiles on either side over their distance (Bahadur's representation).
+    """
+    before, pooled, behind = np.quantile(errors, [0.94, 0.95, 0.96])
+    beyond = (errors > pooled).mean(axis=1)
+    return {
+        "mean": errors.mean(axis=1),
+        "mean_square": (errors**2).mean(axis=1),
+        "p95": np.quantile(errors, 0.95, axis=1),
+        "pooled_p95": np.full(len(errors), pooled),
+        "pooled_p95_influence": (beyond - 0.05) * (behind - before) / 0.02,
+    }
 
 
 def tubes(run: Audited, file: str, robot: str) -> list[Finding]:
@@ -248,62 +280,6 @@ def weighting(run: Audited, file: str, robot: str) -> list[Finding]:
     return found
 
 
-def ladder(run: Audited, file: str, robot: str) -> list[Finding]:
-    """What must hold of the ladder of models: one is chosen of each data set, every link is added once.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
-    frame, questions = run.table(file), run.configuration["questions"]
-    rungs = frame.groupby(["noise", "length", "data_set"])
-    count = len(questions["ladder_noise_um"]) * len(questions["ladder_lengths"]) * run.configuration["data_sets"]
-    found = [compared(file, "noises, lengths and data sets", "counting", [rungs.ngroups], [count], 0.0)]
-    chosen = bool((rungs["chosen"].sum() == 1).all())
-    found.append(held(file, "one model is chosen of each data set", "pandas", chosen, "none or several", rungs.ngroups))
-    links = [sorted(some) == list(range(len(some))) for _, some in rungs["added_link"]]
-    found.append(held(file, "every link comes once", "pandas", all(links), "a link twice", rungs.ngroups))
-    positive = bool((frame["mean_square"] > 0).all())
-    found.append(held(file, "squares are positive", "pandas", positive, "one that is not", len(frame)))
-    return found
-
-
-def designs(run: Audited, file: str, robot: str) -> list[Finding]:
-    """What must hold of designs: none is better than the bound of all, optimal ones are within or below random ones.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
-    frame = run.table(file)
-    sizes = sorted(run.configuration["questions"]["design_sizes"])
-    found = [held(file, "sizes", "counting", sorted(set(frame["configurations"])) == sizes, f"{set(frame['configurations'])}")]
-    random = frame[frame["design"] == "random"].set_index(["joint_range", "configurations"])
-    ordered = bool(((random["low"] <= random["rms"]) & (random["rms"] <= random["high"])).all())
-    found.append(held(file, "random designs lie within their quantiles", "pandas", ordered, "one outside", len(random)))
-    others = frame[~frame["design"].isin(["random"])].merge(
-        random["high"].rename("random_high").reset_index(), on=["joint_range", "configurations"]
-    )
-    better = bool((others["rms"] <= others["random_high"]).all())
-    found.append(held(file, "chosen designs beat the worst random ones", "pandas", better, "one is worse", len(others)))
-    falling = [
-        bool((np.diff(some.sort_values("configurations")["rms"]) < 0).all())
-        for _, some in frame.groupby(["joint_range", "design"])
-    ]
-    found.append(held(file, "more configurations leave less", "pandas", all(falling), "a design whose error grows", len(frame)))
-    return found
-
-
 def places(run: Audited, file: str, robot: str) -> list[Finding]:
     """Bounds of the end-effector alone, in sampled data sets; shares, and what a second target can do.
 
@@ -353,23 +329,6 @@ def places(run: Audited, file: str, robot: str) -> list[Finding]:
     return found
 
 
-def geometry(run: Audited, file: str, robot: str) -> list[Finding]:
-    """What must hold of geometry and compliances: errors are positive, what is known is not estimated.
-
-    Parameters
-    ----------
-    run : Audited
-    file, robot : str
-
-    Returns
-    -------
-    list of Finding
-    """
-    frame = run.table(file)
-    values = frame.drop(columns="estimator").to_numpy(float)
-    return [held(file, "errors are not negative", "pandas", bool((values >= 0).all()), "one that is", values.size)]
-
-
 def studies(run: Audited, file: str, interpretation: str, robot: str) -> list[Finding]:
     """Scores of a sampled further study at its shortest lengths, drawn, estimated and averaged again.
 
@@ -415,9 +374,6 @@ CHECKS = (
     (re.compile(r"results/uses/([^/]+)\.parquet"), uses),
     (re.compile(r"results/tubes/([^/]+)\.parquet"), tubes),
     (re.compile(r"results/weighting/([^/]+)\.parquet"), weighting),
-    (re.compile(r"results/ladder/([^/]+)\.parquet"), ladder),
-    (re.compile(r"results/designs/([^/]+)\.parquet"), designs),
     (re.compile(r"results/places/([^/]+)\.parquet"), places),
-    (re.compile(r"results/geometry/([^/]+)\.parquet"), geometry),
     (re.compile(r"results/studies/([^/]+)/([^/]+)\.parquet"), studies),
 )

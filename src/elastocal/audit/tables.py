@@ -13,8 +13,9 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
+from elastocal.audit import paper_figures, rankings
 from elastocal.audit.estimates import points_of
-from elastocal.audit.findings import Finding, compared, held
+from elastocal.audit.findings import ROUNDING, Finding, compared, held
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,27 +30,9 @@ _ZERO = 1e-7
 _QUANTILE = 1.96
 
 
-def reduced(run: Audited) -> list[str]:
-    """Robots of the study without elastic links."""
-    return [name for name in run.configuration["robots"] if "links" not in run.robots[name]]
-
-
-def extended(run: Audited) -> list[str]:
-    """Robots of the study with elastic links."""
-    return [name for name in run.configuration["robots"] if "links" in run.robots[name]]
-
-
-def _noise(run: Audited) -> str:
-    return f"{run.configuration['tables']['noise_um']:g}"
-
-
-def _cell(run: Audited, kind: str, robot: str, noise_um: str, key: str) -> pd.DataFrame:
-    return run.table(f"results/{kind}/{robot}/{noise_um}um/{key}.parquet")
-
-
 def table1(run: Audited) -> pd.DataFrame:
     """Compliances of the robot files."""
-    rows = {name: run.robots[name]["compliance_urad_per_Nm"] for name in reduced(run)}
+    rows = {name: run.robots[name]["compliance_urad_per_Nm"] for name in run.reduced}
     return pd.DataFrame([{"robot": name} | {f"c{j}": c for j, c in enumerate(row, 1)} for name, row in rows.items()])
 
 
@@ -86,8 +69,8 @@ def table2(run: Audited) -> pd.DataFrame:
 def table3(run: Audited) -> pd.DataFrame:
     """Compliances by the classical strategy, from results/metrics."""
     tables, rows = run.configuration["tables"], []
-    for robot in reduced(run):
-        frame = _cell(run, "metrics", robot, _noise(run), tables["classical_strategy"]).set_index("length")
+    for robot in run.reduced:
+        frame = run.cell("metrics", robot, tables["classical_strategy"]).set_index("length")
         at, row = frame.loc[tables["length"]], {"robot": robot}
         for j in range(1, run.arm(robot).joints + 1):
             row |= {f"c{j}": 1e6 * at[f"compliance_{j}"], f"c{j}_std_error": 1e6 * at[f"compliance_{j}_std_error"]}
@@ -100,10 +83,10 @@ def table4(run: Audited) -> pd.DataFrame:
     tables, rows = run.configuration["tables"], []
     length = tables["length"]
     for key, strategy in run.strategies.items():
-        for robot in reduced(run):
-            frame = _cell(run, "metrics", robot, _noise(run), key)
+        for robot in run.reduced:
+            frame = run.cell("metrics", robot, key)
             at = frame.set_index("length").loc[length]
-            drawn = _cell(run, "replicates", robot, _noise(run), key)
+            drawn = run.cell("replicates", robot, key)
             row: dict[str, Any] = {"strategy": strategy["name"], "robot": robot}
             for suffix in ("", "_first_stage"):
                 name, limit = f"k_sigma{suffix}", tables["k_sigma_limit_percent"]
@@ -137,10 +120,10 @@ def _reached(frame: pd.DataFrame, drawn: pd.DataFrame, name: str, limit: float) 
 def extended_table(run: Audited) -> pd.DataFrame:
     """What the reduced model leaves, from results/metrics and results/replicates."""
     rows, length = [], run.configuration["tables"]["length"]
-    for robot in extended(run):
+    for robot in run.extended:
         for key, strategy in run.strategies.items():
-            at = _cell(run, "metrics", robot, _noise(run), key).set_index("length").loc[length]
-            drawn = _cell(run, "replicates", robot, _noise(run), key)
+            at = run.cell("metrics", robot, key).set_index("length").loc[length]
+            drawn = run.cell("replicates", robot, key)
             drawn = drawn[drawn["length"] == length]
             rows.append(
                 {
@@ -167,31 +150,44 @@ def per_dataset(run: Audited) -> pd.DataFrame:
         for noise_um in run.configuration["noise_um"]:
             for key, strategy in run.strategies.items():
                 points = "+".join(sorted(points_of(strategy)))
-                for _, at in _cell(run, "accuracy", robot, f"{noise_um:g}", key).iterrows():
+                for _, at in run.cell("accuracy", robot, key, noise_um).iterrows():
                     row = {"strategy": strategy["name"], "robot": robot, "noise_um": float(noise_um), "ds": at["length"]}
                     row |= {f"{name}_um": 1e6 * at[name] for name in ("mean", "rms", "p95", "max")}
                     row |= {f"{name}_um_std_error": 1e6 * at[f"{name}_std_error"] for name in ("mean", "rms", "p95", "max")}
                     row["crlb_rms_um"] = bounds[points, int(at["length"])] * noise_um
                     row["efficiency"] = (row["crlb_rms_um"] / row["rms_um"]) ** 2 if noise_um else np.nan
+                    row["efficiency_std_error"] = 2 * row["efficiency"] * row["rms_um_std_error"] / row["rms_um"]
+                    for j in range(1, run.arm(robot).joints + 1):
+                        for error in ("", "_std_error"):
+                            row[f"relative_error_{j}_percent{error}"] = at[f"relative_error_{j}{error}"]
                     rows.append(row)
     return pd.DataFrame(rows)
 
 
 def solvers(run: Audited) -> pd.DataFrame:
     """How far the solvers lie apart, from results/solvers."""
-    rows = []
-    for robot in reduced(run):
-        for strategy, some in run.table(f"results/solvers/{robot}.parquet").groupby("strategy", observed=True):
-            linear, exact = (some.filter(like=name).to_numpy() for name in ("equation_11", "gauss_newton"))
-            apart = float(np.max(np.abs(linear - exact) / np.abs(exact)))
-            rows.append({"robot": robot, "strategy": strategy, "between_solvers": apart})
+    rows: list[dict[str, Any]] = []
+    stated = _keyed(run.table("reports/tables/solvers.csv"), ("robot", "strategy"))["closest_strategy"].to_dict()
+    for robot in run.reduced:
+        frame = run.table(f"results/solvers/{robot}.parquet").sort_values("data_set")
+        names = list(dict.fromkeys(frame["strategy"]))
+        linear, exact = (
+            {name: frame[frame["strategy"] == name].filter(like=solver).to_numpy() for name in names}
+            for solver in ("equation_11", "gauss_newton")
+        )
+        for name in names:
+            row: dict[str, Any] = {"robot": robot, "strategy": name, "between_solvers": _apart(linear[name], exact[name])}
+            apart = pd.Series({other: _apart(exact[name], exact[other]) for other in names if other != name})
+            row["closest_strategy"] = closest = _closest(stated.get(f"{robot}|{name}"), apart) if len(apart) else name
+            row |= {"gauss_newton_difference": _apart(exact[name], exact[closest])}
+            rows.append(row | {"equation_11_difference": _apart(linear[name], linear[closest])})
     return pd.DataFrame(rows)
 
 
 def budget(run: Audited) -> pd.DataFrame:
     """Sets of points, from results/budget."""
     rows, length = [], run.configuration["tables"]["length"]
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/budget/{robot}.parquet")
         for points, names in run.configuration["questions"]["point_sets"].items():
             for count in sorted({length, 2 * length // len(names)}):
@@ -213,40 +209,56 @@ def budget_pairs(run: Audited) -> pd.DataFrame:
     """Sets of points against the first one at as many measurements, from results/budget."""
     rows, length, sets = [], run.configuration["tables"]["length"], run.configuration["questions"]["point_sets"]
     first = next(iter(sets))
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/budget/{robot}.parquet").set_index(["points", "length"]).sort_values("data_set")
         for points, names in sets.items():
             keys = (points, 2 * length // len(names)), (first, 2 * length // len(sets[first]))
             if points == first or any(key not in frame.index for key in keys):
                 continue
             ours, theirs = (frame.loc[[key]]["mean_square"].to_numpy() for key in keys)
-            row = {"robot": robot, "points": points, "difference_um": 1e6 * (np.sqrt(ours.mean()) - np.sqrt(theirs.mean()))}
+            roots = [np.sqrt(each.mean()) for each in (ours, theirs)]
+            row: dict[str, Any] = {"robot": robot, "points": points, "against": first}
+            row |= {"measurements": keys[0][1] * len(names)}
+            row |= {"configurations": keys[0][1], "configurations_against": keys[1][1]}
+            row["difference_um"] = 1e6 * (roots[0] - roots[1])
+            row["difference_um_std_error"] = 1e6 * stats.sem(ours / (2 * roots[0]) - theirs / (2 * roots[1]))
             rows.append(row | dict(zip(("ratio", "ratio_low", "ratio_high"), _ratio(ours, theirs), strict=True)))
-    return pd.DataFrame(rows, columns=["robot", "points", "difference_um", "ratio", "ratio_low", "ratio_high"])
+    return pd.DataFrame(rows) if rows else pd.DataFrame(columns=["robot", "points"])
 
 
 def configurations_needed(run: Audited) -> pd.DataFrame:
     """How many configurations reach an accuracy for good, from results/budget."""
     rows, questions = [], run.configuration["questions"]
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/budget/{robot}.parquet")
         for points, names in questions["point_sets"].items():
             mine = frame[frame["points"] == points]
-            for accuracy in questions["accuracies_um"] if len(mine) else ():
-                # A length at which some data set determines nothing reaches no accuracy.
-                rms = mine.groupby("length")["mean_square"].agg(lambda some: np.sqrt(some.mean(skipna=False)))
-                missed = rms.index[~(1e6 * rms <= accuracy)]
-                needed = float(missed[-1] + 1) if len(missed) else 1.0
-                needed = needed if needed <= rms.index[-1] else np.inf
-                row = {"robot": robot, "points": points, "accuracy_um": accuracy, "configurations": needed}
-                rows.append(row | {"measurements": needed * len(names)})
+            if mine.empty:
+                continue
+            # A length at which some data set determines nothing reaches no accuracy.
+            by_length = mine.groupby("length")
+            rms = by_length["mean_square"].agg(lambda some: np.sqrt(some.mean(skipna=False)))
+            error = by_length["mean_square"].agg(lambda some: some.sem(skipna=False)) / (2 * rms)
+            bound = np.sqrt(by_length["bound"].mean())
+            curves = {"": rms, "_low": rms - _QUANTILE * error, "_high": rms + _QUANTILE * error, "_by_bound": bound}
+            for accuracy in questions["accuracies_um"]:
+                row = {"robot": robot, "points": points, "accuracy_um": accuracy}
+                row |= {f"configurations{name}": _for_good(1e6 * curve, accuracy) for name, curve in curves.items()}
+                rows.append(row | {"measurements": row["configurations"] * len(names)})
     return pd.DataFrame(rows)
+
+
+def _for_good(curve: pd.Series, limit: float) -> float:
+    """Length from which on a curve stays at its limit or below."""
+    missed = curve.index[~(curve <= limit)]
+    needed = float(missed[-1] + 1) if len(missed) else float(curve.index[0])
+    return needed if needed <= curve.index[-1] else np.inf
 
 
 def ladder(run: Audited) -> pd.DataFrame:
     """Errors by number of link springs, from results/ladder."""
     rows = []
-    for robot in extended(run):
+    for robot in run.extended:
         frame = run.table(f"results/ladder/{robot}.parquet")
         for (noise, length), cell in frame.groupby(["noise", "length"]):
             parts = {str(springs): some for springs, some in cell.groupby("link_springs")}
@@ -254,6 +266,8 @@ def ladder(run: Audited) -> pd.DataFrame:
                 rms, error = _root_mean(some["mean_square"])
                 row = {"robot": robot, "noise_um": round(1e6 * float(str(noise)), 6), "length": length, "link_springs": springs}
                 row |= {"rms_um": 1e6 * rms, "rms_um_std_error": 1e6 * error}
+                counted = some["added_link"].value_counts().sort_index()
+                row["usual_link"] = counted.idxmax() if springs.isdigit() and springs != "0" else np.nan
                 rows.append(row | {"chosen_percent": 100 * some["chosen"].mean() if springs.isdigit() else np.nan})
     return pd.DataFrame(rows)
 
@@ -261,7 +275,7 @@ def ladder(run: Audited) -> pd.DataFrame:
 def designs(run: Audited) -> pd.DataFrame:
     """Designs, from results/designs."""
     parts = []
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/designs/{robot}.parquet").copy()
         for name in ("rms", "low", "high"):
             frame[f"{name}_um"] = 1e6 * frame.pop(name)
@@ -272,18 +286,22 @@ def designs(run: Audited) -> pd.DataFrame:
 def observability(run: Audited) -> pd.DataFrame:
     """Rank correlations, from results/observability, by pandas."""
     rows = []
-    for robot in reduced(run):
-        ranked = run.table(f"results/observability/{robot}.parquet").corr("spearman")
+    for robot in run.reduced:
+        frame = run.table(f"results/observability/{robot}.parquet")
+        ranked, sets = frame.corr("spearman"), len(frame)
         for index in ("O1", "O2", "O3", "O4", "O5", "bound"):
-            row = {"robot": robot, "index": index, "rank_correlation_with_bound": ranked.loc[index, "bound"]}
-            rows.append(row | {"rank_correlation_with_error": ranked.loc[index, "mean_square"]})
+            row: dict[str, Any] = {"robot": robot, "index": index}
+            for name, column in (("bound", "bound"), ("error", "mean_square")):
+                row[f"rank_correlation_with_{name}"] = found = float(ranked[column].to_dict()[index])
+                row[f"rank_correlation_with_{name}_std_error"] = (1 - found**2) / np.sqrt(sets - 1)
+            rows.append(row)
     return pd.DataFrame(rows)
 
 
 def places(run: Audited) -> pd.DataFrame:
     """A second target at each place, from results/places."""
     rows = []
-    for robot in reduced(run):
+    for robot in run.reduced:
         for key, cell in run.table(f"results/places/{robot}.parquet").groupby(["joints", "along", "side"], sort=False):
             row = {"robot": robot} | dict(zip(("joints", "along_m", "side"), key, strict=True))
             pair = cell["bound"].to_numpy(), cell["bound_end_effector"].to_numpy()
@@ -295,7 +313,7 @@ def places(run: Audited) -> pd.DataFrame:
 def geometry(run: Audited) -> pd.DataFrame:
     """Geometry and compliances, from results/geometry."""
     parts = []
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/geometry/{robot}.parquet")
         part = frame.rename(columns={f"compliance_{name}": f"compliance_{name}_percent" for name in ("noise", "leak")})
         part = part.assign(robot=robot, rms_um=1e6 * np.sqrt(frame["noise"] ** 2 + frame["leak"] ** 2))
@@ -308,7 +326,7 @@ def geometry(run: Audited) -> pd.DataFrame:
 def weighting(run: Audited) -> pd.DataFrame:
     """What equal weights cost, from results/weighting."""
     parts = []
-    for robot in reduced(run):
+    for robot in run.reduced:
         frame = run.table(f"results/weighting/{robot}.parquet")
         scaled = {f"{name}_um": 1e6 * frame[name] for name in ("per_metre", "equal", "weighted")}
         parts.append(frame[["orientation_ratio"]].assign(robot=robot, ratio=frame["equal"] / frame["weighted"], **scaled))
@@ -318,7 +336,7 @@ def weighting(run: Audited) -> pd.DataFrame:
 def tubes(run: Audited) -> pd.DataFrame:
     """Other diameters, from results/tubes."""
     rows = []
-    for robot in extended(run):
+    for robot in run.extended:
         for diameter, cell in run.table(f"results/tubes/{robot}.parquet").groupby("diameter", sort=False):
             single: dict[str, pd.Series] = {
                 "mean": cell["mean"],
@@ -333,60 +351,14 @@ def tubes(run: Audited) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def strategy_scores(run: Audited) -> pd.DataFrame:
-    """Every strategy by every metric, from results/uses and results/metrics."""
-    rows, length = [], run.configuration["tables"]["length"]
-    for robot in reduced(run):
-        uses = run.table(f"results/uses/{robot}.parquet")
-        for key, strategy in run.strategies.items():
-            mine = uses[uses["strategy"] == strategy["name"]]
-            at = _cell(run, "metrics", robot, _noise(run), key).set_index("length").loc[length]
-            values = {
-                "rms_um": 1e6 * np.sqrt(mine["mean_square"].mean()),
-                "mean_um": 1e6 * mine["mean"].mean(),
-                "p95_um": 1e6 * mine["p95"].mean(),
-                "pooled_p95_um": 1e6 * mine["pooled_p95"].iloc[0],
-                "iso_9283_um": 1e6 * mine["iso_9283"].mean(),
-                "path_rms_um": 1e6 * np.sqrt(mine["path_mean_square"].mean()),
-                "path_max_um": 1e6 * mine["path_max"].mean(),
-                "k_sigma_percent": at["k_sigma"],
-                "k_sigma_percent_first_stage": at["k_sigma_first_stage"],
-                "dev_um": 1e6 * at["deviation"],
-            }
-            head = {"robot": robot, "strategy": strategy["name"]}
-            rows += [head | {"metric": name, "value": value} for name, value in values.items() if not np.isnan(value)]
-    return pd.DataFrame(rows)
+def _closest(stated: str | None, apart: pd.Series) -> str:
+    """The closest strategy; of several that are one estimator, to rounding, the one that is stated."""
+    return str(stated if stated is not None and stated in apart and apart[stated] <= apart.min() + ROUNDING else apart.idxmin())
 
 
-def comparison(run: Audited) -> pd.DataFrame:
-    """Our figures beside the paper's: those of Tables 1 to 4 from these tables, scatter and p values of Table 2 by scipy."""
-    rows = []
-    columns = {"deviation_mean": "mean", "deviation_std": "std", "deviation_max": "max"}
-    table = run.table("reports/tables/comparison.csv")
-    for _, printed in table[table["table"].astype(str).isin(list("1234"))].iterrows():
-        number, robot, quantity = str(printed["table"]), printed["robot"], printed["quantity"]
-        row = {name: printed[name] for name in ("table", "robot", "strategy", "quantity")} | {"paper": printed["paper"]}
-        source = run.table(f"reports/tables/table{number}.csv")
-        source = source[source["robot"] == robot]
-        if number == "4":
-            source = source[source["strategy"] == printed["strategy"]]
-        name = (
-            f"{columns[quantity]}_mm"
-            if number == "2"
-            else {"k_sigma_20": "k_sigma_20_percent", "dev_20": "dev_20_um"}.get(quantity, quantity)
-        )
-        name = f"{name}_first_stage" if "k_sigma" in name else name
-        row["ours"] = float(source[name].iloc[0]) if len(source) and name in source else np.nan
-        if number == "1":
-            # What the study starts from.
-            row["mc_std"] = 0.0
-        elif len(source) and name in source:
-            # A maximum has no standard error.
-            row["mc_std"] = float(source[f"{name}_std_error"].iloc[0]) if f"{name}_std_error" in source else 0.0
-        else:
-            row["mc_std"] = np.nan
-        rows.append(row)
-    return pd.DataFrame(rows)
+def _apart(values: np.ndarray, others: np.ndarray) -> float:
+    """Largest relative difference."""
+    return float(np.max(np.abs(values - others) / np.abs(others)))
 
 
 def _root_mean(squares: pd.Series) -> tuple[float, float]:
@@ -422,8 +394,10 @@ TABLES: Mapping[str, tuple[Any, tuple[str, ...]]] = {
     "geometry": (geometry, ("robot", "estimator")),
     "weighting": (weighting, ("robot", "orientation_ratio", "per_metre_um")),
     "tubes": (tubes, ("robot", "diameter_mm")),
-    "strategy_scores": (strategy_scores, ("robot", "metric", "strategy")),
-    "comparison": (comparison, ("table", "robot", "strategy", "quantity")),
+    "strategy_scores": (rankings.strategy_scores, ("robot", "metric", "strategy")),
+    "strategy_pairs": (rankings.strategy_pairs, ("robot", "metric", "strategy", "other")),
+    "comparison": (paper_figures.comparison, ("table", "robot", "strategy", "quantity")),
+    "expectations": (paper_figures.expectations, ("robot", "strategy", "quantity")),
 }
 
 
@@ -445,20 +419,31 @@ def table(run: Audited, file: str, name: str) -> list[Finding]:
     stored, again = run.table(file), make(run)
     # Names of rows as texts, numbers with the digits of the file.
     left, right = (_keyed(frame, keys) for frame in (stored, again))
-    missing = sorted(set(right.index) - set(left.index))[:1]
-    found = [held(file, "rows", "pandas", not missing, f"no row {missing}", len(right))]
-    if missing:
+    odd = sorted(set(right.index) ^ set(left.index))[:1]
+    twice = left.index[left.index.duplicated()].tolist()[:1]
+    note = f"row {(odd + twice)[0]} is {'there twice' if not odd else 'in only one of both'}" if odd or twice else ""
+    found = [held(file, "rows", "pandas", not note, note, len(right))]
+    if note:
         return found
     left = left.loc[right.index]
     columns = [column for column in left.columns if column in right.columns and column not in keys]
     for column in columns:
-        found.append(
-            compared(file, f"column {column}", "pandas", left[column], right[column], _NINE_DIGITS, _ZERO, right[column])
-        )
+        if pd.api.types.is_numeric_dtype(right[column]) and not pd.api.types.is_bool_dtype(right[column]):
+            one = compared(file, f"column {column}", "pandas", left[column], right[column], _NINE_DIGITS, _ZERO, right[column])
+        else:
+            texts = (frame[column].fillna("").astype(str) for frame in (left, right))
+            off = [
+                f"{name}: {here!r}, expected {there!r}"
+                for name, here, there in zip(right.index, *texts, strict=True)
+                if here != there
+            ]
+            one = held(file, f"column {column}", "pandas", not off, ", ".join(off[:1]), len(right))
+        found.append(one)
     followed = len(right) * len(columns)
-    numeric = [column for column in stored.select_dtypes("number").columns if column not in keys]
-    rest = sorted(set(numeric) - set(columns))
-    words = f"{followed} of {len(stored) * len(numeric)} cells followed" + (f"; not {', '.join(rest)}" if rest else "")
+    rest = [column for column in stored.columns if column not in (*columns, *keys)] if len(stored) else []
+    words = f"{followed} of {len(stored) * (len(columns) + len(rest))} cells followed" + (
+        f"; not {', '.join(rest)}" if rest else ""
+    )
     return [*found, Finding(file, words, "counting", followed, 0.0)]
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from elastocal.audit import campaigns, data, estimates, questions, scores, tables
+from elastocal.audit import assumptions, campaigns, choices, data, estimates, questions, scores, tables
 from elastocal.audit.files import described, intact, recorded
 from elastocal.audit.findings import Finding, held
 from elastocal.errors import InputError
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from elastocal.audit.audited import Audited
 
-_CHECKS = (*data.CHECKS, *estimates.CHECKS, *scores.CHECKS, *questions.CHECKS, *tables.CHECKS, *campaigns.CHECKS)
+_CHECKED = (data, estimates, scores, questions, choices, assumptions, tables, campaigns)
+_CHECKS = tuple(check for module in _CHECKED for check in module.CHECKS)
 # What an audit itself wrote is not audited.
 _OWN = "reports/audit."
 COLUMNS = ("file", "checked", "by", "compared", "worst", "holds", "note")
