@@ -70,6 +70,29 @@ def test_a_copy_that_goes_elsewhere_leaves_the_original_where_it_is(fanuc, held,
         np.testing.assert_array_equal(again, plain)
 
 
+@pytest.mark.parametrize("pose_rad", [0.0, 3e-5])
+@pytest.mark.parametrize("offset", [None, (0.0, 0.0, 0.1)])
+def test_products_by_factors_are_those_of_the_columns_written_out(fanuc, offset, pose_rad, monkeypatch):
+    """Targets that are fitted and that are known; errors of a state alone, and of a pose that has several."""
+    targets = tuple(replace(target, offset_m=offset) for target in TARGETS)
+    model = model_of(fanuc, "joint_offset@2", "lost_motion@3", "link_geometry@3", targets=targets, rows=6)
+    states = replace(made_states(6, 12, seed=88), pose=np.arange(12) // 3, load=np.arange(12) % 3)
+    estimate = made_estimate(model, seed=87)
+    seen = with_noise(seen_exactly(model, estimate, states), np.random.default_rng(89))
+    joints = 1e-6 * np.array([40.0, 15, 15, 30, 45, 220])
+    noise = Noise("declared", 5e-6, 1e-5, joints, pose_rad=pose_rad)
+    plausible = np.array([parameter.plausible for _, parameter in parameters(model, estimate)])
+    weights, found = np.random.default_rng(90).uniform(0.3, 1.0, len(seen)), []
+    for fewest in (0, 1000):
+        monkeypatch.setattr("elastocal.fitting.normal_equations._COLUMNS_A_COORDINATE", fewest)
+        measurements = Parts(model, seen, noise, conditions(model, estimate, seen.states), plausible)
+        measurements.linearize(estimate)
+        measurements.whiten()
+        found.append(measurements.normal_equations(weights))
+    for by_factors, written_out in zip(*found, strict=True):
+        np.testing.assert_allclose(by_factors, written_out, rtol=1e-9, atol=1e-9 * np.abs(written_out).max())
+
+
 GANTRY_NOISES = {
     "sensor": Noise("declared", 1e-4, 1e-4, np.zeros(3)),
     "joints": Noise("repeats", 1e-4, 1e-4, np.array([2e-4, 0.0, 5e-5])),

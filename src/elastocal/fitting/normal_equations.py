@@ -60,6 +60,8 @@ class Parts:
         self.around: list[Conditions | None] = [around] if self.whole else [None] * len(self.parts)
         if not self.whole and around is not None:
             self.around = [at_states(around, states) for states, _ in self.slices]
+        # What is whitened over several states has no factors any more, one of which belongs to the state.
+        self.factors = not noise.pose_rad or observations.cluster.max() + 1 == len(observations.states)
         self.coordinates: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self.whiteners: dict[int, Whitening | Scaling] = {}
         # Of so many states that conditions are not kept neither are these.
@@ -110,7 +112,7 @@ class Parts:
             whitener, mine = self.whiteners[number], root[seen]
             right = whitener.apply(line.residual * mine[:, None])
             turned = whitener.after(_of_rotation_vectors(line.residual) * mine[:, None, None])
-            if size > _COLUMNS_A_COORDINATE * len(line.displacements.spans):
+            if self.factors and size > _COLUMNS_A_COORDINATE * len(line.displacements.spans):
                 part_gram, part_along = _products(line, turned, right)
                 gram += part_gram
                 along += part_along
