@@ -30,15 +30,24 @@ class InputError(ValueError):
 
     def __init__(self, source: str | Path, key: str, found: str, allowed: str) -> None:
         self.source, self.key, self.found, self.allowed = str(source), key, found, allowed
-        name = _printed(self.source)
+        name = printable(self.source)
         where = name if len(name) <= _LONGEST_SOURCE else f"…{name[1 - _LONGEST_SOURCE :]}"
-        where += f": {_shortened(_printed(key), _LONGEST_KEY)}" if key else ""
-        message = f"{where}: found {_shortened(_printed(found), _LONGEST_FOUND)}; allowed: "
-        super().__init__(message + _shortened(_printed(allowed), LONGEST_MESSAGE - len(message)))
+        where += f": {_shortened(printable(key), _LONGEST_KEY)}" if key else ""
+        message = f"{where}: found {_shortened(printable(found), _LONGEST_FOUND)}; allowed: "
+        super().__init__(message + _shortened(printable(allowed), LONGEST_MESSAGE - len(message)))
 
 
-def _printed(text: str) -> str:
-    """A text on one line, control characters as their escapes: what a file holds must not steer a terminal."""
+def printable(text: str) -> str:
+    """A text on one line, control characters as their escapes: what a file holds must not steer a terminal.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+    """
     line = " ".join(text.split())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 

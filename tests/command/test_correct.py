@@ -73,7 +73,7 @@ def test_a_pose_out_of_reach_is_named_and_nothing_is_written(monkeypatch, tmp_pa
     table.to_csv(path, index=False)
     result, output = run(monkeypatch, cell, path)
     assert isinstance(result.exception, InputError)
-    assert "row 3 is unreachable" in str(result.exception)
+    assert "line 4 is unreachable" in str(result.exception)
     assert not output.exists()
     result, output = run(monkeypatch, cell, path, "--partial")
     assert result.exit_code == 0

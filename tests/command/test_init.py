@@ -31,4 +31,6 @@ def test_a_robot_that_cannot_be_read_leaves_nothing_behind(tmp_path):
     (tmp_path / "arm.yaml").write_text("name: arm\n")
     assert isinstance(run(tmp_path / "cell", "--robot", tmp_path / "arm.yaml").exception, InputError)
     assert isinstance(run(tmp_path / "cell", "--robot", tmp_path / "none.yaml").exception, InputError)
+    (tmp_path / "latin.yaml").write_bytes(b"name: \xe9\n")
+    assert isinstance(run(tmp_path / "cell", "--robot", tmp_path / "latin.yaml").exception, InputError)
     assert not (tmp_path / "cell").exists()

@@ -32,6 +32,10 @@ from elastocal.exchange.column_names import UNITS, is_name, joints_in, kind_of, 
         ("q0", None, None),
         ("Operator", None, None),
         ("tx", None, None),
+        # No arm has so many joints, and each up to the last would be looked for.
+        ("q999999999", None, None),
+        ("q" + "9" * 5000, None, None),
+        ("q٣", None, None),
         ("x_furlong", None, None),
     ],
 )

@@ -1,10 +1,12 @@
 """Tables in any dialect: what is found out, and what is refused with its line."""
 
 import itertools
+import time
 
 import pytest
 from support import refused
 
+from elastocal.exchange import csv_dialect
 from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, read_text_table
 
 
@@ -47,6 +49,9 @@ def test_a_separator_at_the_end_of_rows_and_quotes_are_read(tmp_path):
         ("x;y\n1;2\n1\n", ["line 3", "1 cells", "2, one for each"]),
         ("x;y\n1,5;2.5\n", ["'2.5' in line 2", "'1,5' in line 2", "--decimal"]),
         ('x;y\n"1;2\n', ["line 2"]),
+        ("x;y\n1;\x002\n", ["line 2", "control character", "UTF-16"]),
+        # Only what editors take for ends of lines are ends of lines.
+        ("x;y\n1\x0c\x1c\u2028;2\n1\n", ["line 3", "1 cells"]),
     ],
 )
 def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
@@ -54,8 +59,30 @@ def test_what_cannot_be_read_is_refused_with_its_line(tmp_path, text, words):
         read_text_table(written(tmp_path, text), is_header)
 
 
+def test_lines_that_end_in_any_way_are_counted_as_editors_count_them(tmp_path):
+    found = read_text_table(written(tmp_path, "x;y\r1;2\r\n3;4\n\n5;6"), is_header)
+    assert found.lines == (2, 3, 5) and found.columns["y"] == ("2", "4", "6")
+
+
+def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch):
+    path = written(tmp_path, "x;y\n" + "1;2\n" * 200)
+    monkeypatch.setattr(csv_dialect, "MOST_LINES", 200)
+    with refused(path, "", "201 lines", "at most 200"):
+        read_text_table(path, is_header)
+    monkeypatch.setattr(csv_dialect, "LARGEST_BYTES", 100)
+    with refused(path, "", "more than 100 bytes"):
+        read_text_table(path, is_header)
+
+
+def test_thousands_of_columns_are_looked_at_in_no_time(tmp_path):
+    begin = time.monotonic()
+    with refused(tmp_path / "table.txt", "line 2"):
+        read_text_table(written(tmp_path, ";".join(["x", "y", *map(str, range(30_000))]) + "\n1;2\n"), is_header)
+    assert time.monotonic() - begin < 3.0
+
+
 def test_a_missing_file_and_other_encodings_are_refused(tmp_path):
-    with refused((tmp_path / "none.csv").as_posix(), "", "readable"):
+    with refused((tmp_path / "none.csv").as_posix(), "", "No such file", "a table"):
         read_text_table(tmp_path / "none.csv", is_header)
-    with refused((tmp_path / "table.txt").as_posix(), "byte 4", "UTF-8"):
+    with refused((tmp_path / "table.txt").as_posix(), "line 1", "UTF-8"):
         read_text_table(written(tmp_path, "x;y;°\n", "latin-1"), is_header)

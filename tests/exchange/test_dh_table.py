@@ -61,6 +61,11 @@ FAULTS = {
     "a mass without a centre": ("d,a,alpha,mass_kg\n0,0,0,9\n", "line 2, cx, cy, cz", ["three numbers"]),
     "a centre without a mass": ("d,a,alpha,cx\n0,0,0,9\n", "line 2, mass_kg", ["the mass"]),
     "a mass of nothing": ("d,a,alpha,mass_kg,cx,cy,cz\n0,0,0,0,0,0,0\n", "line 2, mass_kg", ["more than 0"]),
+    "underscores": (HEADER + "1,0,0.1,0,9_0,R\n", "line 2, alpha_deg", ["'9_0'"]),
+    "more turns than a joint counts": (HEADER + "1,0,0.1,0,1e9,R\n", "line 2, alpha_deg", ["'1e9'", "1000 turns at most"]),
+    "an endless cell": (HEADER + f"1,0,{'1' * 200_000},0,90,R\n", "line 2", ["field limit"]),
+    "a quote that is not closed": (HEADER + '1,0,"0.1,0,90,R\n2,0,0,0,0,R\n', "line 2", ["quotes in pairs"]),
+    "more rows than a chain has room for": ("d,a,alpha\n" + "0,0,90\n" * 501, "", ["501 rows", "at most 500"]),
     "no joint": ("d,a,alpha,type\n0,0,0,F\n", "", ["no joint"]),
     "nothing at all": ("# only this\n", "", ["an empty file"]),
 }
@@ -74,6 +79,13 @@ def test_a_fault_names_its_line_and_column(tmp_path, fault):
         read_dh_table(path)
 
 
+@pytest.mark.parametrize("cell", ["pi/0", "0*pi/0", "9" * 400 + "*pi", "1e9*pi", "1000000*pi", "pi/pi"])
+def test_a_multiple_of_pi_is_a_number(tmp_path, cell):
+    path = table(tmp_path, f"d,a,alpha\n0.1,0,{cell}\n")
+    with refused(path, "line 2, alpha", repr(cell)[:100]):
+        read_dh_table(path, "rad")
+
+
 @pytest.mark.parametrize(("name", "text"), [("arm.yaml", "rows: 3"), ("arm.txt", "x"), ("arm.yaml", "[]"), ("arm.yaml", "- 3")])
 def test_what_is_no_table_is_refused(tmp_path, name, text):
     with refused(tmp_path / name, ""):
@@ -84,5 +96,5 @@ def test_a_file_that_is_not_there_or_no_text_is_refused(tmp_path):
     with refused(tmp_path / "none.csv", "", "No such file"):
         read_dh_table(tmp_path / "none.csv")
     (tmp_path / "latin.csv").write_bytes(b"d,a,alpha\n\xff")
-    with refused(tmp_path / "latin.csv", "byte 10", "UTF-8"):
+    with refused(tmp_path / "latin.csv", "line 2", "byte 10", "UTF-8"):
         read_dh_table(tmp_path / "latin.csv")

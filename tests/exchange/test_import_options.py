@@ -1,5 +1,6 @@
 """Options of an import as a file."""
 
+import pytest
 from support import refused
 
 from elastocal.exchange.import_options import import_options_text, read_import_options
@@ -16,4 +17,11 @@ def test_options_read_back_as_they_were(tmp_path):
 def test_an_unknown_key_is_refused(tmp_path):
     (tmp_path / "import.yaml").write_text("seperator: tab\n")
     with refused((tmp_path / "import.yaml").as_posix(), "seperator", "'separator'?"):
+        read_import_options(tmp_path / "import.yaml")
+
+
+@pytest.mark.parametrize("text", ["columns: {null: J1}\n", "units: {1: mm}\n", "columns: {q1: 2}\n"])
+def test_names_and_headers_are_texts(tmp_path, text):
+    (tmp_path / "import.yaml").write_text(text)
+    with refused((tmp_path / "import.yaml").as_posix(), text.partition(":")[0]):
         read_import_options(tmp_path / "import.yaml")

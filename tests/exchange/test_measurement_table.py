@@ -1,12 +1,13 @@
 """Another program's table becomes measurements; what it leaves open is asked for."""
 
 import math
+import time
 
 import numpy as np
 import pytest
 from support import refused
 
-from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
+from elastocal.exchange.measurement_table import SAME_POSE, ImportOptions, read_measurement_table
 
 PLAIN = ImportOptions(units={"angles": "deg", "lengths": "mm"}, target="smr")
 
@@ -37,6 +38,27 @@ def test_poses_loads_and_repeats_are_counted_where_no_column_has_them(tmp_path):
     assert found.table["pose"].tolist() == [1, 1, 1, 1, 2, 2, 2, 1]
     assert found.table["load"].tolist() == [0, 0, 1, 1, 0, 1, 2, 1]
     assert found.table["repeat"].tolist() == [0, 1, 0, 1, 0, 0, 0, 2]
+
+
+def test_poses_without_numbers_are_told_apart_as_by_looking_at_each(tmp_path):
+    rng = np.random.default_rng(5)
+    angles = np.repeat(rng.uniform(-3, 3, (40, 2)), 5, axis=0)[rng.permutation(200)] + rng.uniform(-6e-4, 6e-4, (200, 2))
+    leaders, expected = [], []
+    for row in angles:
+        alike = [number for number, first in enumerate(leaders, 1) if np.abs(row - first).max() <= SAME_POSE]
+        leaders += [] if alike else [row]
+        expected.append(alike[0] if alike else len(leaders))
+    rows = "".join(f"{one!r},{other!r},1,2,3\n" for one, other in angles.tolist())
+    found = table(tmp_path, "q1,q2,x,y,z\n" + rows, ImportOptions(units={"angles": "rad", "lengths": "m"}, target="a"))
+    np.testing.assert_array_equal(found.table["pose"], expected)
+    assert len(leaders) > 40
+
+
+def test_tens_of_thousands_of_poses_are_numbered_in_seconds(tmp_path):
+    begin = time.monotonic()
+    rows = "".join(f"{number * 0.1:.1f},1,2,3\n" for number in range(30_000))
+    assert table(tmp_path, "q1,x,y,z\n" + rows, PLAIN).table["pose"][-1] == 30_000
+    assert time.monotonic() - begin < 6.0
 
 
 def test_labels_of_poses_are_numbered_and_numbers_stay(tmp_path):
@@ -84,7 +106,11 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
         ("x,y,z\n1,2,3\n", PLAIN, ["no joint angles", "--column q1"]),
         ("q1,J1,x,y,z\n0,0,1,2,3\n", PLAIN, ["both 'q1' and 'J1'", "--column q1=NAME"]),
         ("q1,x,y,z\n0,1,a,3\n", PLAIN, ["line 2, column y", "'a'", "number"]),
-        ("q1,x,y,z\n0,1,nan,3\n", PLAIN, ["line 2, column y", "finite"]),
+        ("q1,x,y,z\n0,1,nan,3\n", PLAIN, ["line 2, column y", "a number such as"]),
+        ("q1,x,y,z\n0,1,1_0,3\n", PLAIN, ["line 2, column y", "'1_0'"]),
+        ("q1,x,y,z\n0,1,1e308,3\n", PLAIN, ["line 2, column y", "'1e308'"]),
+        ("q1,x,y,z,pose\n0,1,2,3,99999999999\n", PLAIN, ["line 2, column pose", "an integer, up to"]),
+        ("q999999999,x,y,z\n0,1,2,3\n", PLAIN, ["no joint angles"]),
         ("q1,x,y,z,repeat\n0,1,2,3,0.5\n", PLAIN, ["line 2, column repeat", "an integer"]),
         ("q1,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,1,0,0\n", PLAIN, ["line 2, column qw", "length 1"]),
         ("q1,x [bananas],y,z\n0,1,2,3\n", PLAIN, ["unit of 'x [bananas]'", "mm"]),

@@ -36,13 +36,15 @@ def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
 @pytest.mark.parametrize(
     ("header", "row", "key", "words"),
     [
-        ("x,y,z,rx,ry", "1,0,0,0,0", "header", ["no column 'rz'"]),
-        (HEADER + ",q3", "1,0,0,0,0,0,1", "header", ["unknown column 'q3'"]),
-        (HEADER + ",fx", "1,0,0,0,0,0,1", "header", ["fx without fy, fz"]),
-        (HEADER, "1,0,left,0,0,0", "row 1, column z", ["'left'"]),
-        (HEADER, "1,0,nan,0,0,0", "row 1, column z", ["'nan'"]),
-        (HEADER, "1100,0,0,0,0,0", "row 1", ["1100", "metres"]),
-        (HEADER, "1,0,0,0,0", "row 1", ["5 cells", "6"]),
+        ("x,y,z,rx,ry", "1,0,0,0,0", "line 1", ["no column 'rz'"]),
+        (HEADER + ",q3", "1,0,0,0,0,0,1", "line 1", ["unknown column 'q3'"]),
+        (HEADER + ",fx", "1,0,0,0,0,0,1", "line 1", ["fx without fy, fz"]),
+        (HEADER, "1,0,left,0,0,0", "line 2, column z", ["'left'"]),
+        (HEADER, "1,0,nan,0,0,0", "line 2, column z", ["'nan'"]),
+        (HEADER, "1,0,1_0,0,0,0", "line 2, column z", ["'1_0'"]),
+        ("# made by hand\n" + HEADER, "1,0,1e999,0,0,0", "line 3, column z", ["'1e999'"]),
+        (HEADER, "1100,0,0,0,0,0", "line 2", ["1100", "metres"]),
+        (HEADER, "1,0,0,0,0", "line 2", ["5 cells", "6"]),
     ],
 )
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):

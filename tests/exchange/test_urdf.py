@@ -79,6 +79,13 @@ def test_limits_are_degrees_and_metres_and_a_turn_where_there_are_none(tmp_path)
     assert any("'j' has no limits" in note for note in result.notes)
 
 
+def test_limits_that_stand_for_none_are_a_turn_too(tmp_path):
+    endless = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=(-1e16, 1e16)))
+    result = robot_from_urdf(endless, "a", "b")
+    assert result.document["joint_limits_deg"] == [[-360.0, 360.0]]
+    assert any("'j' has no limits" in note for note in result.notes)
+
+
 def test_a_shift_without_limits_is_refused(tmp_path):
     path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", "prismatic", limits=None))
     with refused(path, "joint 'j': limit", "metres"):

@@ -99,6 +99,8 @@ def test_joints_that_no_serial_arm_has_are_refused(tmp_path, kind):
 def test_an_axis_without_a_direction_is_refused(tmp_path):
     with refused("made.urdf", "joint 'j'", "0 0 0"):
         chain(tmp_path, "a", "b", parts=(link("a"), link("b"), joint("j", "a", "b", axis=(0, 0, 0))))
+    with refused("made.urdf", "joint 'j'", "1e-20"):
+        chain(tmp_path, "a", "b", parts=(link("a"), link("b"), joint("j", "a", "b", axis=(1e-20, 0, 0))))
 
 
 def test_points_that_would_have_one_name_are_refused(tmp_path):

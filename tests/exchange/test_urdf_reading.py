@@ -44,7 +44,7 @@ def test_entities_are_refused_before_they_are_looked_at(tmp_path, text, encoding
 
 def test_more_than_a_urdf_can_have_is_not_read(tmp_path, monkeypatch):
     monkeypatch.setattr(urdf_reading, "LARGEST_BYTES", 1_000_000)
-    with refused(tmp_path / "made.urdf", "", "more than 1 MB"):
+    with refused(tmp_path / "made.urdf", "", "more than 1000000 bytes"):
         read_urdf(file_of(tmp_path, robot(*SOUND) + " " * 1_000_000))
 
 
@@ -75,6 +75,12 @@ FAULTS = {
     "no number": (robot(*SOUND[:2], SOUND[2].replace(PLACE, 'xyz="0 0 nan"')), "joint 'j': origin xyz", ["nan"]),
     "two origins": (robot(*SOUND[:2], SOUND[2].replace("</joint>", "<origin/></joint>")), "joint 'j'", ["<origin> 2 times"]),
     "a negative mass": (robot(link("a", -1.0), *SOUND[1:]), "link 'a': mass value", ["-1.0", "0 or more"]),
+    "underscores": (robot(link("a", 1.0).replace('"1.0"', '"1_0"'), *SOUND[1:]), "link 'a': mass value", ["'1_0'", "a number"]),
+    "a number beyond all machines": (
+        robot(*SOUND[:2], SOUND[2].replace(PLACE, 'xyz="0 0 1e300"')),
+        "joint 'j': origin xyz",
+        ["1e300", "3 numbers"],
+    ),
     "a mass of nothing": (robot(link("a", 1.0).replace('value="1.0"', ""), *SOUND[1:]), "link 'a'", ["<mass> without value"]),
 }
 
@@ -84,6 +90,13 @@ def test_a_fault_is_one_line(tmp_path, fault):
     text, key, words = FAULTS[fault]
     with refused(tmp_path / "made.urdf", key, *words):
         read_urdf(file_of(tmp_path, text))
+
+
+def test_more_links_than_can_be_followed_are_refused_at_once(tmp_path):
+    links = [link(f"l{number}") for number in range(2002)]
+    joints = [joint(f"j{number}", f"l{number}", f"l{number + 1}") for number in range(2001)]
+    with refused(tmp_path / "made.urdf", "", "2002 times <link>", "at most 2000"):
+        read_urdf(file_of(tmp_path, robot(*links, *joints)))
 
 
 def test_a_file_that_is_not_there_is_one_line(tmp_path):

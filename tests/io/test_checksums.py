@@ -39,6 +39,17 @@ def test_any_altered_byte_is_found(file, altered, place):
     check_checksums(FILES)
 
 
+@pytest.mark.parametrize("name", FILES)
+def test_files_of_another_folder_are_found_too(tmp_path, monkeypatch, name):
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    check_checksums(FILES, tmp_path)
+    file = next(path for path in (tmp_path / name, *sorted((tmp_path / name).rglob("*.json"))) if path.is_file())
+    file.write_bytes(b"")
+    with refused(file, "", "other contents than were written"):
+        check_checksums(FILES, tmp_path)
+
+
 def test_a_file_that_is_taken_away_or_added_to_a_folder_is_found():
     Path("data/sealed/block/3.json").write_text("")
     with refused("data/sealed/block/3.json", "", "other contents"):

@@ -50,6 +50,18 @@ def test_a_job_has_a_name_of_its_own():
     assert FIT.name == "fit kuka"
 
 
+def test_any_altered_character_of_a_record_is_found(folder):
+    write_job_record("results/logs/fit.log", FIT)
+    path = folder / RECORDS / "fit.json"
+    written = path.read_text(encoding="utf-8")
+    for place in range(0, len(written) - 1, 7):
+        if written[place].isspace():
+            continue
+        path.write_text(written[:place] + chr(ord(written[place]) ^ 1) + written[place + 1 :], encoding="utf-8")
+        with pytest.raises(InputError, match=r"^results/jobs/fit\.json: found no record of a job "):
+            read_job_records()
+
+
 @pytest.mark.parametrize("text", ["", "{", "{}", "[]", '{"inputs": 1, "outputs": []}'])
 def test_a_damaged_record_is_refused_in_one_line(folder, text):
     write_job_record("results/logs/fit.log", FIT)

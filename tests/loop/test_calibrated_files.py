@@ -1,5 +1,6 @@
 """The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while the campaign is as it was."""
 
+import re
 import shutil
 
 import numpy as np
@@ -9,6 +10,7 @@ from diagnosed_folders import diagnosed_folder
 from support import refused
 
 from elastocal.application.calibrated import calibrated_from
+from elastocal.io.checksums import record_checksums
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.calibrated_files import load_diagnosed
@@ -68,3 +70,19 @@ def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(ma
 def test_a_campaign_that_was_never_diagnosed_is_refused(made, config_folder, tmp_path):
     with refused(made[0].as_posix(), "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
         load_diagnosed(made[0], config_folder / "robots", tmp_path)
+
+
+def test_a_file_of_the_diagnosis_that_was_altered_is_refused(made, config_folder, tmp_path, monkeypatch):
+    """Where the pipeline has them, in results/loop; a number of diagnosis.json alone would move every target."""
+    folder, results = made
+    shutil.copytree(results / "made", tmp_path / "results/loop/made")
+    monkeypatch.chdir(tmp_path)
+    record_checksums(path.relative_to(tmp_path).as_posix() for path in (tmp_path / "results/loop/made").iterdir())
+    assert load_diagnosed(folder, config_folder / "robots", "results/loop").name == "made"
+    diagnosis = tmp_path / "results/loop/made/diagnosis.json"
+    text = diagnosis.read_text(encoding="utf-8")
+    place = re.search(r"\.\d*(\d)", text).start(1)
+    diagnosis.write_text(text[:place] + str((int(text[place]) + 1) % 10) + text[place + 1 :], encoding="utf-8")
+    monkeypatch.chdir(tmp_path.parent)
+    with refused(diagnosis, "", "other contents than were written"):
+        load_diagnosed(folder, config_folder / "robots", tmp_path / "results/loop")

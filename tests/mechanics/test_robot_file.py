@@ -192,6 +192,14 @@ def test_weights_that_do_not_suit_the_robot_are_refused(changes, key, words):
         ({"gear_ratio": [0, 100]}, "gear_ratio[0]"),
         ({"compensator": {"joint": 2, "kind": "rope"}}, "compensator.kind"),
         ({"payload_kg": 0}, "payload_kg"),
+        # Beyond all machines, and so large that sums and squares of it are infinite.
+        ({"payload_kg": 1e300}, "payload_kg"),
+        ({"masses": [WEIGHED["masses"][0] | {"mass_kg": 1e300}]}, "masses[0].mass_kg"),
+        ({"masses": [WEIGHED["masses"][0] | {"centre_m": [0, 0, -1e300]}]}, "masses[0].centre_m[2]"),
+        ({"gravity_m_s2": [0, 0, -1e300]}, "gravity_m_s2[2]"),
+        ({"compliance_urad_per_Nm": [1e300, 1]}, "compliance_urad_per_Nm[0]"),
+        ({"name": "two\x1b[2J"}, "name"),
+        ({"joint_names": ["a", "b\x07"]}, "joint_names[1]"),
     ],
 )
 def test_schema_refuses_weights_that_cannot_be(changes, key):

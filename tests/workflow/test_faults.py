@@ -119,6 +119,20 @@ def test_numbers_inside_of_a_mapping_may_come_from_the_command_line(unstarted):
     unstarted.planned("--config", "evaluation={bootstrap_replicates: 20}")
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("seed: 1\nseed: 2\n", "more.yaml: line 2: found the key 'seed' again; allowed: each key once (first in line 1)"),
+        ("a: &a [x, x]\nb: &b [*a, *a]\nseed: !!binary MQ==\n", "more.yaml: line 3: found the tag "),
+    ],
+)
+def test_a_further_configuration_is_read_as_strictly_as_the_first(text, said, unstarted):
+    unstarted.path("more.yaml").write_text(text, encoding="utf-8")
+    ended = unstarted.snakemake("-j1", "--configfile", "more.yaml")
+    assert ended.returncode != 0 and said in ended.stderr.splitlines()[-1]
+    assert "Traceback" not in ended.stderr
+
+
 def _truncate(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
 

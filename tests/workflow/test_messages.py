@@ -22,3 +22,17 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
     monkeypatch.setattr("elastocal.report.first_page.sentences", lambda document: [document["verdict"], "more"])
     made = ["reports/study.pdf", "reports/loop/cell7/report.pdf", "reports/tables/table1.csv"]
     assert outcome(made) == ["cell7: not_testable", "    reports/loop/cell7/report.pdf", "the study: reports/study.pdf"]
+
+
+def test_a_script_that_fails_while_it_imports_has_no_log_and_is_said_to_have_none(finished):
+    finished.path("results/identified/kuka/200um/6DoF.parquet").unlink()
+    script = finished.path("workflow/scripts/identify.py")
+    script.write_text("import none_of_this_name\n" + script.read_text(encoding="utf-8"), encoding="utf-8")
+    ended = finished.snakemake("-j1", "results/identified/kuka/200um/6DoF.parquet")
+    said = ended.stderr.splitlines()
+    assert ended.returncode != 0 and any(
+        "No module named 'none_of_this_name'" in line for line in said + ended.stdout.splitlines()
+    )
+    assert said[-1].startswith(
+        "identify: found an end before its log began (results/logs/identify/kuka/200um/6DoF.log); allowed: "
+    )

@@ -12,7 +12,9 @@ FILE = Path(workflow.basedir, "config.yaml")
 try:
     # Of what the file holds no key counts here; Snakemake reads it again, with the changes of the command line.
     FILE = FILE.relative_to(Path.cwd()) if FILE.is_relative_to(Path.cwd()) else FILE
-    if not isinstance(read_document(FILE), dict):
-        raise InputError(FILE, "", "no keys", "the keys of src/elastocal/schemas/config.yaml")
+    # Those of --configfile as well, which Snakemake has read by now without bounds and without a word on a key that stands twice.
+    for each in (FILE, *(workflow.config_settings.configfiles or ())):
+        if not isinstance(read_document(each), dict):
+            raise InputError(each, "", "no keys", "the keys of src/elastocal/schemas/config.yaml")
 except InputError as error:
     sys.exit(str(error))

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
 from elastocal.io.storage import Column
+from elastocal.io.texts import LARGEST_NUMBER
 from elastocal.mechanics.components import WRENCH
 
 if TYPE_CHECKING:
@@ -189,11 +190,14 @@ def _passed_over(line: str) -> bool:
 def _split(lines: Iterable[str], path: str, before: int) -> Iterator[tuple[int, list[str]]]:
     """Line in the file and cells of each row; `before` lines of the file are left out."""
     reader = csv.reader(lines, skipinitialspace=True, strict=True)
+    ended = 0
     try:
         for cells in reader:
-            yield before + reader.line_num, cells
+            ended = reader.line_num
+            yield before + ended, cells
     except csv.Error as error:
-        raise InputError(path, f"line {before + reader.line_num}", str(error), "comma-separated values") from None
+        # A quote that is never closed is in the first of the lines that it swallows.
+        raise InputError(path, f"line {before + ended + 1}", str(error), "comma-separated values, quotes in pairs") from None
 
 
 def _numbers(cells: Sequence[str]) -> np.ndarray | list[str]:
@@ -336,9 +340,11 @@ class MeasurementFile:
         except (ValueError, TypeError):
             index = next(i for i, cell in enumerate(self.columns[name]) if not _is_number(cell))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), "a number with a decimal point") from None
-        if not np.isfinite(values).all():
-            index = int(np.argmin(np.isfinite(values)))
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), "a finite number")
+        # Not a number is no more than anything either.
+        sound = np.abs(values) <= LARGEST_NUMBER
+        if not sound.all():
+            index = int(np.argmin(sound))
+            raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
         return values
 
 

@@ -34,6 +34,33 @@ def diagnosed_campaign(folder: Path) -> Diagnosed:
     return load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
 
 
+def report_file(name: str, file: str) -> Path | None:
+    """A file of the reports of a campaign.
+
+    Parameters
+    ----------
+    name : str
+        Of the campaign.
+    file : str
+
+    Returns
+    -------
+    Path or None
+        None where there is none.
+
+    Raises
+    ------
+    InputError
+        A file that is no longer what the pipeline wrote.
+    """
+    from elastocal.io.checksums import check_checksums
+
+    place = f"reports/loop/{name}/{file}"
+    check_checksums([place], workplace())
+    path = workplace() / place
+    return path if path.is_file() else None
+
+
 def held_out_rms_m(name: str) -> float | None:
     """What the model of a campaign missed its held-out poses by (RMS), m; None where no verdict says so.
 
@@ -48,5 +75,5 @@ def held_out_rms_m(name: str) -> float | None:
     """
     from elastocal.io.json_files import read_json
 
-    path = workplace() / "reports" / "loop" / name / "verdict.json"
-    return read_json(path)["heldout"]["after"]["rms_m"] if path.is_file() else None
+    path = report_file(name, "verdict.json")
+    return None if path is None else read_json(path)["heldout"]["after"]["rms_m"]

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.campaign import diagnosed_campaign, report_file
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.quantities import length_m
 from elastocal.errors import InputError
@@ -49,7 +49,7 @@ def certificate(
     reports = workplace() / "reports" / "loop" / found.name
     needed = [reports / name for name in ("verdict.json", "before_after.csv", "residuals.parquet")]
     for path in needed:
-        if not path.is_file():
+        if report_file(found.name, path.name) is None:
             raise InputError(path, "", "no report of the diagnosis", f"elastocal diagnose {folder}")
     verdict = read_json(needed[0])
     if any(effect["family"] == "data" for effect in verdict["effects"]):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.compensation import Correction
 
-# Rows that a message names.
+# Lines that a message names.
 _NAMED = 5
 
 
@@ -54,7 +54,7 @@ def correct(
         )
     bad = (found.status != OK).nonzero()[0]
     if len(bad) and not partial:
-        rows = ", ".join(f"row {row + 1} is {found.status[row]}" for row in bad[:_NAMED])
+        rows = ", ".join(f"line {wanted.lines[row]} is {found.status[row]}" for row in bad[:_NAMED])
         more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
         raise InputError(path, "", rows + more, "poses that the robot reaches within its limits, or --partial")
     beyond = beyond_campaign(

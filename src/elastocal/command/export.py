@@ -28,7 +28,7 @@ def export(
     table: Annotated[
         int, typer.Option(min=0, help="Rows of a table of errors over the joint space, for programs that cannot run the model.")
     ] = 0,
-    force: Annotated[float, typer.Option(min=0.0, help="Hanging load of the table in N.")] = 0.0,
+    force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
 ) -> None:
     """Write the calibrated robot: robot file, URDF and DH parameters (geometry), and a sidecar with springs and effects."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements, ImportOptions
@@ -89,9 +89,8 @@ def csv(
     with atomic_write(folder / CSV) as partial:
         write_measurements(partial, found.table, found.joints)
     write_text(folder / IMPORT, import_options_text(found.options, file))
-    typer.echo(
-        "\n".join([*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"])
-    )
+    lines = [*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
+    typer.echo("\n".join(map(printable, lines)))
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:

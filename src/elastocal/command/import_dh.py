@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from elastocal.errors import printable
 from elastocal.exchange.dh import RELATIVE_STD, robot_from_dh
 from elastocal.exchange.robot_text import refuse_existing, summary, write_robot
 
@@ -52,4 +53,4 @@ def dh(
     refuse_existing(output, force)
     result = robot_from_dh(file, modified, angles.value, lengths.value, name, mass_std)
     write_robot(result, output)
-    typer.echo("\n".join([*summary(result), f"written: {output.as_posix()}"]))
+    typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from elastocal.errors import printable
 from elastocal.exchange.robot_text import refuse_existing, summary, write_robot
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_weights import RELATIVE_STD
@@ -27,4 +28,4 @@ def urdf(
     refuse_existing(output, force)
     result = robot_from_urdf(file, base, tip, point or (), mass_std)
     write_robot(result, output)
-    typer.echo("\n".join([*summary(result), f"written: {output.as_posix()}"]))
+    typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

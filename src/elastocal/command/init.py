@@ -20,13 +20,15 @@ def init(
     from elastocal.campaigns.reading import read_robot
     from elastocal.campaigns.template import campaign_template, robot_template, sheet_template
     from elastocal.io.atomic_writes import write_text
+    from elastocal.io.documents import LARGEST_BYTES
+    from elastocal.io.texts import read_text
 
     place = folder / "robot.yaml"
     if (folder / DOCUMENT).exists():
         raise InputError(folder / DOCUMENT, "", "a campaign that is there already", "a folder without campaign.yaml")
     if robot is not None and place.exists():
         raise InputError(place, "", "a robot that is there already", "a folder without robot.yaml, or no --robot")
-    text = robot_template() if robot is None else robot.read_text(encoding="utf-8") if robot.is_file() else ""
+    text = robot_template() if robot is None else read_text(robot, LARGEST_BYTES)
     source = place if place.exists() else robot
     arm = None if source is None else read_robot(source)
     folder.mkdir(parents=True, exist_ok=True)

@@ -16,7 +16,10 @@ from elastocal.command.init import init
 from elastocal.command.plan import plan
 from elastocal.errors import InputError
 
-app = typer.Typer(name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+# Without the boxes of rich the last line says what is wrong with an option.
+app = typer.Typer(
+    name="elastocal", no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+)
 app.command()(init)
 app.command()(diagnose)
 app.command()(correct)
@@ -33,9 +36,13 @@ def elastocal() -> None:
 
 
 def main() -> None:
-    """Run the command; exit code 1 with one line on standard error where the input is wrong."""
+    """Run the command; exit code 1 with one line on standard error where the input is wrong, or the machine fails."""
     try:
         app()
     except InputError as error:
-        print(error, file=sys.stderr)
-        sys.exit(1)
+        sys.exit(str(error))
+    except OSError as error:
+        allowed = "a place with space where this user may write"
+        sys.exit(str(InputError(str(error.filename or "disk"), "", error.strerror or str(error), allowed)))
+    except MemoryError:
+        sys.exit(str(InputError("memory", "", "none left", "a smaller file, or more memory")))

@@ -29,7 +29,7 @@ def plan(
     accuracy: Annotated[str | None, typer.Option(help="Wanted accuracy such as 0.1mm: as few poses as reach it.")] = None,
     number: Annotated[int, typer.Option("--candidates", min=10, help="Configurations among which is chosen.")] = 10_000,
     criterion: Annotated[str, typer.Option(help="D, A or I: determinant, parameters, error over the workspace.")] = "D",
-    force: Annotated[float, typer.Option(min=0.0, help="Force of the load in N; 0 for none.")] = 0.0,
+    force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
     pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction; otherwise it hangs.")] = False,
     measured: Annotated[str, typer.Option(help="position or pose.")] = "position",
     base_known: Annotated[bool, typer.Option("--base-known", help="Measurements are in the base frame.")] = False,

@@ -41,8 +41,9 @@ COVARIATES = ("time_s", "temperature_c", "u95_m")
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
-_JOINT = re.compile(r"(?:q|j|a|axis|joint|theta|jointangle|actualq)(\d+)")
-_APPROACH = re.compile(r"(?:approach|direction)(\d+)")
+# No arm has a hundred joints, and a table is looked through for each up to the last that it names.
+_JOINT = re.compile(r"(?:q|j|a|axis|joint|theta|jointangle|actualq)([0-9]{1,2})")
+_APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
 _ALSO = {
     "x": ("px", "posx", "positionx", "measuredx", "xmeas"),
     "y": ("py", "posy", "positiony", "measuredy", "ymeas"),
@@ -86,7 +87,7 @@ def kind_of(name: str) -> tuple[str, ...]:
     tuple of str
         Keys of `UNITS`.
     """
-    if re.fullmatch(r"q\d+", name):
+    if re.fullmatch(r"q[0-9]+", name):
         # A prismatic joint reports a length.
         return ANGLE, LENGTH
     if name in (*POSITION, "t14", "t24", "t34", "u95_m"):
@@ -100,7 +101,7 @@ def kind_of(name: str) -> tuple[str, ...]:
 
 def is_name(name: str) -> bool:
     """Whether a column of that name can be imported."""
-    return name in _ALSO or name in _KNOWN.values() or re.fullmatch(r"(q|approach)\d+", name) is not None
+    return name in _ALSO or name in _KNOWN.values() or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
 
 
 def unit_scale(name: str, unit: str) -> float | None:
@@ -143,7 +144,7 @@ def recognized(header: str) -> tuple[str | None, str | None]:
 
 def joints_in(names: Iterable[str]) -> list[str]:
     """Names of joint angles among names, from q1 on."""
-    numbers = sorted(int(name[1:]) for name in names if re.fullmatch(r"q\d+", name))
+    numbers = sorted(int(name[1:]) for name in names if re.fullmatch(r"q[0-9]+", name))
     return [f"q{number}" for number in numbers]
 
 

@@ -5,11 +5,13 @@ from __future__ import annotations
 import codecs
 import csv
 import re
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
+from elastocal.io.texts import decoded, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -19,8 +21,11 @@ SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": 
 DECIMALS = {"point": ".", "comma": ","}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _COMMENTS = ("#", "%", "//")
-_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
-_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?", re.ASCII)
+_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
+_ENDS = re.compile(r"\r\n|\n|\r")
+# The whole of it is in memory, as text and as cells: some 2 GB at most.
+LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,7 @@ def read_text_table(
         A file that cannot be read or has no header, a row of another length, or decimals that are written both ways.
     """
     source = Path(path).as_posix()
-    lines = _lines(path, source)
+    lines = _lines(path)
     kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
@@ -101,11 +106,10 @@ def read_text_table(
         if not stated:
             raise InputError(source, f"line {header}", "no header", "the line that names the columns")
         separator = separator or _separator_of(stated[0])
-    table = [(number, _cells(line, separator, source, number)) for number, line in kept if number >= header]
+    table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number >= header]
     names, rows = table[0][1], table[1:]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(source, f"line {header}", f"column {name!r} twice", "each column once")
+    if twice := [name for name, times in Counter(names).items() if times > 1]:
+        raise InputError(source, f"line {header}", f"column {twice[0]!r} twice", "each column once")
     for number, cells in rows:
         # A separator at the end of the rows and not of the header is common.
         if len(cells) == len(names) + 1 and not cells[-1]:
@@ -123,15 +127,26 @@ def read_text_table(
     return TextTable(source, Dialect(separator, decimal, header), columns, tuple(number for number, _ in rows))
 
 
-def _lines(path: str | Path, source: str) -> list[str]:
-    try:
-        content = Path(path).read_bytes()
-        encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
-        return content.decode(encoding).splitlines()
-    except OSError as error:
-        raise InputError(source, "", error.strerror or str(error), "a readable file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(source, f"byte {error.start}", "text that is neither UTF-8 nor UTF-16", "UTF-8") from None
+def lines_of(text: str) -> list[str]:
+    """Lines of a text as editors count them; other characters that Python takes for ends of lines stay in their line."""
+    lines = _ENDS.split(text)
+    return lines[:-1] if lines[-1] == "" else lines
+
+
+def _lines(path: str | Path) -> list[str]:
+    content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
+    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
+    text = decoded(content, path, encoding)
+    if (null := text.find("\0")) >= 0:
+        line = text.count("\n", 0, null) + 1
+        raise InputError(
+            path, f"line {line}", "the control character '\\x00'", "text in UTF-8, or in UTF-16 with a byte order mark"
+        )
+    lines = lines_of(text)
+    if len(lines) > MOST_LINES:
+        allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
+        raise InputError(path, "", f"{len(lines)} lines", allowed)
+    return lines
 
 
 def _header(
@@ -139,7 +154,7 @@ def _header(
 ) -> tuple[str, int]:
     for number, line in kept:
         for name in [separator] if separator else [name for name, mark in SEPARATORS.items() if mark in line]:
-            if is_header(_cells(line, name, source, number)):
+            if is_header(cells_of(line, name, source, number)):
                 return name, number
     first = kept[0][1][:60]
     allowed = "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are"
@@ -150,8 +165,29 @@ def _separator_of(line: str) -> str:
     return next((name for name, mark in SEPARATORS.items() if mark in line), "comma")
 
 
-def _cells(line: str, separator: str, source: str, number: int) -> list[str]:
-    mark = SEPARATORS[separator]
+def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
+    """Cells of one line.
+
+    Parameters
+    ----------
+    line : str
+    separator : str
+        A name in `SEPARATORS`, or the mark itself.
+    source : str
+        Named in errors.
+    number : int
+        Of the line.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    InputError
+        Quotes that are not in pairs, a cell of more than 100,000 characters.
+    """
+    mark = SEPARATORS.get(separator, separator)
     if mark == " ":
         return line.split()
     try:

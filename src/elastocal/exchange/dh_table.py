@@ -19,7 +19,6 @@ may stand for a number. Optional columns: ``lower`` and ``upper`` (joint limits;
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import dataclass
@@ -28,7 +27,9 @@ from typing import TYPE_CHECKING, Any
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
-from elastocal.io.documents import read_document
+from elastocal.exchange.csv_dialect import cells_of, lines_of
+from elastocal.io.documents import LARGEST_BYTES, read_document
+from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -40,7 +41,11 @@ _ANGLES, _LENGTHS, _LIMITS = ("theta_offset", "alpha"), ("d", "a", "cx", "cy", "
 _PLAIN = ("compliance_urad_per_Nm", "mass_kg")
 _WORDS = ("joint", "type", "point")
 _NEEDED = ("d", "a", "alpha")
-_PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.IGNORECASE)
+_PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.ASCII | re.IGNORECASE)
+# The chain of more has no room in a robot file.
+MOST_ROWS = 500
+# A joint may count any number of turns; a thousand are a mistake.
+MOST_TURNS = 1000
 _COMMENT = "#"
 
 
@@ -109,6 +114,8 @@ def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m") -> 
         raise InputError(source, "", f"a file that ends in {suffix or 'nothing'!r}", ".csv, .yaml or .yml")
     columns, table = _csv_rows(path, source) if suffix == ".csv" else _yaml_rows(path, source)
     meanings = _meanings(columns, angles, lengths, source)
+    if len(table) > MOST_ROWS:
+        raise InputError(source, "", f"{len(table)} rows", f"at most {MOST_ROWS}, one for each joint")
     rows = [_row(where, cells, meanings, source) for where, cells in table]
     if not any(row.kind != FIXED for row in rows):
         raise InputError(source, "", "no joint", "a row of type R or P for each joint")
@@ -125,19 +132,14 @@ class _Meaning:
 
 
 def _csv_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
-    try:
-        with open(path, encoding="utf-8-sig", newline="") as file:
-            lines = [(number, line) for number, line in enumerate(file, 1) if line.strip() and not line.startswith(_COMMENT)]
-    except OSError as error:
-        raise InputError(source, "", error.strerror or str(error), "a readable file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(source, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
+    text = enumerate(lines_of(read_text(path, LARGEST_BYTES)), 1)
+    lines = [(number, line) for number, line in text if line.strip() and not line.startswith(_COMMENT)]
     if not lines:
         raise InputError(source, "", "an empty file", "a header and one row for each joint")
     separator = ";" if ";" in lines[0][1] else ","
-    cells = [[cell.strip() for cell in row] for row in csv.reader((line for _, line in lines), delimiter=separator)]
+    cells = [cells_of(line, separator, source, number) for number, line in lines]
     header, table = cells[0], []
-    for (number, _), row in zip(lines[1:], cells[1:], strict=False):
+    for (number, _), row in zip(lines[1:], cells[1:], strict=True):
         if len(row) != len(header):
             raise InputError(source, f"line {number}", f"{len(row)} cells", f"{len(header)}, one for each column")
         table.append((f"line {number}", dict(zip(header, row, strict=True))))
@@ -194,8 +196,10 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         column, meaning = column_of[name], meanings[column_of[name]]
         turns = name in _ANGLES or (name in _LIMITS and kind != PRISMATIC)
         value = _number(text(name), turns and meaning.angle == "rad")
-        if value is None:
-            raise InputError(source, f"{where}, {column}", repr(text(name)), "a number")
+        largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
+        if value is None or abs(value) > largest:
+            allowed = f"a number{f', {MOST_TURNS} turns at most' if turns else ''}"
+            raise InputError(source, f"{where}, {column}", repr(text(name)), allowed)
         if name in _PLAIN:
             if not value > 0:
                 raise InputError(source, f"{where}, {column}", text(name), "more than 0")
@@ -237,10 +241,7 @@ def _number(text: str, of_pi: bool) -> float | None:
     """A number, or in radians a multiple of pi; None for anything else."""
     match = _PI.fullmatch(text.replace(" ", "")) if of_pi else None
     if match:
-        sign, factor, divisor = match.groups()
-        return (-1.0 if sign == "-" else 1.0) * float(factor or 1) * math.pi / float(divisor or 1)
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) and "_" not in text else None
+        sign, *parts = match.groups()
+        factor, divisor = (plain_number(part or "1") for part in parts)
+        return (-1.0 if sign == "-" else 1.0) * factor * math.pi / divisor if factor is not None and divisor else None
+    return plain_number(text)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from scipy.spatial import cKDTree
 
 from elastocal.campaigns.measurements import closest_first, file_columns, shown
 from elastocal.errors import InputError
@@ -39,6 +40,7 @@ from elastocal.exchange.rotations import (
     is_rotation,
     rotation_vectors,
 )
+from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -51,6 +53,8 @@ ON_ROBOT, BY_ROBOT = "on-robot", "by-robot"
 # Angles that a controller reports twice at one standstill agree to better; poses of a plan lie degrees apart.
 SAME_POSE = 1e-3
 _TRANSLATION = ("t14", "t24", "t34")
+# Of a pose, load, repeat or session; as in measurements.csv.
+_LARGEST_ORDINAL = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -271,28 +275,19 @@ class _Reader:
     def numbers(self, name: str) -> np.ndarray:
         """ndarray (N,), SI units."""
         cells = self.cells(name)
-        try:
-            values = np.array(cells, float)
-        except ValueError:
-            values = np.array([_number(cell) for cell in cells])
+        values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in cells])
         if not np.isfinite(values).all():
-            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a finite number")
+            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a number such as -0.25 or 2.5e-3")
         unit = self.units.get(name)
         return values if unit is None else values * (unit_scale(name, unit) or 1.0)
 
     def integers(self, name: str) -> np.ndarray:
         """ndarray of int (N,)."""
         values = self.numbers(name)
-        if (values != np.round(values)).any():
-            raise self.fault(int(np.argmax(values != np.round(values))), name, "an integer")
+        wrong = (values != np.round(values)) | (np.abs(values) > _LARGEST_ORDINAL)
+        if wrong.any():
+            raise self.fault(int(np.argmax(wrong)), name, f"an integer, up to {_LARGEST_ORDINAL}")
         return values.astype(np.int64)
-
-
-def _number(cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError:
-        return np.nan
 
 
 def _wrench(read: _Reader, acts: str) -> dict[str, np.ndarray]:
@@ -358,10 +353,13 @@ def _ordinals(read: _Reader, table: Mapping[str, np.ndarray]) -> dict[str, np.nd
 
 def _same(values: np.ndarray, within: float) -> np.ndarray:
     """Number of each row by first appearance, from 1: one for rows that agree to `within`."""
-    numbers = np.zeros(len(values), np.int64)
+    different, which = np.unique(values, axis=0, return_inverse=True)
+    near = cKDTree(different)
+    numbers = np.zeros(len(different), np.int64)
     number = 0
-    while (rest := numbers == 0).any():
-        number += 1
-        first = values[int(np.argmax(rest))]
-        numbers[rest & (np.abs(values - first).max(axis=1) <= within)] = number
-    return numbers
+    for row in which:
+        if not numbers[row]:
+            number += 1
+            alike = np.array(near.query_ball_point(different[row], within, p=np.inf))
+            numbers[alike[numbers[alike] == 0]] = number
+    return numbers[which]

@@ -13,13 +13,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.importers.csv_columns import read_columns, table
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
+from elastocal.exchange.csv_dialect import read_text_table
+from elastocal.io.texts import plain_number
 from elastocal.mechanics.components import WRENCH
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from elastocal.exchange.csv_dialect import TextTable
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
@@ -42,6 +45,8 @@ class TargetPath:
         N, N m.
     approach : ndarray (N, n) or None
     time_s, temperature_c : ndarray (N,) or None
+    lines : tuple of int (N,)
+        Line of the file of each pose.
     """
 
     position: np.ndarray
@@ -51,6 +56,7 @@ class TargetPath:
     approach: np.ndarray | None
     time_s: np.ndarray | None
     temperature_c: np.ndarray | None
+    lines: tuple[int, ...]
 
     def __len__(self) -> int:
         return len(self.position)
@@ -77,26 +83,44 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
     known = (*_POSE, *_WRENCH, *angles, *approach, "time_s", "temperature_c")
-    cells = read_columns(path, ",", _POSE, f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes")
+    read = read_text_table(path, lambda _: True, "comma", "point")
+    cells, header = read.columns, f"line {read.dialect.header}"
+    for name in _POSE:
+        if name not in cells:
+            allowed = f"{', '.join(_POSE)}: position in m and rotation vector in rad, base axes, separated by commas"
+            raise InputError(path, header, f"no column {name!r}", allowed)
     for name in cells:
         if name not in known:
-            raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, known))
+            raise InputError(path, header, f"the unknown column {name!r}", closest_first(name, known))
 
     def group(names: tuple[str, ...]) -> np.ndarray | None:
         there = [name for name in names if name in cells]
         if not there:
             return None
         if missing := [name for name in names if name not in cells]:
-            raise InputError(path, "header", f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
-        return table(path, cells, names)
+            raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
+        return np.column_stack([_numbers(read, name) for name in names])
 
-    pose = table(path, cells, _POSE)
+    pose = np.column_stack([_numbers(read, name) for name in _POSE])
     far = np.abs(pose[:, :3]).max(axis=1) > _FARTHEST_M
     if far.any():
         row = int(np.argmax(far))
         allowed = f"metres, {_FARTHEST_M:g} at most"
-        raise InputError(path, f"row {row + 1}", f"a position of {np.abs(pose[row, :3]).max():g}", allowed)
+        raise InputError(path, f"line {read.lines[row]}", f"a position of {np.abs(pose[row, :3]).max():g}", allowed)
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
     rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
-    return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature)
+    return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
+
+
+def _numbers(read: TextTable, name: str) -> np.ndarray:
+    """A column, ndarray (N,)."""
+    values = np.zeros(len(read.lines))
+    for index, cell in enumerate(read.columns[name]):
+        value = plain_number(cell)
+        if value is None:
+            raise InputError(
+                read.path, f"line {read.lines[index]}, column {name}", repr(cell), "a number such as -0.25 or 2.5e-3"
+            )
+        values[index] = value
+    return values

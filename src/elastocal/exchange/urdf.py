@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.errors import InputError
+from elastocal.exchange.dh_table import MOST_TURNS
 from elastocal.exchange.robot_text import imported
 from elastocal.exchange.urdf_chain import chain_between
 from elastocal.exchange.urdf_reading import read_urdf
@@ -86,7 +87,7 @@ def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
     if low >= high and prismatic:
         allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
         raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}", allowed)
-    if low >= high:
+    if low >= high or (not prismatic and max(-low, high) > 2.0 * math.pi * MOST_TURNS):
         notes.append(f"joint {joint.name!r} has no limits in the URDF: a turn either way")
         return list(UNLIMITED_DEG)
     return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
     from yourdfpy import URDF, Joint
 
+# Of a shorter one the direction is no more than rounding.
+_SHORTEST_AXIS = 1e-9
 _MOVING = {"revolute": "R", "continuous": "R", "prismatic": "T"}
 
 
@@ -143,8 +145,8 @@ def _moved(
 ) -> tuple[list[str], Carried]:
     """Words of a joint that moves, and where it carries what is behind it."""
     axis = np.asarray(joint.axis, float)
-    if not np.linalg.norm(axis) > 0:
-        raise InputError(source, f"joint {joint.name!r}: axis xyz", "0 0 0", "a direction")
+    if not np.linalg.norm(axis) > _SHORTEST_AXIS:
+        raise InputError(source, f"joint {joint.name!r}: axis xyz", " ".join(f"{part:g}" for part in axis), "a direction")
     kind = _MOVING[joint.type]
     before, letter, minus, after = turned_axis(axis)
     negative = (minus == "-") != (sign < 0)

@@ -12,7 +12,6 @@ References
 from __future__ import annotations
 
 import io
-import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +19,7 @@ from xml.etree import ElementTree
 from xml.parsers import expat
 
 from elastocal.errors import InputError
+from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
+# Whole cells with grippers and cameras have some hundred links; each is followed to the root.
+MOST_PARTS = 2000
+LARGEST_LIMIT = 1e100
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
 # How many numbers each attribute has that is read.
@@ -59,7 +62,7 @@ def read_urdf(path: str | Path) -> URDF:
         A file that is missing, too large, no URDF, or one whose joints and links do not hold together.
     """
     source = Path(path).as_posix()
-    root = _root_of(_bytes_of(path), source)
+    root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
     cleaned = ElementTree.Element("robot", {"name": root.get("name") or Path(path).stem})
     for part in root:
         if part.tag == "link":
@@ -71,17 +74,6 @@ def read_urdf(path: str | Path) -> URDF:
     from yourdfpy import URDF
 
     return URDF.load(io.BytesIO(ElementTree.tostring(cleaned)), load_meshes=False, build_scene_graph=False)
-
-
-def _bytes_of(path: str | Path) -> bytes:
-    try:
-        with open(path, "rb") as file:
-            data = file.read(LARGEST_BYTES + 1)
-    except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable URDF file") from None
-    if len(data) > LARGEST_BYTES:
-        raise InputError(path, "", f"more than {LARGEST_BYTES // 10**6} MB", "a URDF, which has less than one")
-    return data
 
 
 def _root_of(data: bytes, source: str) -> ElementTree.Element:
@@ -123,7 +115,9 @@ def _copy(part: ElementTree.Element, called: str, kept: tuple[str, ...], source:
         if len(children) > 1:
             raise InputError(source, called, f"<{tag}> {len(children)} times", "once at most")
         for attribute, count in _NUMBERS.get(tag, {}).items():
-            _check_numbers(children[0].get(attribute), count, f"{called}: {tag} {attribute}", source)
+            # Programs write 1e16 and more where a joint, a force or a speed has no limit.
+            largest = LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
+            _check_numbers(children[0].get(attribute), count, f"{called}: {tag} {attribute}", source, largest)
         needed = _NEEDED.get(tag)
         if needed and not children[0].get(needed):
             raise InputError(source, called, f"<{tag}> without {needed}", f"<{tag} {needed}=...>")
@@ -150,14 +144,11 @@ def _by_tag(part: ElementTree.Element, kept: tuple[str, ...]) -> Iterator[tuple[
             yield tag, children
 
 
-def _check_numbers(text: str | None, count: int, key: str, source: str) -> None:
+def _check_numbers(text: str | None, count: int, key: str, source: str, largest: float) -> None:
     if text is None:
         return
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError:
-        numbers = []
-    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+    words = text.split(None, count)
+    if len(words) != count or any(plain_number(word, largest) is None for word in words):
         raise InputError(source, key, repr(text), "a number" if count == 1 else f"{count} numbers")
 
 
@@ -166,6 +157,8 @@ def _check_tree(robot: ElementTree.Element, source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not parts:
             raise InputError(source, "", f"no <{tag}>", "a URDF with links and joints")
+        if len(parts) > MOST_PARTS:
+            raise InputError(source, "", f"{len(parts)} times <{tag}>", f"at most {MOST_PARTS}")
         name, times = Counter(part.attrib["name"] for part in parts).most_common(1)[0]
         if times > 1:
             raise InputError(source, f"{tag} {name!r}", f"{times} times", "each name once")

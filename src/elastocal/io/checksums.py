@@ -34,13 +34,15 @@ def record_checksums(paths: Iterable[str]) -> None:
         write_text(place, "".join(f"{checksum(file)}  {file}\n" for file in _files_of(path)))
 
 
-def check_checksums(paths: Iterable[str]) -> None:
+def check_checksums(paths: Iterable[str], within: str | Path = "") -> None:
     """Refuse files that are no longer what the step wrote that made them.
 
     Parameters
     ----------
     paths : iterable of str
         As in `record_checksums`; of files without a record nothing is known.
+    within : str or Path
+        Folder that they and the records are in; the working directory without.
 
     Raises
     ------
@@ -48,17 +50,17 @@ def check_checksums(paths: Iterable[str]) -> None:
         The first such file.
     """
     for path in filter(_made, paths):
-        place = _record_of(path)
-        if not place.is_file() or not Path(path).exists():
+        place = Path(within, _record_of(path))
+        if not place.is_file() or not Path(within, path).exists():
             continue
         lines = place.read_text("utf-8").splitlines()
         written = {file: digest for digest, _, file in (line.partition("  ") for line in lines)}
-        found = {file: checksum(file) for file in _files_of(path)}
+        found = {file: checksum(Path(within, file)) for file in _files_of(path, within)}
         for file in sorted(written.keys() | found.keys()):
             if written.get(file) != found.get(file):
                 again = "it" if file == path else path
                 allowed = f"the file as the pipeline wrote it (delete {again} and it is made again)"
-                raise InputError(file, "", "other contents than were written", allowed)
+                raise InputError(Path(within, file), "", "other contents than were written", allowed)
 
 
 def checksum(path: str | Path) -> str:
@@ -76,11 +78,13 @@ def checksum(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _files_of(path: str) -> list[str]:
+def _files_of(path: str, within: str | Path = "") -> list[str]:
     """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step."""
-    if not Path(path).is_dir():
+    folder = Path(within, path)
+    if not folder.is_dir():
         return [path]
-    return sorted(file.as_posix() for file in Path(path).rglob("*") if file.is_file() and not file.name.startswith("."))
+    files = [file for file in folder.rglob("*") if file.is_file() and not file.name.startswith(".")]
+    return sorted(file.relative_to(within).as_posix() for file in files)
 
 
 def _made(path: str) -> bool:

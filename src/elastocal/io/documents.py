@@ -5,9 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import math
-import os
 import re
-import stat
 from functools import cache
 from importlib import resources
 from itertools import islice
@@ -18,6 +16,7 @@ import jsonschema
 import yaml
 
 from elastocal.errors import InputError
+from elastocal.io.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
@@ -126,18 +125,7 @@ def read_document(path: str | Path) -> Any:
     InputError
         A file that is missing or is no YAML, such as a URDF.
     """
-    try:
-        # A pipe or a device would never end.
-        if not stat.S_ISREG((status := os.stat(path)).st_mode):
-            raise InputError(path, "", "no regular file", "a readable file")
-        if status.st_size > LARGEST_BYTES:
-            raise InputError(path, "", f"{status.st_size} bytes", f"at most {LARGEST_BYTES} bytes of YAML")
-        text = Path(path).read_text("utf-8")
-    except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
-    except UnicodeDecodeError as error:
-        raise InputError(path, f"byte {error.start}", "text that is not UTF-8", "a UTF-8 file") from None
-    return parsed(text, path)
+    return parsed(read_text(path, LARGEST_BYTES), path)
 
 
 def parsed(text: str, source: str | Path) -> Any:
@@ -165,8 +153,10 @@ def parsed(text: str, source: str | Path) -> Any:
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
         line = getattr(getattr(error, "problem_mark", None), "line", None)
-        where = "" if line is None else f"line {line + 1}"
         found = (getattr(error, "problem", None) or str(error)).removeprefix("but ").removeprefix("found ")
+        if isinstance(error, yaml.reader.ReaderError):
+            line, found = text.count("\n", 0, error.position), f"the control character {chr(error.character)!r}"
+        where = "" if line is None else f"line {line + 1}"
         raise InputError(source, where, found, getattr(error, "allowed", "YAML")) from None
 
 

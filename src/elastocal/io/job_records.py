@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.json_files import read_json, write_json
-from elastocal.io.origin import Origin
+from elastocal.io.origin import Origin, configuration_sha256
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
+    from typing import Any
 
 RECORDS = Path("results/jobs")
 _LOGS = "results/logs"
+# Of all else that the record says.
+_DIGEST = "sha256"
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,8 @@ def write_job_record(log: str, record: JobRecord) -> None:
         return
     place = (RECORDS / Path(log).relative_to(_LOGS)).with_suffix(".json")
     place.parent.mkdir(parents=True, exist_ok=True)
-    write_json(place, asdict(record))
+    written = asdict(record)
+    write_json(place, written | {_DIGEST: _digest(written)})
 
 
 def read_job_records(folder: str | Path = RECORDS) -> list[JobRecord]:
@@ -115,9 +119,15 @@ def jobs_behind(targets: Iterable[str], records: Iterable[JobRecord]) -> list[Jo
     return sorted(found.values(), key=lambda record: (record.started, record.name))
 
 
+def _digest(written: Mapping[str, Any]) -> str:
+    return configuration_sha256(written)
+
+
 def _read(path: Path) -> JobRecord:
     try:
         kept = read_json(path)
+        if kept.pop(_DIGEST) != _digest(kept):
+            raise ValueError("other contents than were written")
         files = {key: tuple(kept[key]) for key in ("inputs", "outputs")}
         return JobRecord(**kept | files | {"origin": Origin(**kept["origin"])})
     except (ValueError, KeyError, TypeError) as error:

@@ -12,6 +12,7 @@ from elastocal.application.calibrated import calibrated_of
 from elastocal.campaigns.columns import columns_of
 from elastocal.errors import InputError
 from elastocal.fitting.case import case_from, noise_from
+from elastocal.io.checksums import check_checksums
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.diagnosis_tables import final_parameters, step_model
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 # Of results/loop/<campaign>/.
 DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS = "campaign.json", "training.parquet", "held_out.parquet", "diagnosis.json"
 STEPS_TABLE, CORRELATIONS_TABLE = "steps.parquet", "correlations.parquet"
+_FILES = (DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS, STEPS_TABLE, CORRELATIONS_TABLE)
 
 
 @dataclass(frozen=True)
@@ -70,16 +72,17 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str |
     Raises
     ------
     InputError
-        Not diagnosed, or changed since.
+        Not diagnosed, changed since, or a file of the diagnosis that is no longer what the pipeline wrote.
     """
     descriptions, *parts = load_campaign(folder, robots_folder)
     name = descriptions["campaign"]["campaign"]
-    tables = Path(results) / name
+    tables = Path(results).absolute() / name
     again = f"a campaign as it was diagnosed: elastocal diagnose {folder}"
-    if not all(
-        (tables / file).is_file() for file in (DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS, STEPS_TABLE, CORRELATIONS_TABLE)
-    ):
+    if not all((tables / file).is_file() for file in _FILES):
         raise InputError(folder, "", f"no diagnosis of it in {results}", again)
+    # Of a job Snakemake's script does it; here people and their editors have been at the files.
+    top = tables.parents[2]
+    check_checksums([(tables / file).relative_to(top).as_posix() for file in _FILES], top)
     columns = [columns_of(part) for part in parts]
     kept = [
         read_table(tables / file, measurements(part.joint_angles.shape[1]))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.io
 
+from elastocal.campaigns.importers.mat_files import read_mat
 from elastocal.campaigns.importers.reflectors import write_reflectors
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.errors import InputError
@@ -50,12 +50,7 @@ def read(path: str | Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         No MAT file, a variable that is missing or has another shape.
     """
     names = ("q", *(f"m{target}" for target in TARGETS))
-    try:
-        found = scipy.io.loadmat(path, variable_names=names)
-    except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
-    except Exception as error:  # the reader lets through whatever broken bytes make of its parts
-        raise InputError(path, "", f"no readable MAT file ({error})", "a MAT file of version 5") from None
+    found = read_mat(path, names)
     for name in names:
         shape, width = np.shape(found.get(name, ())), 6 if name == "q" else 3
         if len(shape) != 2 or shape != (len(found["q"]), width) or found[name].dtype.kind != "f" or not len(found["q"]):

@@ -8,8 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.io
 
+from elastocal.campaigns.importers.mat_files import read_mat
 from elastocal.campaigns.importers.unloaded import unloaded_document
 from elastocal.campaigns.public_data import PublicFile
 from elastocal.campaigns.writing import write_campaign as write_folder
@@ -73,12 +73,7 @@ def read(path: str | Path) -> tuple[np.ndarray, np.ndarray]:
     InputError
         No MAT file, another shape, or a turntable that turns.
     """
-    try:
-        found = scipy.io.loadmat(path, variable_names=[_NAME])
-    except OSError as error:
-        raise InputError(path, "", error.strerror or str(error), "a readable file") from None
-    except Exception as error:  # the reader lets through whatever broken bytes make of its parts
-        raise InputError(path, "", f"no readable MAT file ({error})", "a MAT file of version 5") from None
+    found = read_mat(path, [_NAME])
     rows = np.asarray(found.get(_NAME, np.zeros(0)))
     if rows.ndim != 2 or rows.shape[1] != _COLUMNS or rows.dtype.kind != "f":
         raise InputError(path, _NAME, f"shape {rows.shape}", f"(rows, {_COLUMNS}) numbers")

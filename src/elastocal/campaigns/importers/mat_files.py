@@ -1,0 +1,49 @@
+"""Variables of MAT files; what is none, or is damaged, is one line."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING
+
+import scipy.io
+
+from elastocal.errors import InputError
+from elastocal.io.texts import read_bytes
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+    from typing import Any
+
+KIND = "a MAT file of version 5"
+# Of the sources here the largest has four megabytes.
+LARGEST_BYTES = 200_000_000
+
+
+def read_mat(path: str | Path, names: Sequence[str]) -> dict[str, Any]:
+    """Some variables of a MAT file.
+
+    Parameters
+    ----------
+    path : str or Path
+    names : sequence of str
+        Of the variables; any that the file does not have is left out.
+
+    Returns
+    -------
+    dict of str to ndarray
+
+    Raises
+    ------
+    InputError
+        No file, or one that scipy cannot read as a whole.
+    """
+    content = read_bytes(path, LARGEST_BYTES, KIND)
+    # The stubs of scipy know paths alone.
+    stream: Any = io.BytesIO(content)
+    try:
+        found: dict[str, Any] = scipy.io.loadmat(stream, variable_names=list(names))
+    except Exception:
+        # The reader lets through whatever broken bytes make of its parts; its words say nothing of the file.
+        raise InputError(path, "", f"no readable MAT file, or one that is damaged ({len(content)} bytes)", KIND) from None
+    return {name: found[name] for name in names if name in found}

@@ -1,0 +1,123 @@
+"""Bytes and texts of files that people hand in, and the numbers in them: bounded, and of regular files alone."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+import stat
+from pathlib import Path
+
+from elastocal.errors import InputError
+
+# Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
+# No length, angle, force, mass or time of a robot is larger in any unit; squares and products of such numbers are finite.
+LARGEST_NUMBER = 1e12
+_LONGEST_NUMBER = 100
+
+
+def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:
+    """Contents of a file.
+
+    Parameters
+    ----------
+    path : str or Path
+    largest : int
+        Bytes that it may have.
+    kind : str
+        What the file should be, for messages.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    InputError
+        No file, none that may be read, a larger one, or a pipe or device, which might never end.
+    """
+    try:
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
+            found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
+            raise InputError(path, "", found, kind)
+        if status.st_size <= largest:
+            with open(path, "rb") as file:
+                content = file.read(largest + 1)
+            if len(content) <= largest:
+                return content
+        raise InputError(path, "", f"more than {largest} bytes", f"{kind} of at most {largest} bytes")
+    except OSError as error:
+        raise InputError(path, "", error.strerror or str(error), kind) from None
+    except ValueError as error:
+        # A null character in the path; but an InputError is one too.
+        if isinstance(error, InputError):
+            raise
+        raise InputError(path, "", str(error), kind) from None
+
+
+def read_text(path: str | Path, largest: int, kind: str = "a readable file") -> str:
+    """Contents of a file in UTF-8, without the byte order mark that spreadsheets write.
+
+    Parameters
+    ----------
+    path, largest, kind
+        As in `read_bytes`.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        As `read_bytes`, and a text in another encoding, with the line of the first byte at fault.
+    """
+    return decoded(read_bytes(path, largest, kind), path)
+
+
+def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> str:
+    """Text of the contents of a file.
+
+    Parameters
+    ----------
+    content : bytes
+    path : str or Path
+        Named in errors.
+    encoding : str
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        Another encoding.
+    """
+    try:
+        return content.decode(encoding)
+    except UnicodeDecodeError as error:
+        # Its object may lack the mark in front; lines are the same.
+        line = error.object[: error.start].count(b"\n") + 1
+        name = "UTF-16" if encoding == "utf-16" else "UTF-8"
+        raise InputError(path, f"line {line}", f"text that is not {name} (byte {error.start})", "a UTF-8 file") from None
+
+
+def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
+    """A decimal number as people write it.
+
+    Parameters
+    ----------
+    text : str
+    largest : float
+        Size that it may have.
+
+    Returns
+    -------
+    float or None
+        None for anything else: nothing, words, not-a-number, infinity, digits with underscores, a larger number.
+    """
+    value = float(text) if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) else math.inf
+    return value if abs(value) <= largest else None

@@ -1,0 +1,56 @@
+"""Files that people hand in: bounded, regular, UTF-8; numbers as people write them."""
+
+import os
+
+import pytest
+from support import refused
+
+from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes, read_text
+
+
+def test_contents_are_read_up_to_a_bound(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_bytes(b"12345")
+    assert read_bytes(path, 5) == b"12345"
+    with refused(path, "", "more than 4 bytes", "a table of at most 4 bytes"):
+        read_bytes(path, 4, "a table")
+
+
+def test_what_might_never_end_is_not_opened(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "zero").symlink_to("/dev/zero")
+    (tmp_path / "loop").symlink_to("loop")
+    for name, words in (
+        ("pipe", "no regular file"),
+        ("zero", "no regular file"),
+        ("loop", "Too many levels"),
+        ("", "a folder"),
+    ):
+        with refused(tmp_path / name, "", words):
+            read_bytes(tmp_path / name, 10)
+    for name, words in (("none", "No such file"), ("a\0b", "null")):
+        with refused("", "", words):
+            read_bytes(tmp_path / name, 10)
+
+
+def test_text_loses_its_mark_and_other_encodings_are_refused_with_their_line(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("é\r\n", encoding="utf-8-sig", newline="")
+    assert read_text(path, 100) == "é\r\n"
+    path.write_bytes(b"a\nb\n\xe9\n")
+    with refused(path, "line 3", "not UTF-8 (byte 4)"):
+        read_text(path, 100)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("1", 1.0), ("-1.5e-3", -1.5e-3), ("+.5", 0.5), ("2.", 2.0), ("1e12", LARGEST_NUMBER)]
+)
+def test_numbers_as_people_write_them(text, value):
+    assert plain_number(text) == value
+
+
+@pytest.mark.parametrize(
+    "text", ["", "1_0", "nan", "inf", "-infinity", "1e400", "1e13", "٣", "1,5", "1 000", "0x10", "9" * 5000, "1e", ".", "1\n"]
+)
+def test_anything_else_is_none(text):
+    assert plain_number(text) is None

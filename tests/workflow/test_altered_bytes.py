@@ -1,0 +1,75 @@
+"""Of each file that a run makes in data/ and results/, any byte that is altered is found by what reads the file next."""
+
+import random
+import sys
+
+import pytest
+
+from elastocal.errors import InputError
+from elastocal.io.checksums import check_checksums
+from elastocal.io.job_records import read_job_records
+
+# Texts for people: of what a job said and how long it took no job makes anything. The records of checksums judge the others.
+NOT_READ = ("results/logs/", "results/timings/", "results/checksums/")
+
+
+def read_next(name):
+    """As a job or a command begins."""
+    check_checksums([name])
+    if name.startswith("results/jobs/"):
+        read_job_records()
+
+
+def altered_bytes(folder, flips, seed):
+    """Alter bytes of every file, one at a time; the numbers of those that were found, that say the same, and that were missed.
+
+    Parameters
+    ----------
+    folder : Path
+        Of a finished run; the working directory.
+    flips : int
+        For each file, at random places.
+    seed : int
+
+    Returns
+    -------
+    dict of str to int
+    list of str
+        Files and places of those that were missed.
+    """
+    draws, counts, missed = random.Random(seed), {"found": 0, "harmless": 0, "missed": 0}, []
+    paths = [path for top in ("data", "results") for path in sorted((folder / top).rglob("*")) if path.is_file()]
+    names = [path.relative_to(folder).as_posix() for path in paths]
+    for name in (name for name in names if not name.startswith(NOT_READ) and name.count("/") > 1):
+        path = folder / name
+        written = path.read_bytes()
+        meant = read_job_records() if name.startswith("results/jobs/") else None
+        for _ in range(flips):
+            place, bit = draws.randrange(len(written)), 1 << draws.randrange(8)
+            path.write_bytes(written[:place] + bytes([written[place] ^ bit]) + written[place + 1 :])
+            try:
+                read_next(name)
+                same = meant is not None and meant == read_job_records()
+                counts["harmless" if same else "missed"] += 1
+                missed += [] if same else [f"{name} at {place}"]
+            except InputError:
+                counts["found"] += 1
+        path.write_bytes(written)
+    return counts, missed
+
+
+@pytest.mark.usefixtures("finished")
+def test_any_altered_byte_is_found(finished, monkeypatch):
+    monkeypatch.chdir(finished.folder)
+    counts, missed = altered_bytes(finished.folder, 1, 5)
+    assert missed == []
+    # Of a record of a job a blank is harmless; of any other file every byte counts.
+    assert counts["found"] > 100 and counts["harmless"] < counts["found"] / 10
+
+
+if __name__ == "__main__":
+    import os
+    from pathlib import Path
+
+    os.chdir(sys.argv[1])
+    print(*altered_bytes(Path.cwd(), int(sys.argv[2]), int(sys.argv[3])))
