@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from elastocal.diagnosis.summed import Sums, null_draws_of, off_rounding, rows_alike
+from elastocal.diagnosis.summed import Sums, nothing_left, null_draws_of, rows_alike
 from elastocal.fitting.observations import groups_by_size
 
 if TYPE_CHECKING:
@@ -178,30 +178,18 @@ def products_of(rows: WhiteRows, prior_std: np.ndarray, present: np.ndarray, joi
     left -= basis @ (basis.T @ left)
     width = projected.shape[1] + count
     gram, squares = np.eye(width), rows.candidates.gram()
-    inside = off_rounding(squares, squares - projected[:, :-1].T @ projected[:, :-1], gram[count:-1, count:-1])
-    gram[count:-1, -1] = gram[-1, count:-1] = np.where(inside, 0.0, products[:, -1] - projected[:, :-1].T @ projected[:, -1])
+    own, along = gram[count:-1, count:-1], products[:, -1] - projected[:, :-1].T @ projected[:, -1]
+    np.subtract(squares, projected[:, :-1].T @ projected[:, :-1], out=own)
+    inside = nothing_left(squares, own)
+    own[inside], own[:, inside], along[inside] = 0.0, 0.0, 0.0
+    gram[count:-1, -1] = gram[-1, count:-1] = along
     gram[-1, -1] = left @ left
-    pose_rows, pose_gram = _by_pose(rows, beside, projected)
+    pose_rows, pose_gram = rows.products_by_pose(beside)
+    pose_rows[..., count:] -= pose_rows[..., :count] @ projected
     pose_rows[..., count:-1][..., inside] = 0.0
     freedom = max(round(len(declared) - (seen**2).sum()), 1)
     into_basis = np.linalg.inv(triangle) / norms[:, None]
     return Products(count, gram, pose_rows, pose_gram, joint_rad, rows, freedom, into_basis, projected)
-
-
-def _by_pose(rows: WhiteRows, beside: np.ndarray, projected: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """B_p and C_p of `Products`; `beside` are the orthonormal columns and the residual (M, rows, P + 1)."""
-    jacobian, count = rows.jacobian, len(projected)
-    joints, poses = jacobian.shape[2], int(rows.pose.max()) + 1
-    pose_rows, pose_gram = np.empty((poses, joints, count + projected.shape[1])), np.empty((poses, joints, joints))
-    for members in groups_by_size(rows.pose):
-        mine = rows.pose[members[:, 0]]
-        turned = jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
-        together = turned @ beside[members].reshape(len(members), -1, count + 1)
-        pose_rows[mine, :, :count], pose_rows[mine, :, -1] = together[..., :-1], together[..., -1]
-        pose_gram[mine] = turned @ turned.transpose(0, 2, 1)
-    pose_rows[..., count:-1] = rows.candidates.times_by_pose(jacobian, rows.pose)
-    pose_rows[..., count:] -= pose_rows[..., :count] @ projected
-    return pose_rows, pose_gram
 
 
 def statistics_of(products: Products | Sums, pose_error_rad: np.ndarray) -> Statistics:

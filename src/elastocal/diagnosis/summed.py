@@ -67,6 +67,32 @@ class WhiteRows:
         """Whether every pose is one state: an error of the pose is one of the state then."""
         return len(np.unique(self.pose)) == len(np.unique(self.candidates.state))
 
+    def products_by_pose(self, beside: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What an error of the joints in each pose would look like in other rows, the candidates and itself.
+
+        Parameters
+        ----------
+        beside : ndarray (M, rows, P + 1)
+            Orthonormal declared columns Q, and the residual y.
+
+        Returns
+        -------
+        ndarray (G, n, P + K + 1)
+            J'[Q W y] of each pose.
+        ndarray (G, n, n)
+            J'J.
+        """
+        count, joints, poses = beside.shape[2] - 1, self.jacobian.shape[2], int(self.pose.max()) + 1
+        rows, gram = np.empty((poses, joints, count + self.candidates.columns + 1)), np.empty((poses, joints, joints))
+        for members in groups_by_size(self.pose):
+            mine, height = self.pose[members[:, 0]], members.shape[1] * beside.shape[1]
+            turned = self.jacobian[members].reshape(len(members), height, joints).transpose(0, 2, 1)
+            together = turned @ beside[members].reshape(len(members), height, count + 1)
+            rows[mine, :, :count], rows[mine, :, -1] = together[..., :-1], together[..., -1]
+            gram[mine] = turned @ turned.transpose(0, 2, 1)
+        rows[..., count:-1] = self.candidates.times_by_pose(self.jacobian, self.pose)
+        return rows, gram
+
     def whitened(self, tau: float) -> WhiteRows:
         """Rows with (I + tau^2 J J')^-1/2 applied, of poses that are one state each."""
         parts = self.declared, self.candidates.jacobian, self.residual[..., None], self.jacobian
@@ -202,7 +228,7 @@ def summed(
         twice = projected.T @ rest
         left = raw[count:, count:] - twice - twice.T - projected.T @ raw[:count, :count] @ projected
         if not number:
-            inside = np.diag(left)[:-1] <= _INSIDE * np.diag(raw)[count:-1]
+            inside = nothing_left(raw[count:-1, count:-1], left[:-1, :-1])
         rest[:, :-1][:, inside], left[:-1][inside], left[:, :-1][:, inside] = 0.0, 0.0, 0.0
         totals[number] = np.block([[raw[:count, :count], rest], [rest.T, left]])
     log_dets = np.array([total.log_det for total in sums])
@@ -235,7 +261,9 @@ class _Sum:
         self.entries = self.entries + block.candidates.gram_of_entries()
         self.candidates = block.candidates
         if tau and not one_state_each:
-            taken = _taken(block, beside, tau)
+            rows, gram = block.products_by_pose(beside)
+            factor = np.linalg.cholesky(np.eye(gram.shape[1]) + tau**2 * gram)
+            taken = np.linalg.solve(factor, tau * rows).reshape(-1, rows.shape[2])
             self.taken = self.taken + taken.T @ taken
 
     def products(self, prior: np.ndarray) -> np.ndarray:
@@ -264,39 +292,19 @@ def _log_det(block: WhiteRows, tau: float) -> float:
     return total
 
 
-def _taken(block: WhiteRows, beside: np.ndarray, tau: float) -> np.ndarray:
-    """Rows [Q W y] whose squares an error of the poses takes from the products, ndarray (G n, P + K + 1)."""
-    jacobian, joints = block.jacobian, block.jacobian.shape[2]
-    poses, count = int(block.pose.max()) + 1, beside.shape[2] - 1
-    rows, inner = np.empty((poses, joints, count + block.candidates.columns + 1)), np.empty((poses, joints, joints))
-    for members in groups_by_size(block.pose):
-        mine, seen = block.pose[members[:, 0]], tau * jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
-        together = seen @ beside[members].reshape(len(members), -1, count + 1)
-        rows[mine, :, :count], rows[mine, :, -1] = together[..., :-1], together[..., -1]
-        inner[mine] = np.eye(joints) + seen @ seen.transpose(0, 2, 1)
-    rows[..., count:-1] = tau * block.candidates.times_by_pose(jacobian, block.pose)
-    return np.linalg.solve(np.linalg.cholesky(inner), rows).reshape(-1, rows.shape[2])
-
-
-def off_rounding(before: np.ndarray, after: np.ndarray, out: np.ndarray) -> np.ndarray:
-    """Products of columns after something is taken off, zero where nothing but rounding is left of a column.
+def nothing_left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Columns of which nothing but rounding is left after something is taken off.
 
     Parameters
     ----------
     before, after : ndarray (K, K)
-    out : ndarray (K, K)
-        Overwritten.
+        Products of the columns.
 
     Returns
     -------
     ndarray of bool (K,)
-        Columns of which nothing is left.
     """
-    inside = np.diag(after) <= _INSIDE * np.diag(before)
-    out[:] = after
-    out[inside] = 0.0
-    out[:, inside] = 0.0
-    return inside
+    return np.diag(after) <= _INSIDE * np.diag(before)
 
 
 def null_draws_of(sums: Sums, gram: np.ndarray, count: int, stream: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
