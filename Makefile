@@ -70,11 +70,13 @@ lock:
 clean:
 	rm -rf .venv .venv-crate .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json
 
-.venv/bin/python: requirements-install.lock
+# A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
+.venv/made: requirements-install.lock
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install -q --require-hashes -r requirements-install.lock
+	touch $@
 
-.venv/ready: requirements.lock pyproject.toml | .venv/bin/python
+.venv/ready: requirements.lock pyproject.toml | .venv/made
 	$(INSTALL) --no-deps --require-hashes -r requirements.lock
 	$(INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
@@ -89,7 +91,7 @@ clean:
 	touch $@
 
 # The validator of crates.
-.venv-crate/ready: requirements-crate.lock | .venv/bin/python
+.venv-crate/ready: requirements-crate.lock | .venv/made
 	$(PYTHON) -m venv .venv-crate
 	$(BIN)/uv pip install -q --system-certs --python .venv-crate/bin/python --no-deps --require-hashes -r requirements-crate.lock
 	touch $@
