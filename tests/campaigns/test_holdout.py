@@ -218,5 +218,5 @@ def test_other_campaign_that_is_not_there_is_refused(cell):
 )
 def test_faulty_holdout_is_refused_in_one_line(cell, changes, key, words):
     cell.document |= changes
-    with refused(f"{cell.source}: {key}", key, *words):
+    with refused(f"{cell.source}: ", f" {key}", *words):
         cell.read()

@@ -224,7 +224,7 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
 )
 def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
     cell.document |= changes
-    with refused(f"{cell.source}: {key}", key, *words):
+    with refused(f"{cell.source}: ", f" {key}", *words):
         cell.read(effects=["joint_offset", "payload"])
 
 

@@ -132,7 +132,7 @@ def test_faulty_strategy_is_refused_in_one_line(path, value, key, words):
 
 @pytest.mark.parametrize("document", [None, [], "text", 3])
 def test_document_that_is_no_mapping_is_refused_in_one_line(document):
-    with refused("robots/x.yaml", "", "object"):
+    with refused("robots/x.yaml", "", "keys with values"):
         check_document(document, "robot", "robots/x.yaml")
 
 
@@ -276,3 +276,32 @@ def test_a_document_is_named_and_not_reached_by_a_path(tmp_path, name):
     assert named_document(tmp_path, "robots", "robot", "one", "config.yaml") == ROBOT
     with refused("config.yaml", "robots", "one"):
         named_document(tmp_path, "robots", "robot", name, "config.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "allowed"),
+    [
+        (
+            "name: x\nstages:\n- points: [EE]\n  joints: [1]\n- points: [EE]\n  joints: [a]\n",
+            "line 6, stages[1].joints[0]: ",
+            "",
+        ),
+        ("\n\nnmae: x\n", "line 3, nmae: ", "name"),
+        ("name: x\nstages:\n", "line 2, stages: found nothing", "array"),
+        ("name: x\n", "yaml: stages: found nothing", ""),
+        ("- 1\n", "yaml: found [1]", "keys with values"),
+    ],
+)
+def test_what_a_schema_refuses_is_named_with_its_line(tmp_path, text, key, allowed):
+    path = tmp_path / "strategy.yaml"
+    path.write_text(text, encoding="utf-8")
+    with refused(path, key, allowed):
+        check_document(read_document(path), "strategy", path.as_posix())
+
+
+def test_a_value_that_the_file_does_not_have_has_no_line(tmp_path):
+    """Such as one of the command line, put into what was read."""
+    path = tmp_path / "strategy.yaml"
+    path.write_text("name: x\n", encoding="utf-8")
+    with refused(path, "yaml: stages[0]: found 3"):
+        check_document({"name": "x", "stages": [3]}, "strategy", path.as_posix())

@@ -70,7 +70,7 @@ FAULTS = {
         "questions.point_sets.6DoF",
         ["'9DoF'", "2DoF, 3DoF, 4DoF"],
     ),
-    "section that is no mapping": (("tables",), 3, "tables", ["found 3", "object"]),
+    "section that is no mapping": (("tables",), 3, "tables", ["found 3", "keys with values"]),
 }
 
 
@@ -119,7 +119,7 @@ def test_robots_with_other_joints_and_points_pass(other_config, other_folder):
 
 FAULTY_FILES = {
     "bad YAML": ("robots/arm.yaml", "name: [arm\n", "line 2", ["YAML"]),
-    "empty": ("robots/arm.yaml", "", "", ["None", "object"]),
+    "empty": ("robots/arm.yaml", "", "", ["found nothing", "keys with values"]),
     "missing key": ("robots/arm.yaml", "name: arm\n", "chain", ["nothing", "chain notation"]),
     "typo": ("strategies/plain.yaml", "name: plain\nstage: []\n", "stage", ["unknown key", "'stages'?"]),
     "unknown point": ("strategies/plain.yaml", "name: x\nstages: [{points: [C], joints: [1]}]\n", "stages[0].points", ["A, B"]),

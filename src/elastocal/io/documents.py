@@ -236,7 +236,33 @@ def check_document(document: Any, schema: str, source: str) -> None:
         islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
     )
     if errors:
-        raise InputError(source, *_explained(errors[0]))
+        key, found, allowed = _explained(errors[0])
+        line = _line_of(source, errors[0])
+        raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
+
+
+def _line_of(source: str, error: _Violation) -> str:
+    """Line of the file at which a key stands, or what it should stand in; empty where there is no such file any more."""
+    try:
+        node = yaml.compose(read_text(source, LARGEST_BYTES), Loader=_Loader)
+    except (InputError, yaml.YAMLError):
+        return ""
+    path = [*error.absolute_path]
+    if error.validator == "additionalProperties":
+        path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
+    mark = node.start_mark if node else None
+    for part in path:
+        if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
+            node = node.value[part]
+            mark = node.start_mark
+            continue
+        entries = node.value if isinstance(node, yaml.MappingNode) else []
+        entry = next(((key, value) for key, value in entries if key.value == str(part)), None)
+        if entry is None:
+            # Such as a value of the command line, which the file does not have.
+            return ""
+        mark, node = entry[0].start_mark, entry[1]
+    return f"line {mark.line + 1}" if mark and path else ""
 
 
 def _explained(error: _Violation) -> tuple[str, str, str]:
@@ -268,7 +294,8 @@ def _explained(error: _Violation) -> tuple[str, str, str]:
         "uniqueItems": lambda: "each entry once",
         "pattern": lambda: f"text that matches {value}",
     }.get(rule, lambda: error.message)()
-    return key, repr(error.instance), f"{allowed} ({meaning})" if meaning else allowed
+    found = "nothing" if error.instance is None else repr(error.instance)
+    return key, found, f"{allowed} ({meaning})" if meaning else allowed
 
 
 def _of_type(allowed: str | list[str], instance: Any) -> str:
@@ -276,7 +303,8 @@ def _of_type(allowed: str | list[str], instance: Any) -> str:
     written = _WITHOUT_POINT.fullmatch(instance) if isinstance(instance, str) else None
     if written and ("number" in allowed):
         return f"number, which YAML has as {written[1]}.{written[2] or 0}e{written[3] or '+'}{written[4]}"
-    return allowed if isinstance(allowed, str) else " or ".join(allowed)
+    words = {"object": "keys with values, such as name: value", "null": "nothing"}
+    return " or ".join(words.get(name, name) for name in ([allowed] if isinstance(allowed, str) else allowed))
 
 
 def document_path(folder: str | Path, kind: str, name: str) -> str:

@@ -75,7 +75,8 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
             "model absorbs it.",
             "So these measurements show neither that something is missing nor that nothing is.",
         ]
-    chance = f"{100 * verdict['probabilities']['alarm_p_value']:.2g} %"
+    share = 100 * verdict["probabilities"]["alarm_p_value"]
+    chance = f"{share:.2g} %" if share < 99.5 else "100 %"
     level = f"the alarm is set to {percent(verdict['settings']['alarm_level']['value'])}"
     if kind == "adequate":
         return [
