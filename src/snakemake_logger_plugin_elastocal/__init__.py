@@ -87,5 +87,5 @@ def _reason(rule: str, logs: Sequence[str]) -> str:
     """Last line of the logs of a job that failed; a script begins its log once it has imported all."""
     lines = [line for log in logs if Path(log).is_file() for line in Path(log).read_text(encoding="utf-8").splitlines()]
     found = f"{rule}: found an end before its log began ({', '.join(logs)})"
-    said = f"{found}; allowed: a script that can start (its error stands above)"
-    return next((line for line in reversed(lines) if line.strip()), said)
+    otherwise = f"{found}; allowed: a script that can start (its error stands above)"
+    return next((line for line in reversed(lines) if line.strip()), otherwise)
