@@ -219,11 +219,14 @@ def summed(
     # Of the measurements, not of the priors: the trace of the hat matrix.
     measured = sums[0].beside
     hat = np.trace(np.linalg.solve((measured + known.T @ known)[:count, :count], measured[:count, :count]))
-    every = [total.products(known.T @ known) for total in sums]
-    first = every[0]
-    projected = np.linalg.solve(first[:count, :count], first[:count, count:])
-    totals, inside = np.empty((len(every), *first.shape)), np.zeros(first.shape[0] - count - 1, bool)
-    for number, raw in enumerate(every):
+    log_dets = np.array([total.log_det for total in sums])
+    totals = np.empty((0, 0, 0))
+    for number in range(len(sums)):
+        # What is summed for one size of the pose error makes room for the products of the next.
+        raw = sums.pop(0).products(known.T @ known)
+        if not number:
+            totals = np.empty((len(log_dets), *raw.shape))
+            projected = np.linalg.solve(raw[:count, :count], raw[:count, count:])
         rest = raw[:count, count:] - raw[:count, :count] @ projected
         twice = projected.T @ rest
         left = raw[count:, count:] - twice - twice.T - projected.T @ raw[:count, :count] @ projected
@@ -231,7 +234,6 @@ def summed(
             inside = nothing_left(raw[count:-1, count:-1], left[:-1, :-1])
         rest[:, :-1][:, inside], left[:-1][inside], left[:, :-1][:, inside] = 0.0, 0.0, 0.0
         totals[number] = np.block([[raw[:count, :count], rest], [rest.T, left]])
-    log_dets = np.array([total.log_det for total in sums])
     freedom = max(round(rows - hat), 1)
     return Sums(count, np.asarray(pose_error_rad), totals, log_dets, rows, freedom, into_basis, projected)
 
