@@ -26,7 +26,8 @@ from elastocal.plant.physical_robot import specimen
 from elastocal.plant.weights import declared_masses
 
 ROBOTS = ROOT / "config" / "robots"
-CASES, SEED = 12, 2026
+# The median of a dozen lies between two groups of cases and jumps by a tenth from run to run.
+CASES, SEED = 48, 2026
 CASE_S, PROOF_MIN, CORES = 0.7, 45.0, 2
 SERIES_A_S, SERIES_A_GB = 60.0, 1.0
 MILLION, MILLION_S, MILLION_GB = 1_000_000, 300.0, 2.0
@@ -82,9 +83,9 @@ def rows(work: Path) -> Iterator[Row]:
     if os.environ.get(FOLDER_VARIABLE):
         source = os.path.join(os.environ[FOLDER_VARIABLE], ur10_ipa.FILES["ur10_ipa_a"].local)
         ur10_ipa.write_campaign(source, work / "series_a", "ur10_series_a")
-        how = "UR10 Series A, 11,911 poses, from its folder to its verdict, linear algebra on two threads"
+        how = "UR10 Series A, 11,911 poses, from its folder to its verdict, one thread as in a job of the workflow"
         yield from _limits("large ur10_series_a", work / "series_a", SERIES_A_S, SERIES_A_GB, how)
-    how = "a million measurements of a tracker's dynamic mode, from the file to the verdict, linear algebra on two threads"
+    how = "a million measurements of a tracker's dynamic mode, from file to verdict, one thread as in a job of the workflow"
     yield from _limits("large million", _dynamic(work, MILLION), MILLION_S, MILLION_GB, how)
     yield from _growth(work)
 
@@ -131,7 +132,8 @@ def _old_engine(work: Path) -> Iterator[Row]:
 
 
 def _limits(name: str, folder: Path, allowed_s: float, allowed_gb: float, how: str) -> Iterator[Row]:
-    run = _run([folder], threads=CORES)
+    # A second thread costs more than it brings: 76 s for 58 of UR10 Series A, most of whose matrices are small.
+    run = _run([folder])
     (seconds,), peak = run["seconds"], run["peak_gb"]
     yield Row(f"{name} time", seconds, allowed_s, seconds / allowed_s, "<= 1", seconds <= allowed_s, how)
     memory = f"peak of {peak:.2f} GB against {allowed_gb:g} GB: {how}"

@@ -123,8 +123,7 @@ def linearized(
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
     against = other.competitors(around)
     laws = [other.law_of(each, around, settings.other_features) for each in against]
-    features = [len(law.displacement(at_states(around, slice(1)))) for law in laws]
-    units = units_of(tested, list(zip(against, features, strict=True)), settings)
+    units = units_of(tested, [(each, law.features) for each, law in zip(against, laws, strict=True)], settings)
     owners = np.array([owner for owner, _ in fitted.parameters])
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))

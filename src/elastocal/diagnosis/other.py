@@ -106,12 +106,20 @@ class Law:
         rad or m.
     parts : tuple of (int, callable, callable)
         Coordinate that is displaced, waves by their inputs, and the part of them that has a name by the states.
+    waves : int
+        Of each coordinate.
     """
 
     competitor: Competitor
     campaign: Conditions
     size: float
     parts: tuple[tuple[int, Callable[[np.ndarray], np.ndarray], Callable[[Conditions], np.ndarray]], ...]
+    waves: int
+
+    @property
+    def features(self) -> int:
+        """How many displacements these are."""
+        return self.waves * len(self.parts)
 
     def displacement(self, around: Conditions) -> list[dict[int, np.ndarray]]:
         """For each feature a displacement of one coordinate in some states, list of dict of int to ndarray (S,)."""
@@ -144,12 +152,12 @@ def law_of(competitor: Competitor, campaign: Conditions, features: int) -> Law:
     location = competitor.location
     draws = stream(_SEED, f"{OTHER} {competitor.law}", "random Fourier features", location[0] if location else 0)
     size = JOINT_RAD if location else BASE_M if competitor.motion == SHIFT else BASE_RAD
-    parts = []
+    parts, waves = [], features if location else _BASE_FEATURES
     for coordinate in _coordinates(campaign, competitor):
         known = _inputs(campaign, competitor, coordinate, campaign)
-        smooth = _waves(features if location else _BASE_FEATURES, known.shape[1], draws)
+        smooth = _waves(waves, known.shape[1], draws)
         parts.append((coordinate, smooth, _named_part(competitor, campaign, smooth(known))))
-    return Law(competitor, campaign, size, tuple(parts))
+    return Law(competitor, campaign, size, tuple(parts), waves)
 
 
 def _coordinates(around: Conditions, competitor: Competitor) -> list[int]:

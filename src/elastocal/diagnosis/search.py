@@ -270,9 +270,13 @@ class _Searcher:
 
     def keep_likely_pose_errors(self, by_pose_error: np.ndarray, total: np.ndarray) -> None:
         """Go on without the sizes of the pose error that neither "nothing" nor any good single unit makes likely."""
-        kept = np.flatnonzero(_likely(by_pose_error, total, self.empty))
-        self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
+        self.keep_pose_errors(np.flatnonzero(_likely(by_pose_error, total, self.empty)))
         self.empty = self.evaluated((), self.empty.scales)
+
+    def keep_pose_errors(self, kept: np.ndarray) -> None:
+        """Go on with some of the sizes of the pose error alone; their statistics are copied where there are others."""
+        if len(kept) < len(self.log_pose):
+            self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
 
     def measure(self, model: tuple[int, ...]) -> Model:
         """Meet a model as it is, in full, and what it would be without each of its units."""
@@ -286,8 +290,7 @@ class _Searcher:
         self.met[model], self.sizes[model] = odds, found.scales
         self.measured[model] = Model(model, odds, found.scales, self.pose_error(found))
         if odds == max(self.met.values()):
-            kept = np.flatnonzero(found.log_pose > _OUT_OF_QUESTION)
-            self.statistics, self.log_pose = self.statistics.at(kept), self.log_pose[kept]
+            self.keep_pose_errors(np.flatnonzero(found.log_pose > _OUT_OF_QUESTION))
         for place, number in enumerate(model):
             smaller = model[:place] + model[place + 1 :]
             if smaller not in self.met:

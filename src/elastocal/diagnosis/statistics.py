@@ -286,18 +286,21 @@ def null_draws(
         turned = rows.jacobian[members].reshape(len(members), -1, joints).transpose(0, 2, 1)
         seen[rows.pose[members[:, 0]]] = turned @ white[members].reshape(len(members), -1, count)
     squares = (white**2).sum(axis=(0, 1))
-    common = _joint_deviations(products, tau)[None, :, None] * stream.standard_normal((poses, joints, count))
-    squares = squares + 2 * (common * seen).sum(axis=(0, 1))
-    moved = products.pose_gram @ common
-    squares = squares + (common * moved).sum(axis=(0, 1))
-    along = along + flat.T @ common.reshape(-1, count)
-    seen = seen + moved
+    deviation = _joint_deviations(products, tau)
+    if deviation.any():
+        common = deviation[:, None] * stream.standard_normal((poses, joints, count))
+        moved = products.pose_gram @ common
+        squares += (common * (2 * seen + moved)).sum(axis=(0, 1))
+        along += flat.T @ common.reshape(-1, count)
+        seen += moved
     found_along = np.empty((len(pose_error_rad), flat.shape[1] - products.declared, count))
     found_squares = np.empty((len(pose_error_rad), count))
     for number, size_rad in enumerate(pose_error_rad):
-        solved = _pose_inverse(products, size_rad) @ seen
-        these = along - flat.T @ solved.reshape(-1, count)
-        left = squares - (seen * solved).sum(axis=(0, 1))
+        these, left = along, squares
+        if _joint_deviations(products, size_rad).any():
+            solved = _pose_inverse(products, size_rad) @ seen
+            these = along - flat.T @ solved.reshape(-1, count)
+            left = squares - (seen * solved).sum(axis=(0, 1))
         factor_rows, _ = _pose_factor(products, size_rad)
         total = products.gram[: products.declared, :-1] - factor_rows[:, : products.declared].T @ factor_rows[:, :-1]
         factor = np.linalg.cholesky(total[:, : products.declared])

@@ -16,6 +16,7 @@ Nothing else knows the effects by name: a new module is a new effect.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -174,7 +175,7 @@ class Candidate:
         """Where the effect acts: its joints, with the name of the location where they do not determine it."""
         return (*self.joints, self.location_name) if self.location_name else self.joints
 
-    @property
+    @cached_property
     def key(self) -> str:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
         where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
