@@ -223,7 +223,7 @@ def test_a_broken_campaign_ends_with_one_line(fault, unstarted, kuka):
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"campaign": "kuka/7"}, ["campaign.yaml: campaign: ", "'kuka/7'"]),
+        ({"campaign": "kuka/7"}, ["campaign.yaml: line 1, campaign: ", "'kuka/7'"]),
         ({"robot": "kukka"}, ["campaign.yaml: robot: ", "'kuka'"]),
     ],
 )
