@@ -126,7 +126,7 @@ def _old_engine(work: Path) -> Iterator[Row]:
     folders = [folders[0], *folders]
     ours = median(_run(folders)["seconds"][1:])
     command = [OLD_SCRIPT, old / "config" / "robots", str(OLD_REPLICATES), *folders]
-    theirs = median(_called(command, 1, PYTHONPATH=str(old / "src"))["seconds"][1:])
+    theirs = median(_called(command, PYTHONPATH=str(old / "src"))["seconds"][1:])
     how = f"this engine over the one before, median of {OLD_CASES} cases of arms that weigh nothing"
     yield Row("large old engine", ours, theirs, ours / theirs, "", None, how)
 
@@ -158,14 +158,14 @@ def _dynamic(work: Path, measurements: int) -> Path:
     return folder
 
 
-def _run(folders: Sequence[Path], threads: int = 1, share: int = 1) -> dict[str, Any]:
-    return _called([SCRIPT, ROBOTS, str(share), *folders], threads)
+def _run(folders: Sequence[Path], share: int = 1) -> dict[str, Any]:
+    return _called([SCRIPT, ROBOTS, str(share), *folders])
 
 
-def _called(script: Sequence[str | Path], threads: int, **environment: str) -> dict[str, Any]:
+def _called(script: Sequence[str | Path], **environment: str) -> dict[str, Any]:
     """What a process of its own prints last."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-    environment = os.environ | dict.fromkeys(names, str(threads)) | environment
+    environment = os.environ | dict.fromkeys(names, "1") | environment
     command = [sys.executable, "-c", *map(str, script)]
     done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
     return json.loads(done.stdout.splitlines()[-1])
