@@ -41,6 +41,13 @@ def test_the_sentence_names_kilogram_force(campaign):
     assert fault.detail == "the loads look like kilogram-force: measurements fit 9.81 times the written loads"
 
 
+def test_the_sentence_names_what_is_less_likely_too(fanuc):
+    campaign = made(fanuc, 2, Plan(poses=20), replace(fanuc, compliance=1.4 * fanuc.compliance))
+    (fault,) = find(campaign, scaled(campaign.measurements, 1 / POUND, 1 / POUND))
+    assert fault.detail.startswith("the loads look like pounds-force")
+    assert "; less likely, the loads look like kilogram-force: measurements fit 9.81 times" in fault.detail
+
+
 @pytest.mark.parametrize(("force", "moment"), [(1.0, 1e-3), (1e3, 1.0), (GRAVITY, 1.0)])
 def test_forces_and_moments_in_units_that_do_not_match_are_named(campaign, force, moment):
     (fault,) = find(campaign, scaled(campaign.measurements, 1 / force, 1 / moment))

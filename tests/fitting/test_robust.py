@@ -264,6 +264,19 @@ def test_a_fit_has_converged_where_its_step_is_below_a_share_of_the_standard_err
     assert not fit(model, seen, SENSOR, start, **options).converged
 
 
+def test_what_was_found_far_larger_than_plausible_is_not_held_there_under_larger_noise():
+    """Loads in another unit make compliances a thousand times the plausible ones."""
+    model, seen, best, deviation = one_parameter(5.0)
+    plausible = model.effects[0].parameters[0].plausible
+    factor = 5.0 * plausible / deviation
+    start = replace(made_estimate(model, size=0.0), coefficients=(np.array([100.0 * plausible]),))
+    found = fit(model, seen, SENSOR.scaled(factor), start)
+    assert not found.held.any() and found.estimate.coefficients[0][0] == pytest.approx(best, abs=1e-2 * deviation)
+    assert found.covariance[0, 0] == pytest.approx((factor * deviation) ** 2, rel=1e-6)
+    # What nobody has found yet is not sought either.
+    assert fit(model, seen, SENSOR.scaled(factor)).held.all()
+
+
 @pytest.mark.parametrize("moving", [0, 1, 2])
 def test_a_fit_has_not_converged_while_one_of_its_parameters_still_moves(moving, monkeypatch):
     """The others are where they belong, and it moves by ten standard errors."""

@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Estimate
 
 _MANY_POSES = 150
-# Compliances of a robot and those of its data sheet differ by no more; all together by less.
-_RATIO, _MEAN_RATIO = 1.7, 1.35
+# Compliances of a robot and those of its data sheet differ by no more, all together and each beside the others.
+_RATIO = 1.7
 # A joint says something if its compliance is known so well, and so many joints must.
 _WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
-# As written the deflections must fit so much worse, and corrected loads must explain that share of them.
-_FAR_WORSE, _UNEXPLAINED = 2.0, 0.5
+# Share of the deflections that loads as written must leave, and share of that which corrected loads may leave.
+_UNEXPLAINED = 0.5
+# Units that explain the deflections as well as each other, but for so much, are told apart by the compliances alone.
+_AS_WELL = 1.1
 _FEWEST_POSES = 4
 _ROUNDING_M = 1e-9
 # Compliances are sought only within these multiples of the nominal ones, or of those usual for a robot of the size.
@@ -99,14 +101,18 @@ class UnitFound:
     sign : float
         +1, or -1 where the loads are turned round.
     unit : Unit
+        Which brings the compliances nearest to the nominal ones.
+    less_likely : Unit or None
+        Another that explains the deflections as well, by compliances that are further from the nominal ones.
     slope : float
         Deflection seen over the one expected as written, the mean over the joints.
     rms_as_written, rms_corrected : float
-        Residual at nominal compliances, m.
+        Residual at nominal compliances times the best factor that robots have in common, m.
     """
 
     sign: float
     unit: Unit
+    less_likely: Unit | None
     slope: float
     rms_as_written: float
     rms_corrected: float
@@ -170,28 +176,42 @@ def unit_of_loads(deflected: Deflections) -> UnitFound | None:
     UnitFound or None
         None where the loads as written do, or where nothing does.
     """
-    as_written = deflected.by_force + deflected.by_moment
-    best = None
+    as_written = (deflected.by_force + deflected.by_moment).sum(axis=1)
+    found = []
     for unit in UNITS:
         corrected = unit.force * deflected.by_force + unit.moment * deflected.by_moment
         fitted = _ratios(deflected, corrected)
         if fitted is None:
             continue
-        ratios, kept, rms_free = fitted
+        ratios, kept = fitted
         sign = float(np.sign(ratios.sum()))
-        mean = np.exp(np.log(np.abs(ratios)).mean())
-        scaled = np.abs(np.log(ratios / sign / mean)) if (ratios * sign > 0).all() else np.array([np.inf])
-        if scaled.max() > np.log(_RATIO) or abs(np.log(mean)) > np.log(_MEAN_RATIO):
+        if (ratios * sign <= 0).any():
             continue
-        before = rms((deflected.seen - as_written.sum(axis=1))[kept])
-        after = rms((deflected.seen - sign * corrected.sum(axis=1))[kept])
-        if rms_free > _UNEXPLAINED * rms(deflected.seen[kept]) or before < _FAR_WORSE * after:
+        off = np.log(ratios * sign)
+        if max(abs(off.mean()), np.abs(off - off.mean()).max()) > np.log(_RATIO):
             continue
-        if best is None or after < 0.9 * best.rms_corrected:
-            along = as_written[kept].sum(axis=1)
-            slope = float(along @ deflected.seen[kept] / (along @ along))
-            best = UnitFound(sign, unit, slope, before, after)
-    return best
+        seen, written = deflected.seen[kept], as_written[kept]
+        before, share_before = _left(seen, written)
+        after, share_after = _left(seen, sign * corrected[kept].sum(axis=1))
+        if share_before >= _UNEXPLAINED and share_after <= _UNEXPLAINED * share_before:
+            slope = float(written @ seen / (written @ written))
+            found.append((abs(off.mean()), UnitFound(sign, unit, None, slope, before, after)))
+    if not found:
+        return None
+    least = min(each.rms_corrected for _, each in found)
+    as_well = sorted((pair for pair in found if pair[1].rms_corrected <= _AS_WELL * least), key=lambda pair: pair[0])
+    best = as_well[0][1]
+    return replace(best, less_likely=as_well[1][1].unit) if len(as_well) > 1 else best
+
+
+def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
+    """RMS that expected deflections (R,) leave of those seen, times the best factor that robots have, m; and its share, up to 1.
+
+    The share is that of the larger of the two, so that it is the same for loads written too small and too large.
+    """
+    factor = np.clip(expected @ seen / (expected @ expected), 1 / _RATIO, _RATIO)
+    left = rms(seen - factor * expected)
+    return left, min(left / max(rms(seen), factor * rms(expected)), 1.0)
 
 
 @dataclass(frozen=True)
@@ -318,8 +338,8 @@ def state_deflections(campaign: Campaign, measurements: Measurements) -> StateDe
     )
 
 
-def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
-    """Compliance over nominal of the joints that are well known, rows left by sigma clipping, and their RMS residual."""
+def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+    """Compliance over nominal of the joints that are well known, and the rows left by sigma clipping."""
     joints = expected.shape[1]
     kept = np.ones(len(deflected.seen), bool)
     for _ in range(_REJECTIONS):
@@ -336,7 +356,7 @@ def _ratios(deflected: Deflections, expected: np.ndarray) -> tuple[np.ndarray, n
     well = ~held & (deviation < _WELL_KNOWN * np.abs(step))
     if well.sum() < min(_FEWEST_JOINTS, joints):
         return None
-    return step[well], kept, level
+    return step[well], kept
 
 
 def _some_poses(measurements: Measurements) -> Measurements:

@@ -1,7 +1,7 @@
 """Loads turned round, or in another unit than newtons and newton metres.
 
 A load has no size that is absurd in itself. Only the compliances tell: all joints give way by the same factor more, or less,
-than nominally. One between a half and two is nobody's unit.
+than nominally. One between a third and three is nobody's unit.
 """
 
 from __future__ import annotations
@@ -47,5 +47,7 @@ def find(campaign: Campaign, measurements: Measurements) -> list[Fault]:
             Value("newton metres for each unit of moment written", found.unit.moment, "N m"),
             slope,
         )
-        faults.append(Fault("wrong_unit", (), found.unit.detail, parameters, evidence, (), True))
+        other = found.less_likely
+        detail = found.unit.detail if other is None else f"{found.unit.detail}; less likely, {other.detail}"
+        faults.append(Fault("wrong_unit", (), detail, parameters, evidence, (), True))
     return faults

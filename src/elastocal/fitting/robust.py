@@ -91,10 +91,12 @@ def robustly(
     rows = observations.rows
     norm = HuberT(np.sqrt(chi2.ppf(_HUBER_QUANTILE, rows) / rows))
     priors = [parameter.prior_std for _, parameter in parameters(model, estimate)]
-    # What has a prior need not be held: where the data do not identify it, the prior does.
-    plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
-    penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
     nonlinear, bounds = nonlinear_parameters(model, estimate), limits(model, estimate)
+    # What has a prior need not be held: where the data do not identify it, the prior does. Nor need what the start has found
+    # larger than it should be, or it would be held there, without a standard error, once the noise turns out to be larger.
+    plausible = np.array([max(p.plausible, p.prior_std or 0.0) for _, p in parameters(model, estimate)])
+    plausible = np.maximum(plausible, np.where(nonlinear, 0.0, np.abs(parameter_values(model, estimate))))
+    penalty = np.array([0.0 if prior is None else prior**-2 for prior in priors])
     typical = np.sqrt(chi2.median(rows) / rows)
     weights = np.ones(len(observations))
 
