@@ -1,6 +1,7 @@
-"""A Slurm of one machine, for tests: its daemons in a temporary folder, found by a link that stands in /etc/slurm meanwhile."""
+"""A Slurm of two nodes on one machine, for tests: daemons in a temporary folder, found by a link in /etc/slurm meanwhile."""
 
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -9,6 +10,7 @@ import time
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+NODES = ("node1", "node2")
 # Where Slurm's commands look inside of a job, whose environment the plugin clears of Slurm's variables.
 _SYSTEM = Path("/etc/slurm/slurm.conf")
 DAEMONS = ("munged", "slurmctld", "slurmd", "sbatch")
@@ -17,21 +19,22 @@ _CONFIGURATION = """\
 ClusterName=one_machine
 SlurmctldHost={host}(127.0.0.1)
 SlurmUser=root
-SlurmctldPort={ports[0]}
-SlurmdPort={ports[1]}
+SlurmctldPort={port}
 AuthType=auth/munge
 CredType=cred/munge
 AuthInfo=socket={folder}/munge.socket
 StateSaveLocation={folder}/state
-SlurmdSpoolDir={folder}/spool
+SlurmdSpoolDir={folder}/spool-%n
 SlurmctldPidFile={folder}/slurmctld.pid
-SlurmdPidFile={folder}/slurmd.pid
+SlurmdPidFile={folder}/slurmd-%n.pid
 SelectType=select/cons_tres
-SelectTypeParameters=CR_Core_Memory
+SelectTypeParameters=CR_Core_Memory,CR_LLN
 ProctrackType=proctrack/linuxproc
 TaskPlugin=task/none
 MpiDefault=none
 AccountingStorageType=accounting_storage/none
+JobCompType=jobcomp/filetxt
+JobCompLoc={folder}/{ended}
 JobAcctGatherType=jobacct_gather/linux
 JobAcctGatherFrequency=task=1
 JobAcctGatherParams=OverMemoryKill
@@ -39,9 +42,12 @@ SchedulerParameters=sched_min_interval=100000,batch_sched_delay=0,sched_interval
 MinJobAge=600
 ReturnToService=2
 SlurmdParameters=config_overrides
-NodeName={host} NodeAddr=127.0.0.1 CPUs={cores} RealMemory={megabytes} State=UNKNOWN
-PartitionName=tests Nodes={host} Default=YES MaxTime=1440 DefMemPerCPU=500 State=UP
+PartitionName=tests Nodes=ALL Default=YES MaxTime=1440 DefMemPerCPU=500 State=UP
 """
+# What Slurm writes on each job that has ended.
+_ENDED = "ended.txt"
+# Each node is a daemon with a port of its own.
+_NODE = "NodeName={name} NodeHostname={host} NodeAddr=127.0.0.1 Port={port} CPUs={cores} RealMemory={megabytes} State=UNKNOWN\n"
 
 
 def missing():
@@ -61,21 +67,24 @@ def slurm_on_one_machine(cores=4):
     Parameters
     ----------
     cores : int
-        That jobs may have, whatever the machine has.
+        That jobs may have on each node, whatever the machine has.
     """
     with ExitStack() as stack:
         # Names of sockets must be short, and munge asks for a folder that others can read and nobody else can write.
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="slurm", dir="/tmp")))
         folder.chmod(0o755)
         host = socket.gethostname().partition(".")[0]
-        megabytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20
-        text = _CONFIGURATION.format(host=host, ports=_free_ports(2), folder=folder, cores=cores, megabytes=megabytes)
+        megabytes = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**20 // len(NODES)
+        own, *ports = _free_ports(1 + len(NODES))
+        text = _CONFIGURATION.format(host=host, port=own, folder=folder, ended=_ENDED)
+        for name, port in zip(NODES, ports, strict=True):
+            text += _NODE.format(name=name, host=host, port=port, cores=cores, megabytes=megabytes)
         (folder / "slurm.conf").write_text(text, encoding="utf-8")
         _SYSTEM.parent.mkdir(exist_ok=True)
         _SYSTEM.unlink(missing_ok=True)
         _SYSTEM.symlink_to(folder / "slurm.conf")
         stack.callback(_SYSTEM.unlink)
-        for name in ("state", "spool"):
+        for name in ("state", *(f"spool-{node}" for node in NODES)):
             (folder / name).mkdir()
         environment = os.environ | {"PATH": _path(), "SLURM_CONF": str(folder / "slurm.conf")}
         _write_key(folder / "munge.key")
@@ -84,13 +93,23 @@ def slurm_on_one_machine(cores=4):
         _start(munged, folder, environment, stack)
         _wait(lambda: (folder / "munge.socket").exists(), "munged")
         _start(["slurmctld", "-D"], folder, environment, stack)
-        _start(["slurmd", "-D", "-N", host], folder, environment, stack)
-        states = ["sinfo", "--noheader", "--format=%t"]
+        for node in NODES:
+            _start(["slurmd", "-D", "-N", node], folder, environment, stack)
+        states = ["sinfo", "--noheader", "--Node", "--format=%t"]
         _wait(
-            lambda: subprocess.run(states, env=environment, capture_output=True, text=True).stdout.strip() == "idle", "slurmd"
+            lambda: (
+                subprocess.run(states, env=environment, capture_output=True, text=True).stdout.split() == ["idle"] * len(NODES)
+            ),
+            "slurmd",
         )
         yield environment
         subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True)
+
+
+def nodes_of_jobs(environment, folder):
+    """Names of the nodes on which jobs that were submitted from a folder have run."""
+    lines = Path(environment["SLURM_CONF"]).with_name(_ENDED).read_text(encoding="utf-8").splitlines()
+    return {re.search(r" NodeList=(\S+)", line)[1] for line in lines if f" WorkDir={folder} " in line}
 
 
 def _path():
@@ -111,7 +130,7 @@ def _write_key(file):
 
 
 def _start(command, folder, environment, stack):
-    log = stack.enter_context((folder / f"{command[0]}.log").open("wb"))
+    log = stack.enter_context((folder / f"{command[0]}.log").open("ab"))
     # Of its own session, so that an interrupt of the tests reaches it only through its end here.
     process = subprocess.Popen(
         command, cwd=folder, env=environment, stdout=log, stderr=subprocess.STDOUT, start_new_session=True

@@ -1,4 +1,4 @@
-"""The profile for Slurm, on a Slurm of this machine: the same bytes as without it, in few jobs, and more memory after a kill.
+"""The profile for Slurm, on two nodes on this machine: the same bytes as without it, in few jobs, and more memory after a kill.
 
 Daemons are started only where somebody asks for it by ELASTOCAL_SLURM=1, as CI does: a developer's machine is no cluster.
 """
@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from slurm_on_one_machine import missing, slurm_on_one_machine
+from slurm_on_one_machine import NODES, missing, nodes_of_jobs, slurm_on_one_machine
 from study_folder import REPOSITORY, Study
 
 pytestmark = pytest.mark.skipif(
@@ -20,14 +20,25 @@ ONE_MACHINE = (
     *("--slurm-no-account", "--slurm-status-command", "squeue", "--slurm-init-seconds-before-status-checks", "2"),
     *("--seconds-between-status-checks", "1", "--latency-wait", "5"),
 )
-TINY = {"robots": ["kuka"], "strategies": ["6DoF"], "noise_um": [200]}
-# From seeds to compliances: each job on Slurm begins with some seconds of Snakemake.
-TARGET = "results/identified/kuka/200um/6DoF.parquet"
+TINY = {"robots": ["kuka"], "strategies": ["6DoF"], "noise_um": [0, 200]}
+# From seeds to compliances: each job on Slurm begins with some seconds of Snakemake. A job of Slurm for each, so that they run
+# beside one another, on both nodes, from data that one of these wrote.
+TARGETS = ("results/identified/kuka/0um/6DoF.parquet", "results/identified/kuka/200um/6DoF.parquet")
+ONE_EACH = ("--group-components", "robot=10", "cell=1")
 NEEDS_MORE = """
 rule needs_more:
     output: "made.txt"
     resources: mem_mb=lambda wildcards, attempt: attempt * 500
     shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep(6)' && echo {{resources.mem_mb}} > {{output}}"
+"""
+# A rule of the profile's array jobs; the file says which part of an array made it.
+ARRAY = """
+rule all:
+    input: expand("{number}.txt", number=range(4))
+
+rule diagnose_cases:
+    output: "{number}.txt"
+    shell: "sleep 3 && echo $SLURM_ARRAY_TASK_ID > {output}"
 """
 
 
@@ -40,7 +51,7 @@ def cluster():
 def on_slurm(folder, environment, *arguments):
     profile = REPOSITORY / "profiles" / "slurm"
     called = [sys.executable, "-m", "snakemake", "--profile", str(profile), *ONE_MACHINE, *arguments]
-    return subprocess.run(called, cwd=folder, env=environment, capture_output=True, text=True, timeout=200)
+    return subprocess.run(called, cwd=folder, env=environment, capture_output=True, text=True, timeout=400)
 
 
 def contents(study):
@@ -48,20 +59,30 @@ def contents(study):
     return {name: study.path(name).read_bytes() for name in names}
 
 
-def test_a_study_on_slurm_is_byte_for_byte_that_of_one_machine_and_in_few_jobs(cluster, tmp_path):
+def test_a_study_on_two_nodes_is_byte_for_byte_that_of_one_machine_and_in_few_jobs(cluster, tmp_path):
     here, there = (Study.of_sources(tmp_path / name) for name in ("here", "there"))
     for study in (here, there):
         study.configure(TINY)
-    here.run(TARGET)
+    here.run(*TARGETS)
     environment = cluster | {"PYTHONPATH": str(there.folder / "src"), "OMP_NUM_THREADS": "1"}
-    done = on_slurm(there.folder, environment, TARGET)
+    done = on_slurm(there.folder, environment, *TARGETS, *ONE_EACH)
     assert done.returncode == 0, done.stderr[-3000:]
     made = contents(here)
-    assert TARGET in made and len(made) > 3
+    assert made.keys() > set(TARGETS) and len(made) > 4
     assert contents(there) == made
     submitted = (done.stdout + done.stderr).count("has been submitted with SLURM jobid")
     records = len(there.files("results/jobs/**/*.json"))
-    assert 1 <= submitted <= records / 2
+    assert len(NODES) <= submitted <= records / 2
+    assert nodes_of_jobs(cluster, there.folder) == set(NODES)
+
+
+def test_long_jobs_are_parts_of_one_array_on_both_nodes(cluster, tmp_path):
+    (tmp_path / "Snakefile").write_text(ARRAY, encoding="utf-8")
+    done = on_slurm(tmp_path, cluster, "all")
+    assert done.returncode == 0, done.stderr[-3000:]
+    parts = {(tmp_path / f"{number}.txt").read_text(encoding="utf-8").strip() for number in range(4)}
+    assert parts == {"1", "2", "3", "4"}
+    assert nodes_of_jobs(cluster, tmp_path) == set(NODES)
 
 
 def test_a_job_that_slurm_killed_for_its_memory_runs_again_with_more(cluster, tmp_path):
