@@ -184,3 +184,11 @@ def test_locations_are_given_that_the_mechanism_is_there():
     posterior = made_posterior(((OFFSET_2,), 0.3), ((OFFSET_3,), 0.1), ((OFFSET_2, OFFSET_3), 0.1), ((PAYLOAD,), 0.3))
     assert location_probabilities(PROBLEM, posterior, "offset") == pytest.approx({(2,): 0.8, (3,): 0.4})
     assert location_probabilities(PROBLEM, posterior, "payload") == pytest.approx({(): 1.0})
+
+
+@pytest.mark.parametrize("locations", [[(2,), (3,), ("arm",)], [("arm",), (3,), (2,)], [(3,), (2,), ("arm",)]])
+def test_equally_probable_locations_stand_in_the_order_of_their_units(locations):
+    """As in any process, whatever the seed of its hashes, by which a set orders texts."""
+    units = [made_unit("offset", location, number) for number, location in enumerate(locations)]
+    problem = made_problem(made_rows(), units)[0]
+    assert list(location_probabilities(problem, made_posterior(((0, 1, 2), 0.9)), "offset")) == locations

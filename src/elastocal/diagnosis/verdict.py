@@ -190,7 +190,8 @@ def location_probabilities(problem: Problem, posterior: Posterior, mechanism: st
     total = 0.0
     found: dict[tuple[int | str, ...], float] = {}
     for model, probability in zip(posterior.models, posterior.probabilities, strict=True):
-        locations = {problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism}
+        # In the order of the units: equally probable ones keep it, and that of a set differs from one process to the next.
+        locations = dict.fromkeys(problem.units[n].location for n in model.units if problem.units[n].mechanism == mechanism)
         total += probability if locations else 0.0
         for location in locations:
             found[location] = found.get(location, 0.0) + float(probability)
