@@ -295,3 +295,16 @@ def test_a_new_effect_is_a_module_and_a_new_campaign_is_a_file(cell):
     assert set(measurements.column("pose").to_pylist()) < set(range(8))
     planned = cell.planned("reports/loop/tiny/verdict.json", "reports/loop/campaigns.csv")
     assert {job for job in planned if job[0] in STEPS} == {(step, "tiny") for step in STEPS[1:]}
+
+
+def test_a_campaign_waits_for_the_one_that_tests_its_test(unstarted):
+    """Which reading the test looks for: ur5_random is tested on ur5_grid."""
+    unstarted.configure({"loop": {"measured": ["ur5_grid_on_random", "ur5_random", "ur5_grid"]}})
+    planned = unstarted.planned("results/loop/ur5_grid_on_random/training.parquet")
+    imported = {job[1] for job in planned if job[0] == "import_campaign"}
+    assert imported == {"ur5_grid_on_random", "ur5_random", "ur5_grid"}
+
+
+def test_two_campaigns_may_test_each_other(unstarted):
+    planned = unstarted.planned("results/loop/fanuc_cpa/training.parquet")
+    assert {job[1] for job in planned if job[0] == "import_campaign"} == {"fanuc_cpa", "fanuc_static"}

@@ -218,8 +218,10 @@ def files_of_campaign(campaign):
     if campaign in OWN:
         return campaign_files(OWN[campaign], f"{CONFIG}/robots")
     source = SOURCES[campaign]
-    other = source.get("holdout", {}).get("campaign")
-    names = [campaign, *([Path(other).name] if other else [])]
+    # Who reads the test looks whether the campaign is there that tests this one in turn; two may test each other.
+    names = [campaign]
+    while (other := SOURCES[names[-1]].get("holdout", {}).get("campaign")) and Path(other).name not in names:
+        names.append(Path(other).name)
     files = expand("data/campaigns/{name}/{file}", name=names, file=["campaign.yaml", "measurements.parquet"])
     # An import has its robots among its inputs; a simulation does not have the robot that it declares.
     declared = [source["declared_robot"]] if source["source"] == "simulated" else []
