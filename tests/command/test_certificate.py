@@ -27,12 +27,13 @@ def run(top, monkeypatch):
 
 
 def test_pages_and_document_are_written_beside_the_report(run, top):
-    result = run(top / "made", "--tolerance", "0.5mm", "--serial", "7")
+    result = run(top / "made", "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20")
     assert result.exit_code == 0, result.exception
     reports = top / "reports" / "loop" / "made"
     assert (reports / "certificate.pdf").read_bytes().startswith(b"%PDF")
     document = json.loads((reports / "certificate.json").read_text())
-    assert document["serial"] == "7" and document["conformity"]["tolerance_m"] == 5e-4
+    assert (document["serial"], document["date"]) == ("7", "2026-11-20")
+    assert document["conformity"]["tolerance_m"] == 5e-4
     assert document["conformity"]["decision"] in result.output
 
 
@@ -45,7 +46,12 @@ def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [(["--tolerance", "0.5"], "0.2mm"), (["--tolerance", "0.5mm", "--compare", "nowhere"], "nowhere")],
+    [
+        (["--tolerance", "0.5"], "0.2mm"),
+        (["--tolerance", "0.5mm", "--compare", "nowhere"], "nowhere"),
+        (["--tolerance", "0.5mm", "--date", "20 November"], "--date: found '20 November'; allowed: a date"),
+        (["--tolerance", "0.5mm", "--serial", ""], "--serial: found ''; allowed: 1 to 60 characters"),
+    ],
 )
 def test_bad_options_end_in_one_line_and_write_nothing(run, top, tmp_path, words, message):
     result = run(top / "made", *words, "--output", tmp_path / "out")

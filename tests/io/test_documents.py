@@ -305,3 +305,24 @@ def test_a_value_that_the_file_does_not_have_has_no_line(tmp_path):
     path.write_text("name: x\n", encoding="utf-8")
     with refused(path, "yaml: stages[0]: found 3"):
         check_document({"name": "x", "stages": [3]}, "strategy", path.as_posix())
+
+
+CAMPAIGN = {"campaign": "cell7", "robot": "kuka", "measured": "pose", "frame": "base", "targets": {"E": {"point": "6DoF", "offset_m": "unknown"}}}
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "words"),
+    [
+        ("campaign", "cell7\n", ["text that matches"]),
+        ("serial_number", "4711\n", ["text that matches", "on one line"]),
+        ("serial_number", " ", ["text that matches", "on one line"]),
+        ("serial_number", "47\u202811", ["text that matches", "on one line"]),
+        ("measured_on", "2026-02-30", ["a date such as 2026-11-20"]),
+        ("measured_on", "20.11.2026", ["a date such as 2026-11-20"]),
+        ("measured_on", "2026-11-20\n", ["a date such as 2026-11-20"]),
+    ],
+)
+def test_what_reports_print_stands_on_one_line_and_dates_are_of_the_calendar(key, value, words):
+    check_document(CAMPAIGN | {"serial_number": "KR 270-7", "measured_on": "2024-02-29"}, "campaign", "a.yaml")
+    with refused("a.yaml", key, *words):
+        check_document(CAMPAIGN | {key: value}, "campaign", "a.yaml")

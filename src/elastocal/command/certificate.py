@@ -11,6 +11,7 @@ from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign, report_file
 from elastocal.command.pipeline import pipeline, workplace
+from elastocal.command.printed import iso_date, printed
 from elastocal.command.quantities import length_m
 from elastocal.errors import InputError
 
@@ -22,8 +23,8 @@ def certificate(
     tolerance: Annotated[str, typer.Option(help="On the RMS position error, such as 0.2mm.")],
     risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
     compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
-    serial: Annotated[str, typer.Option(help="Serial number of the robot; the campaign's without.")] = "",
-    date: Annotated[str, typer.Option(help="Date of the certificate; today without.")] = "",
+    serial: Annotated[str | None, typer.Option(help="Serial number of the robot; the campaign's without.")] = None,
+    date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
     output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
 ) -> None:
@@ -44,6 +45,8 @@ def certificate(
     console = Console(stderr=True)
     stated = read_descriptions(folder, pipeline() / "config" / "robots")[0].get("serial_number", "")
     limit = length_m("--tolerance", tolerance)
+    number = stated if serial is None else printed("--serial", serial)
+    day = calendar.today().isoformat() if date is None else iso_date("--date", date)
     found = diagnosed_campaign(folder)
     other = None if compare is None else diagnosed_campaign(compare)
     reports = workplace() / "reports" / "loop" / found.name
@@ -55,7 +58,7 @@ def certificate(
     if any(effect["family"] == "data" for effect in verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
     steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2])
-    wanted = Wanted(limit, risk, serial or stated, date or calendar.today().isoformat(), seed)
+    wanted = Wanted(limit, risk, number, day, seed)
     with console.status("working"):
         document, maps = certified(folder, pipeline() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
         facts = certificate_facts(document)

@@ -42,6 +42,7 @@ _DECIMAL = re.compile(
 )
 # What some programs write and YAML 1.1 takes for a text.
 _WITHOUT_POINT = re.compile(r"([-+]?\d+)(?:\.(\d*))?[eE]([-+]?)(\d+)", re.ASCII)
+_FORMATS = jsonschema.FormatChecker(["date"])
 # Faults of one document that are looked at: it may hold a fault in each of its entries.
 _MOST_FAULTS = 1000
 
@@ -94,10 +95,16 @@ def _each_once(_: Any, wanted: bool, instance: Any, __: Any) -> Iterator[jsonsch
             yield jsonschema.ValidationError("an entry twice")
 
 
+def _of_pattern(_: Any, pattern: str, instance: Any, __: Any) -> Iterator[jsonschema.ValidationError]:
+    """The rule pattern; to Python, as to no other reader of a schema, the sign $ also means before a last line break."""
+    if isinstance(instance, str) and not re.fullmatch(pattern, instance):
+        yield jsonschema.ValidationError("another text")
+
+
 # Stricter than JSON, which has no NaN and no infinity and takes 10.0 for an integer.
 _Validator = jsonschema.validators.extend(
     jsonschema.Draft202012Validator,
-    {"uniqueItems": _each_once},
+    {"uniqueItems": _each_once, "pattern": _of_pattern},
     type_checker=jsonschema.Draft202012Validator.TYPE_CHECKER.redefine_many(
         {
             "integer": lambda _, value: isinstance(value, int) and not isinstance(value, bool),
@@ -231,7 +238,7 @@ def check_document(document: Any, schema: str, source: str) -> None:
     InputError
         Names the first key at fault, what was found and what is allowed.
     """
-    validator = _Validator(read_schema(schema))
+    validator = _Validator(read_schema(schema), format_checker=_FORMATS)
     errors = sorted(
         islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
     )
@@ -293,6 +300,7 @@ def _explained(error: _Violation) -> tuple[str, str, str]:
         "minProperties": lambda: f"{value} or more keys",
         "uniqueItems": lambda: "each entry once",
         "pattern": lambda: f"text that matches {value}",
+        "format": lambda: f"a {value} such as {error.schema['examples'][0]}",
     }.get(rule, lambda: error.message)()
     found = "nothing" if error.instance is None else repr(error.instance)
     return key, found, f"{allowed} ({meaning})" if meaning else allowed

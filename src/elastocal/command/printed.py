@@ -1,0 +1,64 @@
+"""Options that a document prints as they are: names and numbers on one line, and dates."""
+
+from __future__ import annotations
+
+from datetime import date
+
+from elastocal.errors import InputError
+
+# As in campaign.yaml.
+_LONGEST = 60
+
+
+def printed(option: str, text: str) -> str:
+    """A text that is printed as it is.
+
+    Parameters
+    ----------
+    option : str
+        Named in errors.
+    text : str
+
+    Returns
+    -------
+    str
+        Without blanks around it.
+
+    Raises
+    ------
+    InputError
+        Nothing but blanks, a line break or another control character, or more characters than a line of the document has.
+    """
+    line = text.strip(" ")
+    if not line.isprintable() or not 0 < len(line) <= _LONGEST:
+        raise InputError(option, "", repr(text), f"1 to {_LONGEST} characters on one line")
+    return line
+
+
+def iso_date(option: str, text: str) -> str:
+    """A day of the calendar.
+
+    Parameters
+    ----------
+    option : str
+        Named in errors.
+    text : str
+        As ISO 8601 writes it with hyphens, such as ``2026-11-20``.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        Another form, or no such day.
+    """
+    try:
+        day = date.fromisoformat(text).isoformat()
+    except ValueError:
+        day = ""
+    # Python also reads 20261120 and 2026-W47-5, which a reader of the document may not.
+    if day != text or not text:
+        raise InputError(option, "", repr(text), "a date of the calendar as ISO 8601 has it, such as 2026-11-20")
+    return day

@@ -1,0 +1,29 @@
+"""What a document prints as it is stands on one line; a date is one of the calendar."""
+
+import pytest
+from support import refused
+
+from elastocal.command.printed import iso_date, printed
+
+
+@pytest.mark.parametrize(("text", "line"), [("4711", "4711"), (" KR 270-7 ", "KR 270-7"), ("é" * 60, "é" * 60)])
+def test_a_line_is_taken_without_the_blanks_around_it(text, line):
+    assert printed("--serial", text) == line
+
+
+@pytest.mark.parametrize("text", ["", "  ", "47\n11", "4711\n", "47\t11", "47\x1b[31m", "47\u202811", "4" * 61])
+def test_nothing_or_more_than_a_line_is_refused(text):
+    with refused("--serial", "", "1 to 60 characters on one line"):
+        printed("--serial", text)
+
+
+def test_a_date_is_taken_as_it_is():
+    assert iso_date("--date", "2024-02-29") == "2024-02-29"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "today", "20.11.2026", "20261120", "2026-W47-5", "2026-02-29", "2026-13-01", "2026-11-20\n", " 2026-11-20"]
+)
+def test_anything_else_than_a_date_of_the_calendar_is_refused(text):
+    with refused("--date", "", "such as 2026-11-20"):
+        iso_date("--date", text)
