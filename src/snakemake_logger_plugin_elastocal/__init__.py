@@ -84,7 +84,7 @@ class LogHandler(LogHandlerBase):
 
 
 def _reason(rule: str, logs: Sequence[str]) -> str:
-    """Last line of the logs of a job that failed; a script begins its log once it has imported all."""
+    """Last line of the logs of a job that failed; a script that was killed as it began has none."""
     lines = [line for log in logs if Path(log).is_file() for line in Path(log).read_text(encoding="utf-8").splitlines()]
     found = f"{rule}: found an end before its log began ({', '.join(logs)})"
     otherwise = f"{found}; allowed: a script that can start (its error stands above)"

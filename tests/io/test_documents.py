@@ -307,7 +307,13 @@ def test_a_value_that_the_file_does_not_have_has_no_line(tmp_path):
         check_document({"name": "x", "stages": [3]}, "strategy", path.as_posix())
 
 
-CAMPAIGN = {"campaign": "cell7", "robot": "kuka", "measured": "pose", "frame": "base", "targets": {"E": {"point": "6DoF", "offset_m": "unknown"}}}
+CAMPAIGN = {
+    "campaign": "cell7",
+    "robot": "kuka",
+    "measured": "pose",
+    "frame": "base",
+    "targets": {"E": {"point": "6DoF", "offset_m": "unknown"}},
+}
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from study_folder import REPOSITORY
 
 sys.path.insert(0, str(REPOSITORY / "workflow" / "scripts"))
 
-from elastocal.errors import InputError
-
 from job import run
+
+from elastocal.errors import InputError
 
 INPUT, OUTPUT = "data/a.csv", "results/b.csv"
 

@@ -2,12 +2,16 @@
 
 import json
 
+import pytest
+
 from outcome import outcome
+
+IDENTIFIED = "results/identified/kuka/200um/6DoF.parquet"
 
 
 def test_a_job_is_one_line_without_lists_of_files(finished):
-    finished.path("results/identified/kuka/200um/6DoF.parquet").unlink()
-    said = finished.run("results/identified/kuka/200um/6DoF.parquet").stderr.splitlines()
+    finished.path(IDENTIFIED).unlink()
+    said = finished.run(IDENTIFIED).stderr.splitlines()
     assert "1 jobs" in said
     assert [line for line in said if line.startswith("1 of 1: identify")] == ["1 of 1: identify kuka 200 6DoF"]
     assert max(map(len, said)) < 200
@@ -24,15 +28,42 @@ def test_the_outcome_names_reports_and_verdicts(tmp_path, monkeypatch):
     assert outcome(made) == ["cell7: not_testable", "    reports/loop/cell7/report.pdf", "the study: reports/study.pdf"]
 
 
-def test_a_script_that_fails_while_it_imports_has_no_log_and_is_said_to_have_none(finished):
-    finished.path("results/identified/kuka/200um/6DoF.parquet").unlink()
-    script = finished.path("workflow/scripts/identify.py")
-    script.write_text("import none_of_this_name\n" + script.read_text(encoding="utf-8"), encoding="utf-8")
-    ended = finished.snakemake("-j1", "results/identified/kuka/200um/6DoF.parquet")
+@pytest.mark.parametrize(
+    ("file", "line", "last"),
+    [
+        (
+            "workflow/scripts/identify.py",
+            "import none_of_this_name",
+            "ModuleNotFoundError: No module named 'none_of_this_name'",
+        ),
+        ("src/elastocal/study/steps/identify.py", "1 / 0", "ZeroDivisionError: division by zero"),
+    ],
+    ids=["a package that is missing", "a module that is broken"],
+)
+def test_the_log_of_a_script_that_fails_while_it_imports_says_why(finished, file, line, last):
+    finished.path(IDENTIFIED).unlink()
+    head, imports = finished.path(file).read_text(encoding="utf-8").split("\nfrom elastocal", 1)
+    finished.path(file).write_text(f"{head}\n{line}\nfrom elastocal{imports}", encoding="utf-8")
+    ended = finished.snakemake("-j1", IDENTIFIED)
+    assert ended.returncode != 0 and ended.stderr.splitlines()[-1] == last
+    log = finished.path("results/logs/identify/kuka/200um/6DoF.log").read_text(encoding="utf-8").splitlines()
+    assert log[0].startswith("Traceback") and log[-1] == last
+
+
+@pytest.mark.parametrize(
+    "file", ["workflow/scripts/identify.py", "workflow/scripts/job.py", "src/elastocal/effects/payload.py"]
+)
+def test_a_source_that_is_no_python_is_one_line(finished, file):
+    finished.append(file, "half = (\n")
+    ended = finished.snakemake("-j1", IDENTIFIED)
     said = ended.stderr.splitlines()
-    assert ended.returncode != 0 and any(
-        "No module named 'none_of_this_name'" in line for line in said + ended.stdout.splitlines()
-    )
-    assert said[-1].startswith(
-        "identify: found an end before its log began (results/logs/identify/kuka/200um/6DoF.log); allowed: "
-    )
+    assert ended.returncode != 0 and f"{file}: line " in said[-1] and said[-1].endswith("; allowed: Python")
+    assert "Traceback" not in ended.stderr
+
+
+def test_a_script_that_is_ended_before_it_begins_has_no_log_and_is_said_to_have_none(finished):
+    finished.path(IDENTIFIED).unlink()
+    finished.replace("workflow/scripts/identify.py", "from job import Job, run\n", "import os\n\nos._exit(9)\n")
+    ended = finished.snakemake("-j1", IDENTIFIED)
+    found = "identify: found an end before its log began (results/logs/identify/kuka/200um/6DoF.log); allowed: "
+    assert ended.returncode != 0 and ended.stderr.splitlines()[-1].startswith(found)

@@ -20,6 +20,7 @@ from elastocal.blind.closed_loop import bow
 from elastocal.blind.rehearsal import filled_sheet, hidden_robot, reached
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
+from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.plant.campaigns import usual_force_N
@@ -75,8 +76,11 @@ if __name__ == "__main__":
         command.add_argument("--reveal", action="store_true", help="say what was hidden")
         command.set_defaults(run=run)
     given = parser.parse_args()
-    document, robot_file = read_descriptions(given.folder, ROBOTS)
-    robot, defects = hidden_robot(robot_file, given.seed, given.effect)
-    given.run(given, robot, document)
+    try:
+        document, robot_file = read_descriptions(given.folder, ROBOTS)
+        robot, defects = hidden_robot(robot_file, given.seed, given.effect)
+        given.run(given, robot, document)
+    except InputError as error:
+        sys.exit(str(error))
     if given.reveal:
         print("hidden:", *(f"{defect.effect} {defect.joints or ''}" for defect in defects[-max(len(given.effect), 1) :]))

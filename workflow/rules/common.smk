@@ -118,7 +118,10 @@ wildcard_constraints:
 def sources(script):
     """A script and the package modules that it runs: an edit of one reruns the jobs that depend on it, and no others."""
     path = ROOT / "workflow" / "scripts" / script
-    files = [path, *closure(path, PACKAGES)]
+    try:
+        files = [path, *closure(path, PACKAGES)]
+    except InputError as error:
+        sys.exit(str(error))
     return [placed(file) for file in files]
 
 

@@ -6,6 +6,9 @@ from itertools import accumulate
 from pathlib import Path
 
 import grimp
+from grimp.exceptions import SourceSyntaxError
+
+from elastocal.errors import InputError
 
 PACKAGE = "elastocal"
 
@@ -24,21 +27,31 @@ def closure(script: Path, source: Path) -> list[Path]:
     -------
     list of Path
         Sorted, without the script itself.
+
+    Raises
+    ------
+    InputError
+        A source file that is no Python, such as an effect that is being written.
     """
-    own, modules = _imports(script), set()
-    files = {file for name in own if (file := script.with_name(f"{name}.py")).is_file()}
-    for file in (script, *files):
+    files, left, modules = set(), [script], set()
+    while left:
+        file = left.pop()
+        files.add(file)
         modules |= _imports(file) & _graph().modules
+        left += {own for name in _imports(file) if (own := file.with_name(f"{name}.py")).is_file()} - files
     modules |= {found for name in modules for found in _graph().find_upstream_modules(name)}
     # With a module come the packages above it.
     names = {package for name in modules for package in accumulate(name.split("."), "{}.{}".format)}
-    return sorted(files | {_file(name, source) for name in names if name.split(".")[0] == PACKAGE})
+    return sorted(files - {script} | {_file(name, source) for name in names if name.split(".")[0] == PACKAGE})
 
 
 @cache
 def _graph() -> grimp.ImportGraph:
     # What is imported for annotations alone changes no result.
-    graph = grimp.build_graph(PACKAGE, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
+    try:
+        graph = grimp.build_graph(PACKAGE, include_external_packages=True, exclude_type_checking_imports=True, cache_dir=None)
+    except SourceSyntaxError as error:
+        raise _no_python(error.filename, error) from None
     # A catalogue looks up the modules beside it by itself.
     for catalogue in graph.find_modules_that_directly_import("pkgutil"):
         for module in graph.find_children(catalogue.rpartition(".")[0]):
@@ -51,12 +64,20 @@ def _graph() -> grimp.ImportGraph:
 def _imports(file: Path) -> frozenset[str]:
     """Names that a file imports: of modules, or of what is in them."""
     names = set()
-    for node in ast.walk(ast.parse(file.read_bytes())):
+    try:
+        tree = ast.parse(file.read_bytes())
+    except SyntaxError as error:
+        raise _no_python(file, error) from None
+    for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     return frozenset(names)
+
+
+def _no_python(file: Path | str, error: SourceSyntaxError | SyntaxError) -> InputError:
+    return InputError(file, f"line {error.lineno}", (error.text or "").strip() or "the end of the file", "Python")
 
 
 def _file(module: str, source: Path) -> Path:

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
+from job import Job, origin_of, run
+
 from elastocal import __version__
 from elastocal.audit.audited import Audited
 from elastocal.audit.page import page
 from elastocal.audit.whole import as_table, audit
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
-
-from job import Job, origin_of, run
 
 
 def audit_files(job: Job) -> None:

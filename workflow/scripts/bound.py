@@ -1,5 +1,7 @@
 """Cramér-Rao bounds of one robot for every set of measuring points that a strategy reads."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, read_table, write_table
 from elastocal.mechanics.robot import with_target_offset
@@ -7,8 +9,6 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.steps.bound import bound_blocks
 from elastocal.study.steps.evaluate import judge_from
 from elastocal.study.table_schemas import BOUNDS, DEFLECTIONS, experiments
-
-from job import Job, run
 
 
 def bound(job: Job) -> None:

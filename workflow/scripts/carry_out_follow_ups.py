@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.blind.carrying_out import carry_out
 from elastocal.blind.cases import SIZES, cases_of
 from elastocal.mechanics.components import WRENCH_NAMES
-
-from job import Job, run
 
 
 def carry_out_follow_ups(job: Job) -> None:

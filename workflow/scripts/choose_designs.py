@@ -1,12 +1,12 @@
 """Random against optimal configurations of one robot."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.designs import design_worths
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.table_schemas import DESIGNS
-
-from job import Job, run
 
 
 def choose_designs(job: Job) -> None:

@@ -1,12 +1,12 @@
 """Models of one robot with more and more link springs."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.ladder import ladder_blocks
 from elastocal.study.table_schemas import LADDER
-
-from job import Job, run
 
 
 def climb_ladder(job: Job) -> None:

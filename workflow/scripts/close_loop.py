@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.blind.closed_loop import cases, closed_loop, schema
 from elastocal.campaigns.reading import read_robot
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
-
-from job import Job, run
 
 
 def close_loop(job: Job) -> None:

@@ -1,12 +1,12 @@
 """Errors and bounds of one robot for every set of measuring points."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.budget import budget_blocks
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.table_schemas import BUDGET
-
-from job import Job, run
 
 
 def compare_point_sets(job: Job) -> None:

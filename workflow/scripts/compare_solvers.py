@@ -1,5 +1,7 @@
 """Both solvers on the data sets of one robot, for every strategy at one length."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
@@ -9,8 +11,6 @@ from elastocal.study.steps.identify import paired_blocks
 from elastocal.study.steps.solvers import solver_table
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, experiments, solvers
-
-from job import Job, run
 
 
 def compare_solvers(job: Job) -> None:

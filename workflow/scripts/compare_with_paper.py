@@ -1,12 +1,12 @@
 """Each figure that the paper prints beside ours."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.io.data_frames import read_frame, read_long, read_studies, write_csv
 from elastocal.study.comparison import OurResults, comparison_table
 from elastocal.study.table_schemas import INITIAL, REPLICATES, metrics, repeated
-
-from job import Job, run
 
 
 def compare_with_paper(job: Job) -> None:

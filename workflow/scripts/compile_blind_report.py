@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.report.blind_facts import blind_facts
 from elastocal.report.blind_pages import write_blind_report
-
-from job import Job, origin_of, run
 
 TABLES = ("summary", "settings", "power", "undetectable", "confusion", "cases", "follow_up", "sweep")
 

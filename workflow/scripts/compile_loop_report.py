@@ -1,5 +1,7 @@
 """The report of a campaign: as PDF, and as a page to look into."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.io.json_files import read_json
@@ -10,8 +12,6 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.report.loop_facts import loop_facts
 from elastocal.report.loop_page import loop_page, write_loop_page
 from elastocal.report.loop_pages import write_loop_report
-
-from job import Job, origin_of, run
 
 
 def compile_loop_report(job: Job) -> None:

@@ -1,12 +1,12 @@
 """The report as PDF."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.io.json_files import read_json
 from elastocal.report.pages import write_report
 from elastocal.study.tables import headed_rows
-
-from job import Job, origin_of, run
 
 TABLES = ("table1", "table2", "table3", "table4", "interpretations")
 

@@ -1,5 +1,7 @@
 """A data set of the league, checked, with its poses dealt into folds."""
 
+from job import Job, run
+
 from elastocal.campaigns.columns import columns_of
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
@@ -9,8 +11,6 @@ from elastocal.league.schemas import FOLDS
 from elastocal.loop.loading import load_whole_campaign
 from elastocal.loop.schemas import measurements
 from elastocal.random_streams import stream
-
-from job import Job, run
 
 
 def deal_league_folds(job: Job) -> None:

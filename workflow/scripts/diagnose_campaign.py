@@ -3,6 +3,8 @@
 import sys
 from dataclasses import replace
 
+from job import Job, run
+
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.next_experiment import propose
 from elastocal.diagnosis.proposal import facts_of, table_of
@@ -15,8 +17,6 @@ from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.case_files import load_case
 from elastocal.loop.schemas import CANDIDATES, CONFOUNDING, CORRELATIONS, MODELS, STEPS
 from elastocal.random_streams import stream
-
-from job import Job, run
 
 
 def diagnose_campaign(job: Job) -> None:

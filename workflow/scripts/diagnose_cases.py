@@ -4,10 +4,10 @@ import json
 import sys
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.io.atomic_writes import write_text
 from elastocal.loop.whole import diagnosed
-
-from job import Job, run
 
 
 def diagnose_cases(job: Job) -> None:

@@ -4,11 +4,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from job import Job, run
+
 from elastocal.blind.follow_up import diagnosed_anew
 from elastocal.io.json_files import write_json
 from elastocal.loop.whole import diagnosed
-
-from job import Job, run
 
 
 def diagnose_follow_ups(job: Job) -> None:

@@ -1,5 +1,7 @@
 """What the training poses of each fold lack, by the whole diagnosis."""
 
+from job import Job, run
+
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.io.json_files import write_json
@@ -10,8 +12,6 @@ from elastocal.league.diagnosed_folds import fold_facts, fold_fits
 from elastocal.league.mechanisms import mechanism_columns
 from elastocal.league.rounds import training_rounds
 from elastocal.league.schemas import FITS, MECHANISMS
-
-from job import Job, run
 
 
 def diagnose_league_folds(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Accuracy of one data set, strategy by strategy."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.strategies import accuracy_of_one_data_set
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_accuracy(job: Job) -> None:

@@ -1,13 +1,13 @@
 """What a second target is worth at every place of the arm."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.arm_map import arm_map
 from elastocal.figures.style import save
 from elastocal.mechanics.kinematics import corners
 from elastocal.mechanics.robot_file import robot_from_document
-
-from job import Job, origin_of, run
 
 
 def draw_arm_map(job: Job) -> None:

@@ -1,13 +1,13 @@
 """Residuals of a campaign as arrows where they were measured, before and after."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.residuals import arrows
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals as schema
 from elastocal.mechanics.robot_file import joint_count
-
-from job import Job, origin_of, run
 
 
 def draw_arrows(job: Job) -> None:

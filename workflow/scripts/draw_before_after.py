@@ -1,12 +1,12 @@
 """Errors on held-out poses, model by model."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.before_after import before_after
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
-
-from job import Job, origin_of, run
 
 
 def draw_before_after(job: Job) -> None:

@@ -1,13 +1,13 @@
 """Bias of the averaged model against the accuracy of one data set."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.strategies import bias_and_accuracy
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
-
-from job import Job, origin_of, run
 
 
 def draw_bias_and_accuracy(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Confusion matrix: verdicts by ground truth."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_power import confusion_map
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_confusion(job: Job) -> None:

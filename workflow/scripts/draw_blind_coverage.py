@@ -1,11 +1,11 @@
 """How often intervals of parameters contain the true value."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_rates import coverage_by_effect
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_coverage(job: Job) -> None:

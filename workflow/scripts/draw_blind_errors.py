@@ -1,11 +1,11 @@
 """Held-out errors of blind cases against the oracle's."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_errors import errors_against_oracle
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_errors(job: Job) -> None:

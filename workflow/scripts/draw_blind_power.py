@@ -1,11 +1,11 @@
 """What is found at which size, beside the oracle."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_power import power_map
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_power(job: Job) -> None:

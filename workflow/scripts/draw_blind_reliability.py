@@ -1,11 +1,11 @@
 """What stated probabilities are worth."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_reliability import reliability_diagram
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_reliability(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Figures of the blind proof against their targets."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.blind_rates import rates_and_targets
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_blind_targets(job: Job) -> None:

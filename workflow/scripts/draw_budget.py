@@ -1,11 +1,11 @@
 """Sets of measuring points at an equal budget."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.questions import budget
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_budget(job: Job) -> None:

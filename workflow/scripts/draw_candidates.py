@@ -1,12 +1,12 @@
 """What may be missing in the model of a campaign: probabilities of hypotheses, and candidates one by one."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.candidates import probabilities
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import CANDIDATES
-
-from job import Job, origin_of, run
 
 
 def draw_candidates(job: Job) -> None:

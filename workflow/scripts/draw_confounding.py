@@ -1,11 +1,11 @@
 """Angles between the contributions of the leading candidates."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.candidates import confounding
 from elastocal.figures.style import save
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import CANDIDATES, CONFOUNDING
-
-from job import Job, origin_of, run
 
 
 def draw_confounding(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Random against optimal configurations."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.questions import designs
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_designs(job: Job) -> None:

@@ -1,5 +1,7 @@
 """Random configurations and wrenches of one robot."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.mechanics.chain import parse_chain
@@ -7,8 +9,6 @@ from elastocal.mechanics.robot_file import joint_limits
 from elastocal.study.simulation import Loading
 from elastocal.study.steps.simulate import experiment_blocks
 from elastocal.study.table_schemas import experiments
-
-from job import Job, run
 
 
 def draw_experiments(job: Job) -> None:

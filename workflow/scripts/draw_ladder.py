@@ -1,11 +1,11 @@
 """Error of one data set by number of link springs."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.questions import ladder
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_ladder(job: Job) -> None:

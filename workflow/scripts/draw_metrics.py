@@ -1,12 +1,12 @@
 """Strategies by every metric."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.questions import metrics
 from elastocal.figures.style import save
 from elastocal.report.metric_answers import METRIC_NAMES
-
-from job import Job, origin_of, run
 
 
 def draw_metrics(job: Job) -> None:

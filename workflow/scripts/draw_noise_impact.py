@@ -1,11 +1,11 @@
 """Figure 4: noise impact on the classical strategy."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.strategies import noise_impact
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
-
-from job import Job, origin_of, run
 
 
 def draw_noise_impact(job: Job) -> None:

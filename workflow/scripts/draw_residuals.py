@@ -1,13 +1,13 @@
 """Residuals of a campaign against what the robot did, before and after."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.residuals import residuals
 from elastocal.figures.style import save
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
 from elastocal.loop.schemas import residuals as schema
 from elastocal.mechanics.robot_file import joint_count
-
-from job import Job, origin_of, run
 
 
 def draw_residuals(job: Job) -> None:

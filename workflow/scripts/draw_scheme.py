@@ -1,11 +1,11 @@
 """Figures 2 and 3: the robot's kinematic scheme, and its springs."""
 
+from job import Job, origin_of, run
+
 from elastocal.figures.kinematic_scheme import kinematic_scheme
 from elastocal.figures.spring_scheme import spring_scheme
 from elastocal.figures.style import save
 from elastocal.mechanics.robot_file import robot_from_document
-
-from job import Job, origin_of, run
 
 SCHEMES = {"kinematic_scheme": kinematic_scheme, "spring_scheme": spring_scheme}
 

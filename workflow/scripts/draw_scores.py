@@ -1,11 +1,11 @@
 """The paper's Table 4 among studies of the same size."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.against_paper import scores
 from elastocal.figures.style import save
-
-from job import Job, origin_of, run
 
 
 def draw_scores(job: Job) -> None:

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.campaigns.reading import read_robot
 from elastocal.effects.catalogue import effects
 from elastocal.figures.effect_signatures import signature, signature_figure
 from elastocal.figures.style import save_svg
-
-from job import Job, run
 
 
 def draw_signatures(job: Job) -> None:

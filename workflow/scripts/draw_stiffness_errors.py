@@ -1,13 +1,13 @@
 """Figures 5a and 5b: summed stiffness error of all strategies."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.strategies import stiffness_errors
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_long
 from elastocal.study.table_schemas import metrics
-
-from job import Job, origin_of, run
 
 
 def draw_stiffness_errors(job: Job) -> None:

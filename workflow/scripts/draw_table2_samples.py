@@ -1,13 +1,13 @@
 """Table 2 against the statistics of single data sets."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.against_paper import table2_samples
 from elastocal.figures.style import save
 from elastocal.io.data_frames import read_frame
 from elastocal.study.table_schemas import INITIAL
-
-from job import Job, origin_of, run
 
 
 def draw_table2_samples(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Bootstrap weights of one robot."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.weights import weight_blocks
 from elastocal.study.table_schemas import WEIGHTS
-
-from job import Job, run
 
 
 def draw_weights(job: Job) -> None:

@@ -1,5 +1,7 @@
 """What one method predicts of the poses of each fold, which it has not seen."""
 
+from job import Job, run
+
 from elastocal.io.json_files import read_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_table, write_table
@@ -9,8 +11,6 @@ from elastocal.league.entry_columns import entry_columns
 from elastocal.league.methods import entered, method_from
 from elastocal.league.rounds import held_out_rounds, training_rounds
 from elastocal.league.schemas import ENTRIES, FITS
-
-from job import Job, run
 
 
 def enter_league(job: Job) -> None:

@@ -1,5 +1,7 @@
 """Metrics of one strategy for one robot at one noise level."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, read_table, write_table
 from elastocal.mechanics.robot import with_target_offset
@@ -8,8 +10,6 @@ from elastocal.study.steps.evaluate import evaluated, judge_from
 from elastocal.study.steps.weights import DATA_SETS, TESTS
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, REPLICATES, WEIGHTS, accuracy, experiments, identified, metrics
-
-from job import Job, run
 
 
 def evaluate(job: Job) -> None:

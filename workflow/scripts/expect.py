@@ -1,5 +1,7 @@
 """Expectations of the scores of one strategy on one robot in closed form."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, read_table, write_table
@@ -9,8 +11,6 @@ from elastocal.study.steps.evaluate import judge_from
 from elastocal.study.steps.expect import expected_scores
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import DEFLECTIONS, design, expected, experiments, metrics
-
-from job import Job, run
 
 
 def expect(job: Job) -> None:

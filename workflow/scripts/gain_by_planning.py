@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.application.inverse_kinematics import reach_m
 from elastocal.application.planning.cell import RADIUS_SHARE, Cell
 from elastocal.application.planning.gains import gains
@@ -10,8 +12,6 @@ from elastocal.application.planning.survey import Survey
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.reading import read_robot
 from elastocal.io.json_files import write_json
-
-from job import Job, run
 
 
 def gain_by_planning(job: Job) -> None:

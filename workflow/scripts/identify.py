@@ -1,5 +1,7 @@
 """One strategy on the data sets of one robot at one noise level, every prefix length."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
@@ -8,8 +10,6 @@ from elastocal.study.steps.columns import DEFLECTION_COLUMNS
 from elastocal.study.steps.identify import identified_blocks, paired_blocks
 from elastocal.study.strategies import strategy_from_document, without_forgotten_stages
 from elastocal.study.table_schemas import DEFLECTIONS, design, experiments, identified
-
-from job import Job, run
 
 
 def identify(job: Job) -> None:

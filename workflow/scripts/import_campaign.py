@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.public_data import fetch
 from elastocal.campaigns.reading import folds_of
-
-from job import Job, run
 
 
 def import_campaign(job: Job) -> None:

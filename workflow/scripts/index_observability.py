@@ -1,12 +1,12 @@
 """Observability indices of one robot's data sets, beside what they are worth."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.observability import observability_columns
 from elastocal.study.table_schemas import OBSERVABILITY
-
-from job import Job, run
 
 
 def index_observability(job: Job) -> None:

@@ -4,10 +4,12 @@ import fcntl
 import sys
 import traceback
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Protocol
+
+from import_log import write_log
 
 from elastocal.errors import InputError
 from elastocal.io.checksums import check_checksums, record_checksums
@@ -35,8 +37,9 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
 
     Files in `checked` that are no longer what a job wrote are refused before; all inputs where it is not given.
     """
-    log = Path(snakemake.log[0])
-    _write(log, "")
+    log = snakemake.log[0]
+    sys.excepthook = sys.__excepthook__
+    write_log(log, "")
     try:
         with _under_way():
             started = _now()
@@ -45,16 +48,16 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
             record_checksums(snakemake.output)
             write_job_record(snakemake.log[0], _record(snakemake, started))
     except InputError as error:
-        _write(log, f"{error}\n")
+        write_log(log, f"{error}\n")
         sys.exit(str(error))
     except (OSError, MemoryError) as error:
         line = fault_of_machine(error, next(iter(snakemake.output), "disk"))
-        _write(log, f"{traceback.format_exc()}{line}\n")
+        write_log(log, f"{traceback.format_exc()}{line}\n")
         sys.exit(line)
     except BaseException:
-        _write(log, traceback.format_exc())
+        write_log(log, traceback.format_exc())
         raise
-    _write(log, "done\n")
+    write_log(log, "done\n")
 
 
 def origin_of(job: Job) -> Origin:
@@ -90,9 +93,3 @@ def _record(job: Job, started: str) -> JobRecord:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="milliseconds")
-
-
-def _write(log: Path, text: str) -> None:
-    """The terminal has the line too, so a log that cannot be written is no fault of its own."""
-    with suppress(OSError):
-        log.write_text(text, encoding="utf-8")

@@ -1,11 +1,11 @@
 """Refuse a run of which some check of its audit does not hold."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.audit.whole import require_all
 from elastocal.io.atomic_writes import write_text
-
-from job import Job, run
 
 
 def judge_audit(job: Job) -> None:

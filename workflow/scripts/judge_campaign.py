@@ -1,5 +1,7 @@
 """The verdict on a campaign: every model on poses that no step has seen."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
@@ -10,8 +12,6 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop.case_files import load_case
 from elastocal.loop.schemas import STEPS, residuals
-
-from job import Job, run
 
 
 def judge_campaign(job: Job) -> None:

@@ -1,5 +1,7 @@
 """What one strategy can identify from the experiments of one robot."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.mechanics.chain import parse_chain
@@ -7,8 +9,6 @@ from elastocal.mechanics.robot import with_target_offset
 from elastocal.study.steps.design import design_blocks
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import design, experiments
-
-from job import Job, run
 
 
 def judge_design(job: Job) -> None:

@@ -1,13 +1,13 @@
 """Errors that one robot's strategies leave, by several yardsticks."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.uses import use_blocks
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import USES
-
-from job import Job, run
 
 
 def judge_in_use(job: Job) -> None:

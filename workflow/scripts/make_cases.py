@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
-
 from job import Job, run
+
+from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
 
 
 def make_cases(job: Job) -> None:

@@ -1,12 +1,12 @@
 """What a second target is worth at every place of one robot's arm."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.arm_points import place_columns
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.table_schemas import PLACES
-
-from job import Job, run
 
 
 def map_arm(job: Job) -> None:

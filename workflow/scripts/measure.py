@@ -1,11 +1,11 @@
 """Deflections of one robot as measured at one noise level."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.study.steps.measure import measured_blocks
 from elastocal.study.table_schemas import DEFLECTIONS
-
-from job import Job, run
 
 
 def measure(job: Job) -> None:

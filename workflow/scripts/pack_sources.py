@@ -4,10 +4,10 @@ import zipfile
 from pathlib import Path
 from urllib.parse import unquote
 
+from job import Job, run
+
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.json_files import read_json
-
-from job import Job, run
 
 MADE = ("data/", "results/", "reports/")
 

@@ -1,13 +1,13 @@
 """What to measure next for the first cases of a block that end in a class; this process opens no sealed file."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.blind.follow_up import LADDER, MOST, POSES, followed_up
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.proposed import proposed
-
-from job import Job, run
 
 
 def propose_follow_ups(job: Job) -> None:

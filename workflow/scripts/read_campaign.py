@@ -1,13 +1,13 @@
 """A campaign's folder, checked, as tables: measurements to fit and measurements to test."""
 
+from job import Job, run
+
 from elastocal.campaigns.columns import columns_of
 from elastocal.io.json_files import write_json
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import measurements
-
-from job import Job, run
 
 
 def read_campaign(job: Job) -> None:

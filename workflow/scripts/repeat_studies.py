@@ -1,13 +1,13 @@
 """Scores of further studies of one robot, at the noise of the tables."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.repeat import repeated_blocks
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import repeated
-
-from job import Job, run
 
 
 def repeat_studies(job: Job) -> None:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.blind.calibration import reliability, statements
@@ -13,8 +15,6 @@ from elastocal.blind.power import powers, undetectable
 from elastocal.blind.targets import by_setting, summarized
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-
-from job import Job, run
 
 
 def score_cases(job: Job) -> None:

@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.blind.follow_up_scores import (
@@ -16,8 +18,6 @@ from elastocal.blind.follow_up_scores import (
 from elastocal.blind.ground_truth import load_ground_truth
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-
-from job import Job, run
 
 
 def score_follow_ups(job: Job) -> None:

@@ -3,9 +3,9 @@
 import hashlib
 from pathlib import Path
 
-from elastocal.blind.cases import write_manifest
-
 from job import Job, run
+
+from elastocal.blind.cases import write_manifest
 
 
 def seal_cases(job: Job) -> None:

@@ -1,13 +1,13 @@
 """Deflections of one robot without noise."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.mechanics.robot import with_target_offset
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.steps.simulate import ideal_blocks
 from elastocal.study.table_schemas import DEFLECTIONS, experiments
-
-from job import Job, run
 
 
 def simulate(job: Job) -> None:

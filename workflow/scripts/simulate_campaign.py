@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.campaigns.writing import write_campaign
 from elastocal.mechanics.robot_file import robot_from_document
-
-from job import Job, run
 
 
 def simulate_campaign(job: Job) -> None:

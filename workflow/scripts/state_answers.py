@@ -2,6 +2,8 @@
 
 import json
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.io.atomic_writes import write_text
@@ -24,8 +26,6 @@ from elastocal.report.question_answers import (
 )
 from elastocal.study.strategies import strategy_from_document
 from elastocal.study.table_schemas import REPLICATES, metrics
-
-from job import Job, run
 
 
 def state_answers(job: Job) -> None:

@@ -1,11 +1,11 @@
 """All campaigns of one kind on one page."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.io.json_files import read_json
 from elastocal.loop.schemas import residuals
 from elastocal.loop.summary import campaign_rows
-
-from job import Job, run
 
 
 def summarize_campaigns(job: Job) -> None:

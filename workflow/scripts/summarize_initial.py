@@ -1,11 +1,11 @@
 """Deflection of one robot before calibration, data set by data set."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import read_blocks, write_table
 from elastocal.study.steps.initial import initial_blocks
 from elastocal.study.table_schemas import DEFLECTIONS, INITIAL
-
-from job import Job, run
 
 
 def summarize_initial(job: Job) -> None:

@@ -1,10 +1,10 @@
 """What one data set gives, for every strategy, robot and noise level."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, read_long, write_csv
 from elastocal.study.table_schemas import BOUNDS, accuracy
 from elastocal.study.tables import per_dataset_table
-
-from job import Job, run
 
 
 def tabulate_accuracy(job: Job) -> None:

@@ -1,10 +1,10 @@
 """What known geometry and equal noise are worth."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import geometry_table, weighting_table
 from elastocal.study.table_schemas import GEOMETRY, WEIGHTING
-
-from job import Job, run
 
 
 def tabulate_assumptions(job: Job) -> None:

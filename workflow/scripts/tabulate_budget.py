@@ -1,10 +1,10 @@
 """Sets of measuring points at an equal budget, paired, and how many configurations each needs."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.budget_tables import budget_table, lengths_table, paired_table
 from elastocal.study.table_schemas import BUDGET
-
-from job import Job, run
 
 
 def tabulate_budget(job: Job) -> None:

@@ -1,10 +1,10 @@
 """Table 1: the compliances that the study takes as true."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import write_csv
 from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.tables import table1
-
-from job import Job, run
 
 
 def tabulate_compliances(job: Job) -> None:

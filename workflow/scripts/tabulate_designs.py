@@ -1,10 +1,10 @@
 """Random against optimal configurations."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import designs_table
 from elastocal.study.table_schemas import DESIGNS
-
-from job import Job, run
 
 
 def tabulate_designs(job: Job) -> None:

@@ -1,12 +1,12 @@
 """Expectations beside further studies and the paper."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.io.data_frames import read_long, read_studies, write_csv
 from elastocal.study.study_tables import expectations_table
 from elastocal.study.table_schemas import expected, repeated
-
-from job import Job, run
 
 
 def tabulate_expectations(job: Job) -> None:

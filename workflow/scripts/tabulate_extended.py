@@ -1,10 +1,10 @@
 """What calibration with the reduced model leaves of robots with elastic links."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
 from elastocal.study.tables import extended_table
-
-from job import Job, run
 
 
 def tabulate_extended(job: Job) -> None:

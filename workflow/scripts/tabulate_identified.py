@@ -1,10 +1,10 @@
 """Table 3: compliances by the classical strategy."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import metrics
 from elastocal.study.tables import table3
-
-from job import Job, run
 
 
 def tabulate_identified(job: Job) -> None:

@@ -1,11 +1,11 @@
 """Table 2: deviation before calibration."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.bootstrap import bootstrap_weights
 from elastocal.study.table_schemas import INITIAL
 from elastocal.study.tables import table2
-
-from job import Job, run
 
 
 def tabulate_initial(job: Job) -> None:

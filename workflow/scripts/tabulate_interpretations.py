@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.io.data_frames import read_studies, write_csv
 from elastocal.study.study_tables import interpretations_table
 from elastocal.study.table_schemas import repeated
-
-from job import Job, run
 
 
 def tabulate_interpretations(job: Job) -> None:

@@ -1,10 +1,10 @@
 """Springs that pay."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import ladder_table
 from elastocal.study.table_schemas import LADDER
-
-from job import Job, run
 
 
 def tabulate_ladder(job: Job) -> None:

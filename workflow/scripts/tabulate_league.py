@@ -3,6 +3,8 @@
 import sys
 from pathlib import Path
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.figures.league import league_picture, mechanism_picture
@@ -14,8 +16,6 @@ from elastocal.league.methods import Method
 from elastocal.league.pages import league_page
 from elastocal.league.schemas import ENTRIES, MECHANISMS
 from elastocal.league.table import Result, cost_table, league_table, mechanism_table
-
-from job import Job, origin_of, run
 
 
 def timing(folder: str, *names: str) -> dict[str, float]:

@@ -1,10 +1,10 @@
 """Observability indices beside what they are worth."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import observability_table
 from elastocal.study.table_schemas import OBSERVABILITY
-
-from job import Job, run
 
 
 def tabulate_observability(job: Job) -> None:

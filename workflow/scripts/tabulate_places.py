@@ -1,10 +1,10 @@
 """What a second target is worth at every place of the arm."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import places_table
 from elastocal.study.table_schemas import PLACES
-
-from job import Job, run
 
 
 def tabulate_places(job: Job) -> None:

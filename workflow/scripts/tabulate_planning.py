@@ -1,11 +1,11 @@
 """Gains by planning of all robots."""
 
+from job import Job, run
+
 import pandas as pd
 
 from elastocal.io.data_frames import write_csv
 from elastocal.io.json_files import read_json
-
-from job import Job, run
 
 
 def tabulate_planning(job: Job) -> None:

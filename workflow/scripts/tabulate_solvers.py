@@ -1,10 +1,10 @@
 """How far the estimates of strategies and solvers that should agree are apart."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.table_schemas import solvers
 from elastocal.study.tables import solver_summary
-
-from job import Job, run
 
 
 def tabulate_solvers(job: Job) -> None:

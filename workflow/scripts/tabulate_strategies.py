@@ -1,10 +1,10 @@
 """Table 4: the strategies compared."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_long, write_csv
 from elastocal.study.table_schemas import REPLICATES, metrics
 from elastocal.study.tables import table4
-
-from job import Job, run
 
 
 def tabulate_strategies(job: Job) -> None:

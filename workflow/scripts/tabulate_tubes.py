@@ -1,10 +1,10 @@
 """How much the diameter of the extended robot's tubes matters."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, write_csv
 from elastocal.study.question_tables import tubes_table
 from elastocal.study.table_schemas import TUBES
-
-from job import Job, run
 
 
 def tabulate_tubes(job: Job) -> None:

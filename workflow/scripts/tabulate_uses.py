@@ -1,10 +1,10 @@
 """Strategies by every metric, and where metrics rank them differently."""
 
+from job import Job, run
+
 from elastocal.io.data_frames import read_frame, read_long, write_csv
 from elastocal.study.ranks import pairs_table, ranks_table, scores
 from elastocal.study.table_schemas import REPLICATES, USES, metrics
-
-from job import Job, run
 
 
 def tabulate_uses(job: Job) -> None:

@@ -1,11 +1,11 @@
 """A table as Markdown and LaTeX, each value with its standard error."""
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.io.data_frames import write_latex, write_markdown
 from elastocal.study.tables import with_errors_merged
-
-from job import Job, origin_of, run
 
 
 def typeset_table(job: Job) -> None:

@@ -1,12 +1,12 @@
 """What known geometry and equal noise are worth, for one robot."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.assumptions import geometry_rows, weighting_rows
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.table_schemas import GEOMETRY, WEIGHTING
-
-from job import Job, run
 
 
 def vary_assumptions(job: Job) -> None:

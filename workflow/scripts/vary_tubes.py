@@ -1,12 +1,12 @@
 """One robot with elastic links, its tubes of other diameters."""
 
+from job import Job, run
+
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
 from elastocal.study.steps.in_memory import study_in_memory
 from elastocal.study.steps.tubes import tube_blocks
 from elastocal.study.table_schemas import TUBES
-
-from job import Job, run
 
 
 def vary_tubes(job: Job) -> None:

@@ -3,6 +3,8 @@
 from dataclasses import asdict
 from importlib.metadata import metadata
 
+from job import Job, origin_of, run
+
 import pandas as pd
 
 from elastocal.crate.data_package import data_package
@@ -13,8 +15,6 @@ from elastocal.io.data_frames import write_csv
 from elastocal.io.job_records import jobs_behind, read_job_records
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import canonical_json
-
-from job import Job, origin_of, run
 
 
 def write_crate(job: Job) -> None:

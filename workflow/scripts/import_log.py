@@ -1,0 +1,24 @@
+"""Until a script has imported what it needs, and `job.run` sees to its log, what ends it is written there; imported first."""
+
+import sys
+import traceback
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+
+def write_log(log: str | Path, text: str) -> None:
+    """Write a log; the terminal has the text too, so a log that cannot be written is no fault of its own."""
+    with suppress(OSError):
+        Path(log).write_text(text, encoding="utf-8")
+
+
+def _log_and_say(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    # Snakemake puts it into the script itself.
+    job = getattr(sys.modules["__main__"], "snakemake", None)
+    if job is not None:
+        write_log(job.log[0], "".join(traceback.format_exception(kind, error, trace)))
+    sys.__excepthook__(kind, error, trace)
+
+
+sys.excepthook = _log_and_say
