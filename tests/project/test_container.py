@@ -5,14 +5,19 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 RECIPE = (ROOT / "Dockerfile").read_text(encoding="utf-8")
+COPIED = {name for line in re.findall(r"^COPY (.*) \S+$", RECIPE, re.MULTILINE) for name in line.split()}
 
 
 def test_what_it_copies_is_there_and_is_what_the_pipeline_is_made_of():
-    copied = {name for line in re.findall(r"^COPY (.*) \S+$", RECIPE, re.MULTILINE) for name in line.split()}
-    assert [name for name in copied if not (ROOT / name).exists()] == []
-    assert copied >= {"Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "pyproject.toml"}
+    assert [name for name in COPIED if not (ROOT / name).exists()] == []
+    assert COPIED >= {"Snakefile", "config.yaml", "config", "profiles", "src", "workflow", "pyproject.toml"}
 
 
 def test_it_installs_by_digest_and_names_no_index():
     assert RECIPE.count("--require-hashes") == 2
     assert "http" not in RECIPE and "index" not in RECIPE
+
+
+def test_an_engine_is_handed_what_is_copied_and_nothing_else():
+    rules = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
+    assert "*" in rules and {rule[1:] for rule in rules if rule.startswith("!")} == COPIED

@@ -8,7 +8,7 @@ hold, reports/audit.txt; where one does not, it ends with an error. Files of oth
 rule audit_files:
     input:
         files=lambda wildcards: files_behind([*rules.study.input, *rules.loop.input]),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("audit_files.py"),
     output:
         table="reports/audit.csv",

@@ -13,7 +13,7 @@ BLIND = [f"{config['blind']}_{number}" for number in range(1, BLIND_BLOCKS + 1)]
 
 rule make_cases:
     input:
-        robots=expand("config/robots/{robot}.yaml", robot=BLIND_ROBOTS),
+        robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=BLIND_ROBOTS),
         sources=sources("make_cases.py"),
     output:
         blind=directory("data/blind/{block}"),
@@ -27,6 +27,7 @@ rule make_cases:
         number=lambda wildcards: int(wildcards.block.rsplit("_", 1)[1]),
         blocks=BLIND_BLOCKS,
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/make_cases.py"
 
@@ -58,5 +59,6 @@ rule diagnose_cases:
         "results/timings/diagnose_cases/{block}.tsv"
     params:
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/diagnose_cases.py"

@@ -20,6 +20,7 @@ rule propose_follow_ups:
     params:
         size=config["blind"],
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/propose_follow_ups.py"
 
@@ -27,7 +28,7 @@ rule propose_follow_ups:
 rule carry_out_follow_ups:
     input:
         proposals=rules.propose_follow_ups.output.proposals,
-        robots=expand("config/robots/{robot}.yaml", robot=BLIND_ROBOTS),
+        robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=BLIND_ROBOTS),
         sources=sources("carry_out_follow_ups.py"),
     output:
         campaigns=directory("data/follow_up/{block}"),
@@ -38,6 +39,7 @@ rule carry_out_follow_ups:
     params:
         size=config["blind"],
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/carry_out_follow_ups.py"
 
@@ -54,6 +56,7 @@ rule diagnose_follow_ups:
         "results/timings/diagnose_follow_ups/{block}.tsv"
     params:
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/diagnose_follow_ups.py"
 

@@ -22,6 +22,7 @@ rule oracle_cases:
         "results/timings/oracle_cases/{block}.tsv"
     params:
         seed=config["seed"],
+        robots=f"{CONFIG}/robots",
     script:
         "../scripts/oracle_cases.py"
 
@@ -177,7 +178,7 @@ rule compile_blind_report:
         sweep=rules.score_sweep.output.table,
         manifest=rules.seal_cases.output.manifest,
         figures=[*expand("reports/blind/figures/{figure}.pdf", figure=BLIND_FIGURES), rules.score_sweep.output.pdf],
-        pages="src/elastocal/report/blind.typ",
+        pages=placed(PACKAGES / "elastocal" / "report" / "blind.typ"),
         sources=sources("compile_blind_report.py"),
     output:
         report=shown("reports/blind/blind.pdf", "blind", "Blind proof", shows="The report of the blind proof", kind="report"),

@@ -8,7 +8,7 @@ CLOSED_LOOP = config["closed_loop"]
 
 rule close_loop:
     input:
-        robot="config/robots/{robot}.yaml",
+        robot=f"{CONFIG}/robots/{{robot}}.yaml",
         sources=sources("close_loop.py"),
     output:
         moved="results/closed_loop/{robot}.parquet",
@@ -26,7 +26,7 @@ rule close_loop:
 rule summarize_closed_loop:
     input:
         moved=expand(rules.close_loop.output.moved, robot=CLOSED_LOOP["robots"]),
-        robots=expand("config/robots/{robot}.yaml", robot=CLOSED_LOOP["robots"]),
+        robots=expand(f"{CONFIG}/robots/{{robot}}.yaml", robot=CLOSED_LOOP["robots"]),
         sources=sources("summarize_closed_loop.py"),
     output:
         errors="reports/closed_loop/cases.csv",

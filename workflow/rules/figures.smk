@@ -79,7 +79,7 @@ rule draw_noise_impact:
 rule draw_stiffness_errors:
     input:
         metrics=lambda wildcards: cells("metrics", STIFFNESS_PANELS[wildcards.panel], TABLE_NOISE),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("draw_stiffness_errors.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
@@ -108,7 +108,7 @@ rule draw_stiffness_errors:
 rule draw_deviations:
     input:
         metrics=lambda wildcards: cells("metrics", DEVIATION_PANELS[wildcards.panel], TABLE_NOISE),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("draw_deviations.py"),
     output:
         pdf="reports/figures/fig5{panel}.pdf",
@@ -214,7 +214,7 @@ rule draw_scores:
 rule draw_table2_samples:
     input:
         initial=expand(rules.summarize_initial.output.initial, robot=config["robots"]),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("draw_table2_samples.py"),
     output:
         pdf="reports/figures/table2_samples.pdf",

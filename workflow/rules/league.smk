@@ -81,7 +81,7 @@ rule tabulate_league:
         mechanisms=lambda wildcards: of_rounds(
             rules.diagnose_league_folds.output.mechanisms, [key for key in rounds_of(wildcards.league) if key[1] == "random"]
         ),
-        published="config/league/published.csv",
+        published=f"{CONFIG}/league/published.csv",
         sources=sources("tabulate_league.py"),
     output:
         league=shown("reports/league/{league}/league.csv", "league", "League", shows="Errors of all methods", kind="table"),

@@ -6,7 +6,7 @@
 
 rule gain_by_planning:
     input:
-        robot="config/robots/{robot}.yaml",
+        robot=f"{CONFIG}/robots/{{robot}}.yaml",
         sources=sources("gain_by_planning.py"),
     output:
         gains="results/planning/{robot}.json",

@@ -58,7 +58,7 @@ rule tabulate_expectations:
     input:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=USUAL, robot=REDUCED),
         expected=cells("expected", REDUCED, TABLE_NOISE),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("tabulate_expectations.py"),
     output:
         table=shown(
@@ -82,7 +82,7 @@ rule tabulate_expectations:
 rule tabulate_interpretations:
     input:
         studies=expand(rules.repeat_studies.output.repeated, interpretation=[USUAL, *config["switched"]], robot=REDUCED),
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("tabulate_interpretations.py"),
     output:
         table=shown(

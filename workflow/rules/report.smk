@@ -62,9 +62,9 @@ rule compile_report:
         table2=rules.tabulate_initial.output.table,
         table3=rules.tabulate_identified.output.table,
         table4=rules.tabulate_strategies.output.table,
-        interpretations="config/paper/interpretations.csv",
+        interpretations=f"{CONFIG}/paper/interpretations.csv",
         figures=expand("reports/figures/{figure}.pdf", figure=FIGURES),
-        pages="src/elastocal/report/study.typ",
+        pages=placed(PACKAGES / "elastocal" / "report" / "study.typ"),
         sources=sources("compile_report.py"),
     output:
         report=shown(

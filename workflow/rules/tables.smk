@@ -208,7 +208,7 @@ rule tabulate_solvers:
 
 rule compare_with_paper:
     input:
-        reference="config/paper/reference.csv",
+        reference=f"{CONFIG}/paper/reference.csv",
         table1=rules.tabulate_compliances.output.table,
         table2=rules.tabulate_initial.output.table,
         table3=rules.tabulate_identified.output.table,

@@ -18,7 +18,7 @@ def carry_out_follow_ups(job: Job) -> None:
         # A block has arms of six joints and of seven.
         shown = states.filter(regex=r"^q\d+$").dropna(axis=1).to_numpy()
         wrench = states[list(WRENCH_NAMES)].to_numpy()
-        carry_out(cases[name], shown, wrench, job.output.campaigns, "config/robots")
+        carry_out(cases[name], shown, wrench, job.output.campaigns, job.params.robots)
 
 
 run(carry_out_follow_ups, snakemake)

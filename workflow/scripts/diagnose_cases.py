@@ -14,7 +14,7 @@ def diagnose_cases(job: Job) -> None:
     folders = sorted(folder for folder in Path(job.input.blind).iterdir() if folder.is_dir())
     verdicts = []
     for number, folder in enumerate(folders, 1):
-        verdicts.append(diagnosed(folder.as_posix(), "config/robots", job.params.seed))
+        verdicts.append(diagnosed(folder.as_posix(), job.params.robots, job.params.seed))
         print(f"{job.wildcards.block}: {number} of {len(folders)} cases", file=sys.stderr, flush=True)
     write_text(job.output.verdicts, json.dumps(verdicts, allow_nan=False) + "\n")
 

@@ -14,7 +14,7 @@ from elastocal.loop.whole import diagnosed
 def diagnose_follow_ups(job: Job) -> None:
     def verdict_on(folder: str) -> dict[str, Any]:
         print(f"{job.wildcards.block}: {Path(folder).parent.name}", file=sys.stderr, flush=True)
-        return diagnosed(folder, "config/robots", job.params.seed)
+        return diagnosed(folder, job.params.robots, job.params.seed)
 
     write_json(job.output.verdicts, diagnosed_anew(job.input.campaigns, verdict_on), allow_nan=False)
 

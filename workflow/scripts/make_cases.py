@@ -12,7 +12,7 @@ def make_cases(job: Job) -> None:
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)
     for case in block_of(cases_of(SIZES[settings.size], settings.seed), settings.number, settings.blocks):
-        make_case(case, job.output.blind, job.output.sealed, "config/robots")
+        make_case(case, job.output.blind, job.output.sealed, job.params.robots)
 
 
 run(make_cases, snakemake)

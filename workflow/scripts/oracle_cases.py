@@ -14,7 +14,7 @@ def oracle_cases(job: Job) -> None:
     verdicts = {verdict["campaign"]: verdict for verdict in read_json(job.input.verdicts)}
     found = {}
     for name, truth in truths.items():
-        found[name] = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", "config/robots", job.params.seed)
+        found[name] = oracle(truth, verdicts[name], f"{job.input.blind}/{name}", job.params.robots, job.params.seed)
     write_json(job.output.oracle, found, allow_nan=False)
 
 

@@ -14,7 +14,7 @@ def propose_follow_ups(job: Job) -> None:
     frames = [pd.DataFrame({"case": []})]
     for verdict in followed_up(read_json(job.input.verdicts), MOST[job.params.size]):
         folder = f"{job.input.blind}/{verdict['campaign']}"
-        frame = proposed(folder, "config/robots", max(POSES), LADDER, job.params.seed)
+        frame = proposed(folder, job.params.robots, max(POSES), LADDER, job.params.seed)
         frames.append(frame.assign(case=verdict["campaign"]))
     write_csv(job.output.proposals, pd.concat(frames, ignore_index=True))
 
