@@ -241,7 +241,8 @@ class Arm:
     def _spring_compliance(self, diameter: float) -> np.ndarray:
         found = np.zeros((self.coordinates, self.coordinates))
         found[: self.joints, : self.joints] = np.diag(self.compliance)
-        if self.coordinates == self.joints:
+        # Links that are named but not described yield as whoever asks for them says.
+        if self.coordinates == self.joints or not self.document["links"]:
             return found
         links = self.document["links"]
         for number, vector in enumerate(self.links):

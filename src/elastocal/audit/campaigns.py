@@ -81,6 +81,30 @@ def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
     return found
 
 
+def models(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Probabilities of the models follow from their odds; each model's mechanisms are those of its parts.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    frame = run.table(file)
+    odds = np.exp(frame["log_odds"] - frame["log_odds"].max())
+    expected = odds * frame["probability"].sum() / odds.sum()
+    found = [compared(file, "probabilities by odds", "numpy", frame["probability"], expected)]
+    off = []
+    for stated, units in zip(frame["mechanisms"], frame["units"], strict=True):
+        named = sorted({re.split(r"[@\[ ]", unit)[0] for unit in units.split("; ") if unit}) or ["nothing"]
+        if " + ".join(named) != stated:
+            off.append(f"{stated}: {units}"[:80])
+    return [*found, held(file, "mechanisms of the parts of each model", "text", not off, ", ".join(off[:2]), len(frame))]
+
+
 def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
     """Errors before and after from the residuals; residuals of the declared model from pinocchio where it is springs alone.
 
@@ -164,5 +188,6 @@ def _moved_base(run: Audited, campaign: str) -> bool:
 CHECKS = (
     (re.compile(r"results/loop/([^/]+)/training\.parquet"), measurements),
     (re.compile(r"results/loop/([^/]+)/diagnosis\.json"), diagnosis),
+    (re.compile(r"results/loop/([^/]+)/models\.parquet"), models),
     (re.compile(r"reports/loop/([^/]+)/residuals\.parquet"), residuals),
 )

@@ -1,0 +1,370 @@
+"""Fits of a campaign, worked out again: statsmodels on pinocchio's kinematics at the estimates that a file states.
+
+What is checked of a step is that its estimates are where iteratively reweighted least squares stand still, and that its
+standard errors are those of the regressors there. A step that has effects other than joint springs and bending links, fitted
+frames or targets, or declared masses is left out.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import statsmodels.api as sm
+from scipy import stats
+from statsmodels.robust.norms import HuberT
+
+from elastocal.audit.audited import COMPONENTS
+from elastocal.audit.elastic import STATE, Readings, Robot, Springs, far_off, readings
+from elastocal.audit.findings import Finding, compared, held
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from elastocal.audit.audited import Audited
+
+# Effects whose formulas are written down here a second time.
+_SPRINGS, _LINKS = "joint_compliance", "link_elasticity"
+_BENDING, _TORSION, _TAPER = "bending_1_over_EI", "torsion_1_over_GJ", "taper"
+# A fit stops at steps of a thousandth of a standard error of the scatter that is there.
+_SETTLED = 2e-3
+# Standard errors belong to the estimates one such step before.
+_OF_ERRORS = 1e-3
+# A fit that is read from a file goes on from there: a thousandth of a standard error displaces by less than this (m, rad).
+_STEP_BACK = 2e-8
+# Beyond this quantile of the distance from the prediction a measurement loses weight.
+_HUBER = 0.99
+# Of the half width of a taper's range; for its slope.
+_DIFFERENCE = 1e-4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One model of a campaign as its files have it.
+
+    Attributes
+    ----------
+    kind : str
+    parameters : DataFrame
+        Rows of steps.parquet.
+    noise : mapping
+        Of diagnosis.json.
+    springs : Springs
+    """
+
+    kind: str
+    parameters: pd.DataFrame
+    noise: Mapping[str, Any]
+    springs: Springs
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign whose models can be worked out again.
+
+    Attributes
+    ----------
+    robot : Robot
+    poses : bool
+        Whether orientations were measured.
+    steps : list of Step or None
+        In the order of the files; None where a step has what is not written down here.
+    """
+
+    robot: Robot
+    poses: bool
+    steps: list[Step | None]
+
+
+def campaign_of(run: Audited, name: str) -> Campaign | None:
+    """A campaign's robot and models.
+
+    Parameters
+    ----------
+    run : Audited
+    name : str
+
+    Returns
+    -------
+    Campaign or None
+        None where frames or targets are fitted, the approach is recorded, or the robot file declares masses or no springs.
+    """
+    described = _document(run, f"results/loop/{name}/campaign.json")
+    asked, robot = described["campaign"], described["robot"]
+    targets = list(asked["targets"].values())
+    placed = asked["frame"] == "base" and all(target["offset_m"] != "unknown" for target in targets)
+    weightless = "masses" not in robot and "compliance_urad_per_Nm" in robot
+    if not placed or not weightless or asked["declared"] or described.get("held_out") is not None:
+        return None
+    if run.table(f"results/loop/{name}/training.parquet")["approach1"].notna().any():
+        return None
+    compliant, facts = Robot(robot, targets), _document(run, f"results/loop/{name}/diagnosis.json")
+    table = run.table(f"results/loop/{name}/steps.parquet")
+    nominal = 1e-6 * np.array(robot["compliance_urad_per_Nm"], float)
+    # Where a fixed rotation or a coupled joint parts a link, its ends are not those of a stretch of translations.
+    plain = "deg)" not in robot["chain"] and len(re.findall(r"q\d+", robot["chain"])) == compliant.joints
+    steps = [_step(stated, table[table["step"] == number], nominal, plain) for number, stated in enumerate(facts["steps"])]
+    return Campaign(compliant, asked["measured"] == "pose", steps)
+
+
+def _step(stated: Mapping[str, Any], parameters: pd.DataFrame, nominal: np.ndarray, plain: bool) -> Step | None:
+    links = [key for key in stated["effects"] if key.startswith(_LINKS)]
+    others = set(stated["effects"]) - {_SPRINGS, *links}
+    # One section of all links; links of their own sections are not written down here.
+    if others or len(links) > 1 or (links and not (plain and "one section" in links[0])):
+        return None
+    values = dict(zip(parameters["parameter"], parameters["value"], strict=True))
+    joints = np.array([values.get(f"c{j}", c) for j, c in enumerate(nominal, 1)])
+    springs = Springs(joints, *(values.get(name, 0.0) for name in (_BENDING, _TORSION, _TAPER)))
+    return Step(stated["kind"], parameters, stated["noise"], springs)
+
+
+def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Noise, estimates and standard errors of every step.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    known = campaign_of(run, campaign)
+    if known is None:
+        return []
+    training = run.table(file.replace("steps", "training"))
+    seen, found = readings(training, known.poses), []
+    for number, step in enumerate(known.steps):
+        if step is None:
+            continue
+        # Most steps go by the noise of the one before.
+        earlier = known.steps[number - 1] if number else None
+        if earlier is None or earlier.noise != step.noise:
+            found += _noise(file, number, step, training, known)
+        if len(step.parameters):
+            found += _fit(file, number, step, seen, known.robot)
+    return found
+
+
+def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Campaign) -> list[Finding]:
+    """Noise of a measurement from the repeats about their means, where the joints have no part in it."""
+    noise = step.noise
+    if noise["source"] != "repeats" or any(noise["joint_rad"]) or noise["pose_rad"] or noise["usual_m"]:
+        return []
+    training = training[~far_off(training)]
+    repeated = training[training.groupby([*STATE, "target"])["row"].transform("size") > 1]
+    residual = each_residual(known, step, repeated)
+    groups = repeated.groupby([*STATE, "target"]).ngroup().to_numpy()
+    off = residual - pd.DataFrame(residual).groupby(groups).transform("mean").to_numpy()
+    free = len(groups) - len(np.unique(groups))
+    squares = (off**2).sum(axis=0)
+    expected = [np.sqrt(squares[first : first + 3].sum() / (3 * free)) for first in range(0, len(squares), 3)]
+    stated = [noise["position_m"], noise["orientation_rad"]][: len(expected)]
+    degrees = len(squares) * free
+    return [
+        compared(file, f"noise of step {number}, from repeats", "pandas on pinocchio", stated, expected, 1e-4),
+        compared(file, f"repeats of step {number}", "counting", noise["degrees_of_freedom"], degrees, 0.0),
+    ]
+
+
+def _fit(file: str, number: int, step: Step, seen: Readings, robot: Robot) -> list[Finding]:
+    """Whether a step stands still, and its standard errors."""
+    free = ~step.parameters["held"].to_numpy(bool)
+    error = step.parameters["std_error"].to_numpy()
+    columns, residual, scale = _whitened(step, seen, robot)
+    by = "statsmodels on pinocchio"
+    fitted = _least_squares(columns[:, free], residual)
+    # A shape at the end of its range does not go on beyond it.
+    inside = free & ~_at_an_end(step)
+    moved = _least_squares(columns[:, inside], residual).params
+    checked = f"estimates of step {number} ({step.kind}) stand still, in standard errors"
+    found = [compared(file, checked, by, moved / (scale * error[inside]), np.zeros(inside.sum()), absolute=_SETTLED)]
+    checked = f"standard errors of step {number} ({step.kind})"
+    return [*found, compared(file, checked, by, error[free], fitted.bse, _OF_ERRORS, scale=fitted.bse)]
+
+
+def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Correlations of the estimates of the last step.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    known = campaign_of(run, campaign)
+    step = known.steps[-1] if known else None
+    if known is None or step is None or step.parameters["held"].all():
+        return []
+    table, free = run.table(file), ~step.parameters["held"].to_numpy(bool)
+    seen = readings(run.table(file.replace("correlations", "training")), known.poses)
+    names = (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[free]
+    columns, residual, _ = _whitened(step, seen, known.robot)
+    covariance = np.asarray(_least_squares(columns[:, free], residual).cov_params())
+    deviation = np.sqrt(np.diag(covariance))
+    place = {name: number for number, name in enumerate(names)}
+    pairs = [(place[one], place[other]) for one, other in zip(table["one"], table["other"], strict=True)]
+    expected = [covariance[pair] / (deviation[pair[0]] * deviation[pair[1]]) for pair in pairs]
+    every = len({frozenset(pair) for pair in pairs}) == len(names) * (len(names) - 1) // 2 == len(pairs)
+    by = "statsmodels on pinocchio"
+    return [
+        held(file, "every pair of parameters once", "counting", every, f"{len(pairs)} of {len(names)} parameters", len(pairs)),
+        compared(file, "correlations of the estimates", by, table["correlation"], expected, absolute=_OF_ERRORS),
+    ]
+
+
+def _least_squares(columns: np.ndarray, residual: np.ndarray) -> Any:
+    """Ordinary least squares of whitened rows, whose variance is one."""
+    return sm.OLS(residual, columns).fit(cov_type="fixed scale", cov_kwds={"scale": 1.0})
+
+
+def _at_an_end(step: Step) -> np.ndarray:
+    """Which parameters are a taper that is as small as it may be, or as large."""
+    ends = step.parameters["value"].isin([0.0, _LARGEST_TAPER])
+    return (ends & (step.parameters["parameter"] == _TAPER)).to_numpy()
+
+
+_LARGEST_TAPER = 0.6
+
+
+def _whitened(step: Step, seen: Readings, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+    """Weighted, whitened regressors and residual with rows for the priors below them, and the scale of the scatter."""
+    loaded = robot.all_loaded(step.springs, seen)
+    residual, jacobian = robot.residuals(loaded, seen), robot.jacobians(loaded, seen)
+    units = _units(step, robot)
+    moved = np.stack([units @ forces for _, forces in loaded])
+    rows = np.concatenate([jacobian @ moved[seen.state].transpose(0, 2, 1), residual[:, :, None]], axis=2)
+    blocks = _whitener(step.noise, seen, jacobian[:, :, : robot.joints])
+    distance = np.sqrt((_applied(blocks, rows[..., -1:]) ** 2).mean(axis=(1, 2)))
+    # Where scatter is larger than the noise, distances count by that of the middle one.
+    count = residual.shape[1]
+    scale = max(float(np.median(distance) / np.sqrt(stats.chi2.median(count) / count)), 1.0)
+    weights = HuberT(np.sqrt(stats.chi2.ppf(_HUBER, count) / count)).weights(distance / scale)
+    white = _applied(blocks, np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2])
+    prior = step.parameters["prior_std"].to_numpy()
+    known = np.isfinite(prior)
+    below = (np.eye(len(prior)) / np.where(known, prior, 1.0)[:, None])[known]
+    value = (step.parameters["value"].to_numpy() / prior)[known]
+    return np.vstack([white[:, :-1], below]), np.concatenate([white[:, -1], -value]), scale
+
+
+def _units(step: Step, robot: Robot) -> np.ndarray:
+    """What a unit of each parameter makes of the loads on the coordinates, (P, C, C)."""
+    springs, still = step.springs, np.zeros(robot.joints)
+    found = []
+    for name in step.parameters["parameter"]:
+        if name == _BENDING:
+            found.append(robot.compliance(Springs(still, 1.0, 0.0, springs.taper)))
+        elif name == _TORSION:
+            found.append(robot.compliance(Springs(still, 0.0, 1.0, springs.taper)))
+        elif name == _TAPER:
+            more, less = (
+                robot.compliance(Springs(still, springs.bending, springs.torsion, springs.taper + sign * _DIFFERENCE))
+                for sign in (1, -1)
+            )
+            found.append((more - less) / (2 * _DIFFERENCE))
+        else:
+            found.append(robot.compliance(Springs((np.arange(1, robot.joints + 1) == int(name[1:])).astype(float))))
+    return np.array(found)
+
+
+def _whitener(noise: Mapping[str, Any], seen: Readings, jacobian: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """For each pose its measurements and the inverse Cholesky factor of their covariance.
+
+    The sensor's part is of each measurement, that of the joints common to a state, another one to a pose.
+    """
+    rows, joints = jacobian.shape[1], np.array(noise["joint_rad"])
+    sensor = np.repeat([noise["position_m"], noise["orientation_rad"]], 3)[:rows] ** 2
+    poses, repeats = seen.pose, seen.repeats
+    found = []
+    for pose in np.unique(poses):
+        members = np.flatnonzero(poses == pose)
+        stacked = jacobian[members].reshape(len(members) * rows, -1)
+        alike = np.kron(seen.state[members][:, None] == seen.state[members], np.ones((rows, rows)))
+        single = np.diag(np.tile(sensor, len(members))) + alike * ((stacked * joints**2) @ stacked.T)
+        covariance = single / np.repeat(repeats[members], rows) + noise["pose_rad"] ** 2 * stacked @ stacked.T
+        found.append((members, np.linalg.inv(np.linalg.cholesky(covariance))))
+    return found
+
+
+def _applied(blocks: Sequence[tuple[np.ndarray, np.ndarray]], values: np.ndarray) -> np.ndarray:
+    """Whitened rows (M, rows, K)."""
+    found = np.empty(values.shape)
+    for members, factor in blocks:
+        some = values[members]
+        found[members] = (factor @ some.reshape(len(factor), -1)).reshape(some.shape)
+    return found
+
+
+def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Residuals of all measurements, fitted and held out, by the declared and by the final model.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    known = campaign_of(run, campaign)
+    if known is None:
+        return []
+    table, found = run.table(file), []
+    parts = [run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")]
+    names = COMPONENTS if known.poses else COMPONENTS[:3]
+    declared = next(number for number, step in enumerate(known.steps) if step is None or step.kind == "declared")
+    for state, step in (("before", known.steps[declared]), ("after", known.steps[-1])):
+        if step is None:
+            continue
+        stored, expected = [], []
+        for measured, unseen in zip(parts, (False, True), strict=True):
+            mine = table[table["held_out"] == unseen].sort_values("row")
+            stored.append(mine[[f"{state}_{name}" for name in names]].to_numpy())
+            expected.append(each_residual(known, step, measured.sort_values("row")))
+        checked = f"residuals {state}, fitted and held out, all rows"
+        pair = np.concatenate(stored), np.concatenate(expected)
+        found.append(compared(file, checked, "pinocchio", *pair, 0.0, absolute=_STEP_BACK))
+    return found
+
+
+def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.ndarray:
+    """Residual of every single measurement, in the order of the rows of a table.
+
+    Parameters
+    ----------
+    known : Campaign
+    step : Step
+    measured : DataFrame
+
+    Returns
+    -------
+    ndarray (N, 3 or 6)
+    """
+    approach = [*STATE, "repeat"]
+    order = measured.reset_index(drop=True).sort_values([*approach, "target"])
+    seen = readings(order.assign(load=order.groupby(approach).ngroup()), known.poses)
+    found = np.empty((len(measured), 6 if known.poses else 3))
+    found[order.index] = known.robot.residuals(known.robot.all_loaded(step.springs, seen), seen)
+    return found
+
+
+def _document(run: Audited, file: str) -> dict[str, Any]:
+    return dict(json.loads((run.folder / file).read_text("utf-8")))
+
+
+CHECKS = (
+    (re.compile(r"results/loop/([^/]+)/steps\.parquet"), fits),
+    (re.compile(r"results/loop/([^/]+)/correlations\.parquet"), correlations),
+    (re.compile(r"reports/loop/([^/]+)/residuals\.parquet"), predictions),
+)
