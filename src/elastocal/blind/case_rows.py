@@ -8,6 +8,7 @@ import numpy as np
 
 from elastocal.blind.cases import impossible_on
 from elastocal.blind.scores import outcome
+from elastocal.diagnosis.judge import ABOUT_ERRORS
 from elastocal.plant.defects import KINDS
 
 if TYPE_CHECKING:
@@ -99,7 +100,7 @@ def _errors(verdict: Mapping[str, Any]) -> dict[str, Any]:
         return dict.fromkeys(_ERRORS[:5], np.nan) | dict.fromkeys(_ERRORS[5:], False)
     before, after = held["before"]["rms_m"], held["after"]["rms_m"]
     reduction, std_error = 1.0 - after / before, held["reduction_std_error"]
-    warned = any("held-out" in warning for warning in verdict["warnings"])
+    warned = any(ABOUT_ERRORS in warning for warning in verdict["warnings"])
     adopted = any(effect.get("adopted", False) for effect in verdict["effects"])
     worse = reduction + _STD_ERRORS * std_error < 0.0
     return {

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
+# What warnings of errors that grew are known by.
+ABOUT_ERRORS = "of the validation poses"
 _ERRORS = {"mean_m": "mean error", "rms_m": "RMS error", "p95_m": "95th percentile of the errors", "max_m": "largest error"}
 
 
@@ -220,9 +222,9 @@ def _warnings(
     found = []
     for name in grown(summary(errors[before].distance), summary(errors[after].distance)):
         low, high = (1e3 * rows[number][f"heldout_{name}"] for number in (before, after))
-        found.append(f"the {_ERRORS[name]} of the validation poses grew from {low:.3f} to {high:.3f} mm")
+        found.append(f"the {_ERRORS[name]} {ABOUT_ERRORS} grew from {low:.3f} to {high:.3f} mm")
     pairs = [(steps[n], rows[n - 1], rows[n]) for n in range(before + 1, after + 1)]
     for step, last, row in pairs:
         if row["heldout_rms_m"] > last["heldout_rms_m"]:
-            found.append(f"the step '{step.name}' raised the RMS error of the validation poses")
+            found.append(f"the step '{step.name}' raised the RMS error {ABOUT_ERRORS}")
     return found
