@@ -24,6 +24,14 @@ DESIGNS, GEOMETRY, USES = (f"results/{kind}/kuka.parquet" for kind in ("designs"
 LADDER = "results/ladder/kuka_extended.parquet"
 COMPARISON, EXPECTATIONS = "reports/tables/comparison.csv", "reports/tables/expectations.csv"
 SCORES, PAIRS = "reports/tables/strategy_scores.csv", "reports/tables/strategy_pairs.csv"
+CAMPAIGN = "kuka_extended_end_effector"
+STEPS, CORRELATIONS, MODELS, HELD_OUT = (
+    f"results/loop/{CAMPAIGN}/{name}.parquet" for name in ("steps", "correlations", "models", "held_out")
+)
+RESIDUALS, BEFORE_AFTER, SPLITS, VERDICT = (
+    f"reports/loop/{CAMPAIGN}/{name}" for name in ("residuals.parquet", "before_after.csv", "splits.csv", "verdict.json")
+)
+CAMPAIGNS = "reports/loop/campaigns.csv"
 # Of the comparison the row of the first figure of Table 3.
 TABLE3 = 21
 
@@ -156,6 +164,42 @@ def shuffled(block):
     return block | {"k_sigma": block["k_sigma"][order]}
 
 
+def of_parameter(name, step, column, change):
+    """A change of one figure of one parameter in one model of a campaign."""
+
+    def planted(block):
+        chosen = (np.array(block["parameter"]) == name) & (block["step"] == step)
+        return block | {column: np.where(chosen, change(block), block[column])}
+
+    return planted
+
+
+def rewritten_json(folder, file, change):
+    """Change a JSON document in place."""
+    document = json.loads((folder / file).read_text("utf-8"))
+    change(document)
+    (folder / file).write_text(json.dumps(document), encoding="utf-8")
+    forge(folder, file)
+
+
+def normal_interval(folder):
+    """An interval by the quantile of the normal distribution, which is too short for so few poses."""
+    frame = pd.read_csv(folder / BEFORE_AFTER)
+    reach = 1.96 / 4.3
+    for end in ("low", "high"):
+        off = np.log(frame[f"heldout_rms_m_{end}"] / frame["heldout_rms_m"])
+        frame[f"heldout_rms_m_{end}"] = frame["heldout_rms_m"] * np.exp(reach * off)
+    frame.to_csv(folder / BEFORE_AFTER, index=False, float_format="%.9g", lineterminator="\n")
+    forge(folder, BEFORE_AFTER)
+
+
+def better_probability(block):
+    """The most probable model a little more so, at the cost of the next."""
+    probability = block["probability"].copy()
+    probability[0], probability[1] = probability[0] + 0.01, probability[1] - 0.01
+    return block | {"probability": probability}
+
+
 def next_length(block):
     return block | {"rms_per_noise": np.append(block["rms_per_noise"][1:], block["rms_per_noise"][-1] * 0.99)}
 
@@ -265,5 +309,48 @@ PLANTED = {
     "an interval of a pair too narrow": (PAIRS, lambda f: cell(f, PAIRS, "ratio_high", 0.999)),
     "a pair said to be reversed": (PAIRS, lambda f: said(f, PAIRS, "reversed", True)),
     "a rank altered": (SCORES, lambda f: cell(f, SCORES, "rank", 2)),
+    "a compliance of a campaign altered": (
+        STEPS,
+        lambda f: rewritten(f, STEPS, of_parameter("c4", 1, "value", lambda b: b["value"] + 0.01 * b["std_error"])),
+    ),
+    "an effect's parameter altered": (
+        STEPS,
+        lambda f: rewritten(
+            f, STEPS, of_parameter("torsion_1_over_GJ", 2, "value", lambda b: b["value"] + 0.01 * b["std_error"])
+        ),
+    ),
+    "a standard error of a campaign halved": (
+        STEPS,
+        lambda f: rewritten(f, STEPS, of_parameter("c2", 2, "std_error", lambda b: 0.5 * b["std_error"])),
+    ),
+    "a prior left out": (STEPS, lambda f: rewritten(f, STEPS, of_parameter("taper", 2, "prior_std", lambda b: 0.1))),
+    "a correlation with the wrong sign": (CORRELATIONS, lambda f: rewritten(f, CORRELATIONS, scaled(-1.0, "correlation"))),
+    "a model more probable than its odds": (MODELS, lambda f: rewritten(f, MODELS, better_probability)),
+    "a held-out measurement altered": (HELD_OUT, lambda f: rewritten(f, HELD_OUT, scaled(1.00001, "z"))),
+    "residuals after too small": (
+        RESIDUALS,
+        lambda f: rewritten(f, RESIDUALS, scaled(0.99, "after_dx", "after_dy", "after_dz")),
+    ),
+    "residuals of orientations too small": (RESIDUALS, lambda f: rewritten(f, RESIDUALS, scaled(0.99, "before_ry"))),
+    "an error after too small": (BEFORE_AFTER, lambda f: cell(f, BEFORE_AFTER, "heldout_rms_m", 0.999, 2)),
+    "an interval of the wrong quantile": (BEFORE_AFTER, normal_interval),
+    "a 95th percentile's limit altered": (BEFORE_AFTER, lambda f: cell(f, BEFORE_AFTER, "heldout_p95_m_low", 1.01, 1)),
+    "an error over another floor": (BEFORE_AFTER, lambda f: cell(f, BEFORE_AFTER, "heldout_rms_over_floor", 0.99, 1)),
+    "an interval of a split too narrow": (SPLITS, lambda f: cell(f, SPLITS, "reduction_low", 1.001)),
+    "a reduction of a block altered": (SPLITS, lambda f: cell(f, SPLITS, "reduction", 1.001, 3)),
+    "a probability of the verdict raised": (
+        VERDICT,
+        lambda f: rewritten_json(f, VERDICT, lambda d: d["effects"][0].update(probability=0.999)),
+    ),
+    "a standard error of the verdict altered": (
+        VERDICT,
+        lambda f: rewritten_json(f, VERDICT, lambda d: d["heldout"].update(reduction_std_error=0.05)),
+    ),
+    "a gain of an effect altered": (
+        VERDICT,
+        lambda f: rewritten_json(f, VERDICT, lambda d: d["effects"][0].update(heldout_gain=0.74)),
+    ),
+    "a cell of the overview of campaigns altered": (CAMPAIGNS, lambda f: cell(f, CAMPAIGNS, "after_rms_high_mm", 0.99)),
+    "a verdict of the overview altered": (CAMPAIGNS, lambda f: said(f, CAMPAIGNS, "verdict", "adequate")),
     "a digit of a printed table": ("reports/tables/table1.md", typo),
 }

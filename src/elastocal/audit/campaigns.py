@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from pandas.api.types import is_numeric_dtype
 
 from elastocal.audit.arm import Arm
 from elastocal.audit.findings import Finding, compared, held
@@ -47,6 +48,50 @@ def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
                 if name in original:
                     found.append(compared(file, f"column {name} as measured", "pandas", rows[name], original[name], 1e-12))
     return found
+
+
+def kept_back(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Held-out measurements are those of the campaign's file, by their rows.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    source = f"data/campaigns/{campaign}/measurements.parquet"
+    if not run.there(source) or _document(run, campaign).get("held_out") is not None:
+        return []
+    rows, original = run.table(file), run.table(source)
+    names = [name for name in rows if name in original and name != "target" and is_numeric_dtype(original[name])]
+    expected = original.iloc[rows["row"].to_numpy() - 1][names]
+    return [compared(file, "measurements as the campaign has them", "pandas", rows[names], expected, 0.0)]
+
+
+def confounding(run: Audited, file: str, campaign: str) -> list[Finding]:
+    """Angles between every two candidates that were tested, each pair once.
+
+    Parameters
+    ----------
+    run : Audited
+    file, campaign : str
+
+    Returns
+    -------
+    list of Finding
+    """
+    frame = run.table(file)
+    tested = sorted({*frame["one"], *frame["other"]})
+    pairs = {frozenset(pair) for pair in zip(frame["one"], frame["other"], strict=True)}
+    every = len(pairs) == len(frame) == len(tested) * (len(tested) - 1) // 2
+    right = bool(frame["angle_deg"].between(0, 90).all())
+    return [
+        held(file, "every two candidates once", "counting", every, f"{len(frame)} pairs of {len(tested)}", len(frame)),
+        held(file, "angles between 0 and 90 degrees", "counting", right, "another one", len(frame)),
+    ]
 
 
 def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
@@ -188,6 +233,8 @@ def _moved_base(run: Audited, campaign: str) -> bool:
 CHECKS = (
     (re.compile(r"results/loop/([^/]+)/training\.parquet"), measurements),
     (re.compile(r"results/loop/([^/]+)/diagnosis\.json"), diagnosis),
+    (re.compile(r"results/loop/([^/]+)/held_out\.parquet"), kept_back),
+    (re.compile(r"results/loop/([^/]+)/confounding\.parquet"), confounding),
     (re.compile(r"results/loop/([^/]+)/models\.parquet"), models),
     (re.compile(r"reports/loop/([^/]+)/residuals\.parquet"), residuals),
 )

@@ -41,6 +41,8 @@ MEANINGS = {
     "results/identified/*.parquet": "identified compliances",
     "results/initial/*.parquet": "deflections before calibration",
     "results/ladder/*.parquet": "models with more and more link springs",
+    "results/loop/*/confounding.parquet": "of a campaign: which effects look alike",
+    "results/loop/*/held_out.parquet": "of a campaign: measurements kept for the test",
     "results/loop/*/correlations.parquet": "of a campaign: correlations of the estimates",
     "results/loop/*/diagnosis.json": "of a campaign: probabilities of what a model lacks",
     "results/loop/*/models.parquet": "of a campaign: how probable each model is",
