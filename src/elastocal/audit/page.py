@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 _SHOWN = 200
 # What files hold that are worked out again, by `kind_of`.
 MEANINGS = {
+    "data/campaigns/*/measurements.parquet": "of a campaign: measurements",
     "data/simulated/*/experiments.parquet": "drawn joint angles and loads",
     "data/simulated/*/ideal.parquet": "deflections without noise",
     "data/simulated/*/measured.parquet": "deflections with the noise of a tracker",

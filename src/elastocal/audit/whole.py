@@ -6,7 +6,23 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from elastocal.audit import assumptions, campaigns, choices, data, estimates, fits, held_out, questions, scores, tables
+from elastocal.audit import (
+    assumptions,
+    blind_cases,
+    blind_tables,
+    campaign_data,
+    campaigns,
+    choices,
+    closed_loop,
+    data,
+    estimates,
+    fits,
+    held_out,
+    league,
+    questions,
+    scores,
+    tables,
+)
 from elastocal.audit.files import described, intact, recorded
 from elastocal.audit.findings import Finding, held
 from elastocal.errors import InputError
@@ -16,7 +32,10 @@ if TYPE_CHECKING:
 
     from elastocal.audit.audited import Audited
 
-_CHECKED = (data, estimates, scores, questions, choices, assumptions, tables, campaigns, fits, held_out)
+_CHECKED = (
+    *(data, estimates, scores, questions, choices, assumptions, tables),
+    *(campaign_data, campaigns, fits, held_out, league, closed_loop, blind_cases, blind_tables),
+)
 _CHECKS = tuple(check for module in _CHECKED for check in module.CHECKS)
 # What an audit itself wrote is not audited.
 _OWN = "reports/audit."
