@@ -6,6 +6,7 @@ import pytest
 from analysed_robots import ROBOTS, analysed
 
 from elastocal.blind import closed_loop as module
+from elastocal.blind import schemas
 from elastocal.blind.closed_loop import (
     DECLARED,
     FOUND,
@@ -17,7 +18,6 @@ from elastocal.blind.closed_loop import (
     cases,
     closed_loop,
     hidden_effects,
-    schema,
 )
 from elastocal.blind.rehearsal import hidden_robot
 from elastocal.io.storage import read_table, write_table
@@ -87,7 +87,7 @@ def test_cases_are_fresh_by_the_seed_and_each_effect_comes_as_often():
 
 def test_the_table_goes_to_a_file_and_back(table, tmp_path):
     columns = {name: table[name].to_numpy() for name in table}
-    write_table(tmp_path / "t.parquet", schema(6), [columns], {})
-    back = read_table(tmp_path / "t.parquet", schema(6))
+    write_table(tmp_path / "t.parquet", schemas.closed_loop(6), [columns], {})
+    back = read_table(tmp_path / "t.parquet", schemas.closed_loop(6))
     np.testing.assert_array_equal(back["reached_error_m"], table["reached_error_m"])
     assert set(back["effect"]) == {"compensator_torque"}

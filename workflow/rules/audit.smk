@@ -4,6 +4,8 @@
 hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
 """
 
+from elastocal.audit.targets import finished
+
 
 rule audit_files:
     input:
@@ -22,6 +24,8 @@ rule audit_files:
         strategies=STUDY.strategies,
         configuration={key: config[key] for key in AUDITED},
         rows=config["audit"]["rows"],
+        # Where another target has run since, the audit is anew; it makes none of them run.
+        others=lambda wildcards: finished(Path()),
     script:
         "../scripts/audit_files.py"
 

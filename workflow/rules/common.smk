@@ -94,10 +94,10 @@ STUDY_SIZE = {
     "tests": config["test_configurations"],
     "noise": 1e-6 * config["tables"]["noise_um"],
 }
-# Keys of config.yaml that the files of study and loop depend on, and so their audit.
+# Keys of config.yaml that the files of study, loop and league depend on, and so their audit.
 AUDITED = [
     *("seed", "robots", "strategies", "noise_um", "data_sets", "configurations", "test_configurations", "loading"),
-    *("interpretations", "identification", "evaluation", "tables", "questions"),
+    *("interpretations", "identification", "evaluation", "tables", "questions", "league"),
 ]
 # Files that jobs make.
 MADE = re.compile("(data|results|reports)/|ro-crate-metadata.json$")

@@ -7,6 +7,7 @@ from job import Job, origin_of, run
 from elastocal import __version__
 from elastocal.audit.audited import Audited
 from elastocal.audit.page import page
+from elastocal.audit.targets import OTHERS
 from elastocal.audit.whole import as_table, audit
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
@@ -16,9 +17,13 @@ def audit_files(job: Job) -> None:
     settings = job.params
     finished = Audited(Path(), settings.configuration, settings.robots, settings.strategies, settings.rows)
     table = as_table(audit(finished))
+    made = settings.others
+    absent = [target for target in OTHERS if target not in made]
     facts = {
         "Seed of the random numbers": str(finished.seed),
         "Rows sampled of a large file": str(settings.rows),
+        "Other targets audited": ", ".join(made) or "none has finished",
+        "Absent, so not audited": ", ".join(absent) or "none",
         "Version of elastocal": __version__,
         "Origin": origin_of(job).words,
     }

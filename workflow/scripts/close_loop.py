@@ -4,7 +4,8 @@ from pathlib import Path
 
 from job import Job, run
 
-from elastocal.blind.closed_loop import cases, closed_loop, schema
+from elastocal.blind import schemas
+from elastocal.blind.closed_loop import cases, closed_loop
 from elastocal.campaigns.reading import read_robot
 from elastocal.io.provenance import provenance
 from elastocal.io.storage import write_table
@@ -13,7 +14,9 @@ from elastocal.io.storage import write_table
 def close_loop(job: Job) -> None:
     robot = Path(job.input.robot)
     blocks = (closed_loop(str(robot), str(robot.parent), *case) for case in cases(str(robot), job.params.seed, job.params.each))
-    write_table(job.output.moved, schema(read_robot(robot).joints), blocks, provenance(job.params, **job.wildcards))
+    write_table(
+        job.output.moved, schemas.closed_loop(read_robot(robot).joints), blocks, provenance(job.params, **job.wildcards)
+    )
 
 
 run(close_loop, snakemake)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from job import Job, origin_of, run
 
-from elastocal.blind.closed_loop import schema
+from elastocal.blind import schemas
 from elastocal.blind.closed_loop_summary import case_errors, goals, summary
 from elastocal.campaigns.reading import read_robot
 from elastocal.figures.closed_loop import closed_loop
@@ -15,7 +15,7 @@ from elastocal.io.data_frames import read_frame, write_csv
 def summarize_closed_loop(job: Job) -> None:
     joints = [read_robot(Path(robot)).joints for robot in job.input.robots]
     tables = {
-        robot: read_frame(path, schema(count))
+        robot: read_frame(path, schemas.closed_loop(count))
         for robot, path, count in zip(job.params.robots, job.input.moved, joints, strict=True)
     }
     errors = case_errors(tables)

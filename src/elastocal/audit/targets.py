@@ -1,0 +1,40 @@
+"""Targets of the workflow beside study and loop: an audit takes in what of them has finished and makes none of them run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# What each makes last.
+OTHERS = {
+    "measured": "reports/loop/measured.csv",
+    "league": "reports/league/all/league.csv",
+    "league_small": "reports/league/small/league.csv",
+    "blind": "reports/blind/summary.csv",
+    "closed_loop": "reports/closed_loop/goals.csv",
+    "planning": "reports/planning/gains.csv",
+    "extended_study": "reports/tables/interpretations.csv",
+}
+
+
+def finished(folder: Path) -> dict[str, str]:
+    """What jobs recorded of those that have finished.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the run.
+
+    Returns
+    -------
+    dict of str to str
+        Checksum of the last file by target.
+    """
+    records = {target: folder / f"results/checksums/{file}.sha256" for target, file in OTHERS.items()}
+    return {
+        target: record.read_text("utf-8").split()[0]
+        for target, record in records.items()
+        if record.is_file() and (folder / OTHERS[target]).is_file()
+    }
