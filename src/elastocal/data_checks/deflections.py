@@ -205,9 +205,9 @@ def unit_of_loads(deflected: Deflections) -> UnitFound | None:
 
 
 def _left(seen: np.ndarray, expected: np.ndarray) -> tuple[float, float]:
-    """RMS that expected deflections (R,) leave of those seen, times the best factor that robots have, m; and its share, up to 1.
+    """What expected deflections (R,), times the best factor that robots have, leave of those seen: RMS in m, and share up to 1.
 
-    The share is that of the larger of the two, so that it is the same for loads written too small and too large.
+    The share is of those expected where they are the larger: the same for loads written too small and too large.
     """
     factor = np.clip(expected @ seen / (expected @ expected), 1 / _RATIO, _RATIO)
     left = rms(seen - factor * expected)
