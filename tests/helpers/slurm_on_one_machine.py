@@ -106,10 +106,10 @@ def slurm_on_one_machine(cores=4):
         subprocess.run(["scancel", "--user=root"], env=environment, capture_output=True)
 
 
-def nodes_of_jobs(environment, folder):
-    """Names of the nodes on which jobs that were submitted from a folder have run."""
+def ended_jobs(environment, folder):
+    """Node and number of cores of each job that was submitted from a folder and has ended."""
     lines = Path(environment["SLURM_CONF"]).with_name(_ENDED).read_text(encoding="utf-8").splitlines()
-    return {re.search(r" NodeList=(\S+)", line)[1] for line in lines if f" WorkDir={folder} " in line}
+    return [re.search(r" NodeList=(\S+) .* ProcCnt=(\d+)", line).groups() for line in lines if f" WorkDir={folder} " in line]
 
 
 def _path():

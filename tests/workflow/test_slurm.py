@@ -8,7 +8,7 @@ import subprocess
 import sys
 
 import pytest
-from slurm_on_one_machine import NODES, missing, nodes_of_jobs, slurm_on_one_machine
+from slurm_on_one_machine import NODES, ended_jobs, missing, slurm_on_one_machine
 from study_folder import REPOSITORY, Study
 
 pytestmark = pytest.mark.skipif(
@@ -31,13 +31,17 @@ rule needs_more:
     resources: mem_mb=lambda wildcards, attempt: attempt * 500
     shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep(6)' && echo {{resources.mem_mb}} > {{output}}"
 """
-# A rule of the profile's array jobs; the file says which part of an array made it.
-ARRAY = """
+# A rule of the profile's array jobs, whose file says which part of an array made it, and one of its groups.
+LONG_AND_SHORT = """
 rule all:
-    input: expand("{number}.txt", number=range(4))
+    input: expand("long/{number}.txt", number=range(4)), expand("short/{number}.txt", number=range(4))
+
+rule simulate:
+    output: "short/{number}.txt"
+    shell: "touch {output}"
 
 rule diagnose_cases:
-    output: "{number}.txt"
+    output: "long/{number}.txt"
     shell: "sleep 3 && echo $SLURM_ARRAY_TASK_ID > {output}"
 """
 
@@ -73,16 +77,18 @@ def test_a_study_on_two_nodes_is_byte_for_byte_that_of_one_machine_and_in_few_jo
     submitted = (done.stdout + done.stderr).count("has been submitted with SLURM jobid")
     records = len(there.files("results/jobs/**/*.json"))
     assert len(NODES) <= submitted <= records / 2
-    assert nodes_of_jobs(cluster, there.folder) == set(NODES)
+    assert {node for node, _ in ended_jobs(cluster, there.folder)} == set(NODES)
 
 
-def test_long_jobs_are_parts_of_one_array_on_both_nodes(cluster, tmp_path):
-    (tmp_path / "Snakefile").write_text(ARRAY, encoding="utf-8")
+def test_long_jobs_are_parts_of_an_array_on_both_nodes_and_short_ones_share_a_job(cluster, tmp_path):
+    (tmp_path / "Snakefile").write_text(LONG_AND_SHORT, encoding="utf-8")
     done = on_slurm(tmp_path, cluster, "all")
     assert done.returncode == 0, done.stderr[-3000:]
-    parts = {(tmp_path / f"{number}.txt").read_text(encoding="utf-8").strip() for number in range(4)}
+    parts = {(tmp_path / f"long/{number}.txt").read_text(encoding="utf-8").strip() for number in range(4)}
     assert parts == {"1", "2", "3", "4"}
-    assert nodes_of_jobs(cluster, tmp_path) == set(NODES)
+    ended = ended_jobs(cluster, tmp_path)
+    # The plugin runs the jobs of a group one after another: more than one core would stand idle.
+    assert len(ended) == 5 and set(ended) == {(node, "1") for node in NODES}
 
 
 def test_a_job_that_slurm_killed_for_its_memory_runs_again_with_more(cluster, tmp_path):
