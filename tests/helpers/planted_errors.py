@@ -354,3 +354,89 @@ PLANTED = {
     "a verdict of the overview altered": (CAMPAIGNS, lambda f: said(f, CAMPAIGNS, "verdict", "adequate")),
     "a digit of a printed table": ("reports/tables/table1.md", typo),
 }
+
+
+def swapped_folds(block):
+    """Two poses in each other's folds."""
+    fold = block["random"].copy()
+    places = [0, int(np.flatnonzero(fold != fold[0])[0])]
+    fold[places] = fold[places[::-1]]
+    return block | {"random": fold}
+
+
+def seen_pose(block):
+    """A pose that is said to be held out in another fold than it is."""
+    fold = block["fold"].copy()
+    fold[block["pose"] == 7] = 1 + fold[block["pose"] == 7] % 4
+    return block | {"fold": fold}
+
+
+BLIND = {
+    name: f"reports/blind/{name}.csv"
+    for name in ("cases", "probabilities", "reliability", "summary", "settings", "confusion", "power", "coverage")
+}
+MOVED = "results/closed_loop/kuka.parquet"
+CASES, TOGETHER, GOALS = (f"reports/closed_loop/{name}.csv" for name in ("cases", "closed_loop", "goals"))
+GAINS = "reports/planning/gains.csv"
+FOLDS, ENTRIES = "results/league/one/folds.parquet", "results/league/one/random/half.parquet"
+LEAGUE, MECHANISMS = "reports/league/small/league.csv", "reports/league/small/mechanisms.csv"
+
+
+def of_blind(name, column, factor):
+    """The first cell of a column of a table of the blind proof that is not zero, multiplied."""
+
+    def planted(folder):
+        values = pd.read_csv(folder / BLIND[name])[column].fillna(0)
+        cell(folder, BLIND[name], column, factor, int(np.flatnonzero(values)[0]))
+
+    return BLIND[name], planted
+
+
+# The same for what stands in reports of the blind proof, the closed loop, plans and the league.
+PLANTED_IN_PROOFS = {
+    "a case said to be detected": (
+        BLIND["cases"],
+        lambda f: said(f, BLIND["cases"], "named_right", True, row_where(f, "cases", "named_right", False)),
+    ),
+    "an error of a case altered": of_blind("cases", "after_rms_m", 0.99),
+    "a p value of the oracle altered": of_blind("cases", "oracle_p_value", 2.0),
+    "a stated probability altered": of_blind("probabilities", "stated", 0.99),
+    "a size of a set of hypotheses altered": of_blind("probabilities", "set_size", 2),
+    "a share of the reliability diagram altered": of_blind("reliability", "rate", 1.01),
+    "a rate of the summary altered": of_blind("summary", "rate", 0.99),
+    "a limit of the wrong quantile": of_blind("summary", "high", 0.98),
+    "a bootstrap limit altered": (
+        BLIND["summary"],
+        lambda f: cell(f, BLIND["summary"], "high", 1.001, row_where(f, "summary", "target", "within 5 %")),
+    ),
+    "a target that was missed said to be reached": (
+        BLIND["summary"],
+        lambda f: said(f, BLIND["summary"], "holds", True, row_where(f, "summary", "holds", False)),
+    ),
+    "a target moved": of_blind("summary", "target_high", 1.2),
+    "false alarms of a setting altered": of_blind("settings", "hits", 2),
+    "a case counted twice in the confusion matrix": of_blind("confusion", "adequate", 2),
+    "a power altered": of_blind("power", "detected_low", 0.99),
+    "coverage of intervals altered": of_blind("coverage", "rate", 0.9),
+    "a pose of the closed loop altered": (MOVED, lambda f: rewritten(f, MOVED, lambda b: b | {"pose": b["pose"] * 0})),
+    "an error of the closed loop altered": (CASES, lambda f: cell(f, CASES, "found", 0.999)),
+    "an error without the tracker's noise altered": (CASES, lambda f: cell(f, CASES, "true_reached", 0.999, 3)),
+    "a limit of the closed loop altered": (TOGETHER, lambda f: cell(f, TOGETHER, "rms_mm_high", 0.999, 3)),
+    "a ratio to the floor altered": (TOGETHER, lambda f: cell(f, TOGETHER, "over_floor", 0.999, 3)),
+    "a case more within the goal": (GOALS, lambda f: cell(f, GOALS, "within", 2)),
+    "an interval of the goal by another method": (GOALS, lambda f: cell(f, GOALS, "share_low", 0.95)),
+    "a worth of a plan altered": (GAINS, lambda f: cell(f, GAINS, "random_mm", 1.1)),
+    "poses in each other's folds": (FOLDS, lambda f: rewritten(f, FOLDS, swapped_folds)),
+    "a pose predicted that was fitted": (ENTRIES, lambda f: rewritten(f, ENTRIES, seen_pose)),
+    "an error of the league altered": (LEAGUE, lambda f: cell(f, LEAGUE, "rms_mm", 0.999, 1)),
+    "a limit of the league altered": (LEAGUE, lambda f: cell(f, LEAGUE, "rms_high_mm", 0.999, 2)),
+    "a ratio to the best altered": (LEAGUE, lambda f: cell(f, LEAGUE, "ratio_to_best_low", 1.001, 2)),
+    "a share of intervals altered": (LEAGUE, lambda f: cell(f, LEAGUE, "covered", 1.01, 2)),
+    "a share of a mechanism altered": (MECHANISMS, lambda f: cell(f, MECHANISMS, "share_low", 1.01, 1)),
+}
+
+
+def row_where(folder, name, column, value):
+    """The first row of a table of the blind proof in which a column has a value."""
+    frame = pd.read_csv(folder / BLIND[name])
+    return int(frame.index[frame[column].astype(str) == str(value)][0])

@@ -5,7 +5,8 @@ import shutil
 import pandas as pd
 import pytest
 import yaml
-from planted_errors import CAMPAIGN, CAMPAIGNS, PLANTED
+from made_proofs import audited_proofs, made_proofs
+from planted_errors import BLIND, CAMPAIGN, CAMPAIGNS, PLANTED, PLANTED_IN_PROOFS
 
 from elastocal.audit.audited import Audited
 from elastocal.audit.files import OF_EVERY_FILE
@@ -65,20 +66,52 @@ def test_every_column_of_the_tables_is_followed_but_the_words_of_interpretations
     assert {file: words for file, words in rest.items() if words} == {"reports/tables/comparison.csv": "interpretation"}
 
 
-@pytest.mark.parametrize("error", PLANTED)
-def test_a_planted_error_is_found(error, folder):
-    file, plant = PLANTED[error]
+def found_in(folder, file, plant, run_of):
+    """Files with findings once an error is planted; the file is put back."""
     changed = [folder / file, folder / f"results/checksums/{file}.sha256"]
     before = [path.read_bytes() for path in changed]
     plant(folder)
-    found = audit(audited(folder), {file})
+    found = audit(run_of(folder), {file})
     for path, content in zip(changed, before, strict=True):
         path.write_bytes(content)
-    assert [finding.file for finding in found if not finding.holds], error
+    return [finding.file for finding in found if not finding.holds]
 
 
-def test_sixty_errors_at_least_are_planted():
-    assert len(PLANTED) >= 60
+@pytest.mark.parametrize("error", PLANTED)
+def test_a_planted_error_is_found(error, folder):
+    assert found_in(folder, *PLANTED[error], audited), error
+
+
+@pytest.fixture(scope="module")
+def proofs(tmp_path_factory):
+    """A folder with small tables of the blind proof, the closed loop, plans and the league."""
+    folder = tmp_path_factory.mktemp("proofs")
+    made_proofs(folder)
+    return folder
+
+
+def test_tables_of_the_proofs_hold_in_every_check(proofs):
+    found = audit(audited_proofs(proofs))
+    assert [finding for finding in found if not finding.holds] == []
+    assert {finding.file for finding in found if "cells followed" in finding.checked} >= {*BLIND.values()}
+
+
+@pytest.mark.parametrize("error", PLANTED_IN_PROOFS)
+def test_an_error_planted_into_a_proof_is_found(error, proofs):
+    assert found_in(proofs, *PLANTED_IN_PROOFS[error], audited_proofs), error
+
+
+def test_a_ground_truth_altered_after_its_seal_is_found(proofs):
+    path = proofs / "data/sealed/some_1/case_003.json"
+    before = path.read_bytes()
+    path.write_bytes(before.replace(b"1.0", b"1.1"))
+    found = audit(audited_proofs(proofs), {"reports/blind/manifest.sha256"})
+    path.write_bytes(before)
+    assert "case_003.json" in next(finding.note for finding in found if not finding.holds)
+
+
+def test_ninety_errors_at_least_are_planted():
+    assert len(PLANTED) + len(PLANTED_IN_PROOFS) >= 90
 
 
 def test_an_edited_robot_makes_its_files_stale(folder):

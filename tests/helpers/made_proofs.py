@@ -1,0 +1,192 @@
+"""A folder with a blind proof, a closed loop, a plan and a league, their tables made by the functions of the pipeline."""
+
+import hashlib
+import json
+
+import numpy as np
+import pandas as pd
+from made_blind_documents import effect, oracle, truth, verdict
+from made_leagues import made_entries
+
+from elastocal import __version__
+from elastocal.audit.audited import Audited
+from elastocal.blind import schemas as of_closed_loop
+from elastocal.blind.calibration import reliability, statements
+from elastocal.blind.case_rows import case_row
+from elastocal.blind.closed_loop import MODELS, PARTS
+from elastocal.blind.closed_loop_summary import case_errors, goals, summary
+from elastocal.blind.confusion import confused
+from elastocal.blind.coverage import covered, intervals_of
+from elastocal.blind.power import powers
+from elastocal.blind.targets import by_setting, summarized
+from elastocal.io.data_frames import write_csv
+from elastocal.io.storage import write_table
+from elastocal.league.folds import dealt
+from elastocal.league.schemas import ENTRIES, FOLDS, MECHANISMS
+from elastocal.league.table import Result, league_table, mechanism_table
+from elastocal.random_streams import stream
+
+SEED = 1
+LEAGUE = {
+    "folds": 4,
+    "reference": "geometry",
+    "methods": {"geometry": {}, "half": {}, "process": {}},
+    "data": {"small": {"A robot": ["one"]}},
+}
+_ORIGIN = {
+    "elastocal_version": __version__,
+    "configuration": {},
+    "configuration_sha256": hashlib.sha256(b"{}").hexdigest()[:16],
+}
+
+
+def audited_proofs(folder):
+    """The folder as an audit has it at hand."""
+    read = {"tool_offset_m": [0, 0, 0], "wrench_at": "end_effector"}
+    return Audited(folder, {"seed": SEED, "league": LEAGUE, "interpretations": read}, {}, {}, 12)
+
+
+def made_proofs(folder):
+    """Write all of it, with the checksums that jobs would have kept."""
+    for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", "results/closed_loop", "reports/closed_loop"):
+        (folder / name).mkdir(parents=True)
+    for name in ("results/planning", "reports/planning", "results/league/one/random", "reports/league/small"):
+        (folder / name).mkdir(parents=True)
+    _blind(folder)
+    _closed_loop(folder)
+    _league(folder)
+    figures = {"poses": 20, "planned_mm": 0.12345678912, "random_mm": 0.2, "random_poses": 28.0}
+    (folder / "results/planning/ur10.json").write_text(json.dumps(figures), encoding="utf-8")
+    write_csv(folder / "reports/planning/gains.csv", pd.DataFrame([{"robot": "ur10"} | figures]))
+    files = [path for part in ("data", "results", "reports") for path in sorted((folder / part).rglob("*")) if path.is_file()]
+    for path in files:
+        file = path.relative_to(folder).as_posix()
+        record = folder / f"results/checksums/{file}.sha256"
+        record.parent.mkdir(parents=True, exist_ok=True)
+        record.write_text(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {file}\n", encoding="utf-8")
+
+
+def _cases():
+    """Ground truths with verdicts and oracles: right, in a class, wrong, silent, of every group that is scored."""
+    draws = np.random.default_rng(3)
+    groups = [
+        ("single", 200.0),
+        ("single", 50.0),
+        ("setting", 50.0),
+        ("several_joints", 200.0),
+        ("outside", 200.0),
+        ("none", 0.0),
+    ]
+    for number in range(90):
+        group, level = groups[number % len(groups)]
+        joint, right = 1 + number % 6, draws.random() < 0.7
+        kind = "outside:slipping_zero" if group == "outside" else "joint_offset"
+        places = [] if group == "none" or number % 18 == 2 else [(kind, joint)]
+        document = truth(
+            *places,
+            group=group,
+            level=level,
+            robot="kuka" if number % 5 == 0 else "gp180",
+            setting="force_3kN" if group == "setting" else "usual",
+            campaign=f"case_{number:03}",
+        )
+        if not places:
+            document["case"]["group"] = "none" if group == "none" else "setting"
+        for defect in document["defects"]:
+            defect["parameters"] = {"offset": 1e-4}
+        size = 1e-4 * (1 + 0.3 * draws.standard_normal())
+        found = effect(
+            "joint_offset" if right else "payload", joint, parameters=[("offset", size, 3e-5)], alternatives=["payload"]
+        )
+        word = "adequate" if not places and right else ("named", "class")[number % 7 == 0]
+        effects = [] if word == "adequate" else [found]
+        said = verdict(
+            word, *effects, after=1e-4 * (1 + 0.1 * draws.random()), freedom=288, compliance=1 + 0.1 * draws.random()
+        )
+        top = [each["name"] for each in effects]
+        stated = 0.5 + 0.49 * draws.random()
+        sets = [{"mechanisms": top, "probability": stated}, {"mechanisms": ["other"], "probability": 1 - stated}]
+        said["probabilities"] = {"nothing": 0.01, "alarm_p_value": 0.002, "sets": sets}
+        yield document, said | {"campaign": document["campaign"]}, oracle(rms=1e-4 * (1 + 0.02 * draws.random()))
+
+
+def _blind(folder):
+    entries, lines = list(_cases()), []
+    for document, _, _ in entries:
+        path = folder / f"data/sealed/some_1/{document['campaign']}.json"
+        path.write_text(json.dumps(document), encoding="utf-8")
+        lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n")
+    (folder / "reports/blind/manifest.sha256").write_text("".join(lines), encoding="utf-8")
+    (folder / "results/blind/some_1.json").write_text(json.dumps([said for _, said, _ in entries]), encoding="utf-8")
+    known = {document["campaign"]: found for document, _, found in entries}
+    (folder / "results/blind/oracle/some_1.json").write_text(json.dumps(known), encoding="utf-8")
+    cases = pd.DataFrame([case_row(*entry) for entry in entries])
+    spans = pd.DataFrame([row for document, said, _ in entries for row in intervals_of(document, said)])
+    stated = statements((document, said) for document, said, _ in entries)
+    tables = {
+        "cases": cases,
+        "probabilities": stated,
+        "reliability": reliability(stated),
+        "summary": summarized(cases, spans, stated, SEED),
+        "settings": by_setting(cases),
+        "confusion": confused(cases),
+        "power": powers(cases),
+        "coverage": covered(spans),
+    }
+    for name, table in tables.items():
+        write_csv(folder / f"reports/blind/{name}.csv", table)
+
+
+def _closed_loop(folder):
+    draws = np.random.default_rng(2)
+    sizes = dict(zip(MODELS, (3e-3, 2e-3, 2e-4, 1.1e-4, 1e-4), strict=True))
+    blocks = []
+    for case in range(8):
+        for part in PARTS:
+            for model in MODELS:
+                off, count = sizes[model] / np.sqrt(3) * draws.standard_normal((30, 3)), 30
+                columns = {"effect": ["payload"] * count, "seed": np.full(count, case), "verdict": ["named"] * count}
+                columns |= {"named": np.full(count, case % 2 == 0), "part": [part] * count, "model": [model] * count}
+                columns |= {"pose": np.arange(count)} | {f"q{joint}": np.zeros(count) for joint in range(1, 7)}
+                columns |= {
+                    "reached_error_m": 0.5 * np.linalg.norm(off, axis=1),
+                    "measured_error_m": np.linalg.norm(off, axis=1),
+                }
+                corrected = (np.arange(count) != 3) | (model != "geometry")
+                blocks.append(columns | {"predicted_std_m": np.full(count, sizes[model]), "corrected": corrected})
+    write_table(folder / "results/closed_loop/kuka.parquet", of_closed_loop.closed_loop(6), blocks, _ORIGIN)
+    errors = case_errors({"kuka": pd.concat([pd.DataFrame(block) for block in blocks], ignore_index=True)})
+    write_csv(folder / "reports/closed_loop/cases.csv", errors)
+    write_csv(folder / "reports/closed_loop/closed_loop.csv", summary(errors, SEED))
+    write_csv(folder / "reports/closed_loop/goals.csv", goals(errors))
+
+
+class _Measured:
+    """What folds are dealt by: poses with their joint angles."""
+
+    def __init__(self, pose):
+        self.session, self.pose = np.zeros(len(pose), np.int32), pose
+        self.joint_angles = np.random.default_rng(5).uniform(-1, 1, (pose.max() + 1, 3))[pose]
+
+
+def _league(folder):
+    made = made_entries(1e-4, 40)
+    measured = _Measured(made["pose"].to_numpy())
+    folds = dealt(measured, LEAGUE["folds"], stream(SEED, "one", "league folds", 0))
+    write_table(folder / "results/league/one/folds.parquet", FOLDS, [folds], _ORIGIN)
+    # Of the measurements an audit looks at which there are.
+    made[["session", "pose", "load", "target"]].to_parquet(folder / "results/league/one/measurements.parquet")
+    results = []
+    for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
+        entries = made_entries(size, 40, len(method), std).assign(fold=folds["random"][made["pose"]])
+        columns = {name: entries[name].to_numpy() for name in entries}
+        write_table(folder / f"results/league/one/random/{method}.parquet", ENTRIES, [columns], _ORIGIN)
+        results.append(Result("one", "random", method, entries))
+    found = pd.DataFrame(
+        {"fold": [1, 2, 3, 4, 1], "mechanism": ["payload"] * 4 + ["other"], "probability": [0.9, 0.8, 1, 1, 0.2], "share": 0.3}
+    )
+    columns = {name: found[name].tolist() if name == "mechanism" else found[name].to_numpy(float) for name in found}
+    write_table(folder / "results/league/one/random/mechanisms.parquet", MECHANISMS, [columns], _ORIGIN)
+    robots = LEAGUE["data"]["small"]
+    write_csv(folder / "reports/league/small/league.csv", league_table(results, robots, LEAGUE["reference"], SEED))
+    write_csv(folder / "reports/league/small/mechanisms.csv", mechanism_table({"one": found}, robots, LEAGUE["folds"]))
