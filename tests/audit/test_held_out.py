@@ -1,0 +1,127 @@
+"""What a verdict, a table of splits and an overview say of residuals; a figure altered is found."""
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from made_audits import CONFIGURATION, failed
+
+from elastocal.audit import held_out
+from elastocal.audit.audited import Audited
+from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
+from elastocal.audit.streams import numbers
+
+FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
+POSES = 9
+EFFECT = {"name": "payload", "joints": [2], "probability": 0.9}
+
+
+def figures(errors, purpose):
+    """Errors before and after and the share by which they fall, with intervals, by the draws for a purpose."""
+    counts = drawn(numbers(1, "cell", purpose, 0), POSES)
+    ends = [limits(errors, counts, model)["rms"] for model in (0, 1)]
+    return [metrics(each) for each in errors.distances], ends, reduction(errors, counts, 0, 1)
+
+
+@pytest.fixture
+def run(tmp_path):
+    for folder in (FOLDER, REPORTS):
+        (tmp_path / folder).mkdir(parents=True)
+    draws, pose = np.random.default_rng(4), np.repeat(np.arange(POSES), 3)
+    columns = [f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]
+    off = draws.normal(size=(len(pose), 6)) * np.repeat([2e-4, 1e-4], 3)
+    frame = pd.DataFrame(off, columns=columns).assign(session=0, pose=pose, load=np.tile([0, 1, 2], POSES), target=0)
+    frame = frame.assign(repeat=0, row=np.arange(1, len(pose) + 1), held_out=True, outside_range=pose == 2)
+    frame.to_parquet(tmp_path / REPORTS / "residuals.parquet")
+    seen = frame[["session", "pose", "load", "target", "row"]].assign(x=draws.normal(size=len(pose)), y=0.0, z=0.0)
+    seen.assign(approach1=np.nan).to_parquet(tmp_path / FOLDER / "held_out.parquet")
+    (tmp_path / FOLDER / "campaign.json").write_text(json.dumps({"campaign": {"campaign": "cell"}, "held_out": None}))
+    errors = Errors(distances([off[:, :3], off[:, 3:]]), pose)
+    sides = {"inside": pose != 2, "outside": pose == 2}
+    (before, after), _, fallen = figures(errors, "held-out poses")
+
+    def stated(values):
+        return {f"{name}_m": value for name, value in values.items()}
+
+    said = {
+        "before": stated(before),
+        "after": stated(after),
+        "noise_floor_rms_m": 1e-4,
+        "reduction_ci95": fallen[:2],
+        "reduction_std_error": fallen[2],
+        "poses": POSES,
+        "share_below_max": 0.05 ** (1 / POSES),
+        "outside_range": {"poses": 1}
+        | {
+            side: {
+                state: stated(metrics(each[kept])) for state, each in zip(("before", "after"), errors.distances, strict=True)
+            }
+            for side, kept in sides.items()
+        },
+    }
+    document = {"verdict": "named", "effects": [EFFECT], "warnings": ["few"], "compliance_urad_per_Nm": {"before": [0.5]}}
+    diagnosed = document | {"effects": [EFFECT | {"heldout_gain": None}]}
+    (tmp_path / FOLDER / "diagnosis.json").write_text(json.dumps({"document": diagnosed}))
+    gain = 1 - after["rms"] / before["rms"]
+    verdict = document | {"effects": [EFFECT | {"heldout_gain": gain}], "heldout": said, "warnings": ["few", "grew"]}
+    (tmp_path / REPORTS / "verdict.json").write_text(json.dumps(verdict))
+    steps = pd.DataFrame({"step": [1], "owner": ["joint_compliance"], "value": [5e-7]})
+    steps.to_parquet(tmp_path / FOLDER / "steps.parquet")
+    rows = {"step": ["declared", "+ payload"], "heldout_rms_m": [before["rms"], after["rms"]]}
+    table = pd.DataFrame(rows).assign(heldout_rms_over_floor=lambda each: each["heldout_rms_m"] / 1e-4)
+    table.to_csv(tmp_path / REPORTS / "before_after.csv", index=False)
+    (before, after), ends, fallen = figures(errors, "splits")
+    row = {"split": "held out", "block": "all", "poses": POSES, "before_rms_m": before["rms"], "after_rms_m": after["rms"]}
+    row |= {f"before_rms_m_{end}": value for end, value in zip(("low", "high"), ends[0], strict=True)}
+    row |= {f"after_rms_m_{end}": value for end, value in zip(("low", "high"), ends[1], strict=True)}
+    row |= {"reduction": gain}
+    row |= dict(zip(("reduction_low", "reduction_high", "reduction_std_error"), fallen, strict=True))
+    pd.DataFrame([row]).to_csv(tmp_path / REPORTS / "splits.csv", index=False)
+    return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
+
+
+def of_verdict(run, change=lambda document: None):
+    path = run.folder / REPORTS / "verdict.json"
+    document = json.loads(path.read_text())
+    change(document)
+    path.write_text(json.dumps(document))
+    return failed(held_out.verdict(run, f"{REPORTS}/verdict.json", "cell"))
+
+
+def of_splits(run, column=None, factor=1.0):
+    path = run.folder / REPORTS / "splits.csv"
+    frame = pd.read_csv(path)
+    if column:
+        frame.loc[0, column] *= factor
+    frame.to_csv(path, index=False)
+    return failed(held_out.splits(run, f"{REPORTS}/splits.csv", "cell"))
+
+
+def test_a_verdict_that_says_what_the_residuals_say_holds(run):
+    assert of_verdict(run) == []
+    assert of_splits(run) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda d: d.update(verdict="class"), "what the diagnosis said"),
+        (lambda d: d["effects"][0].update(probability=0.95), "what the diagnosis said"),
+        (lambda d: d.update(warnings=["grew"]), "what the diagnosis said"),
+        (lambda d: d["effects"][0].update(heldout_gain=0.9), "gain of each effect"),
+        (lambda d: d["compliance_urad_per_Nm"].update(before=[0.6]), "compliances of the declared model"),
+        (lambda d: d["heldout"]["after"].update(p95_m=1e-4), "errors after"),
+        (lambda d: d["heldout"].update(reduction_std_error=0.01), "reduction: interval and standard error"),
+        (lambda d: d["heldout"].update(share_below_max=0.9), "poses, share below the largest error"),
+        (lambda d: d["heldout"]["outside_range"].update(poses=2), "poses, share below the largest error"),
+        (lambda d: d["heldout"].update(noise_floor_rms_m=1.1e-4), "what the noise leaves"),
+    ],
+)
+def test_a_figure_altered_is_found(run, change, expected):
+    assert of_verdict(run, change) == [expected]
+
+
+@pytest.mark.parametrize("column", ["before_rms_m_high", "after_rms_m_low", "reduction_std_error"])
+def test_an_interval_altered_is_found(run, column):
+    assert of_splits(run, column, 1.001) == ["held-out errors and their intervals"]
