@@ -351,6 +351,7 @@ PLANTED = {
         lambda f: rewritten_json(f, VERDICT, lambda d: d["effects"][0].update(heldout_gain=0.74)),
     ),
     "a cell of the overview of campaigns altered": (CAMPAIGNS, lambda f: cell(f, CAMPAIGNS, "after_rms_high_mm", 0.99)),
+    "a campaign left out of the overview": (CAMPAIGNS, lambda f: shortened(f, CAMPAIGNS, 0)),
     "a verdict of the overview altered": (CAMPAIGNS, lambda f: said(f, CAMPAIGNS, "verdict", "adequate")),
     "a digit of a printed table": ("reports/tables/table1.md", typo),
 }

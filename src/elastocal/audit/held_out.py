@@ -229,7 +229,13 @@ def summary(run: Audited, file: str) -> list[Finding]:
     list of Finding
         Of campaigns that are pooled, as folds of one, nothing.
     """
-    table, found = run.table(file), []
+    # Without any campaign a table without columns.
+    table = run.table(file) if (run.folder / file).read_text("utf-8").strip() else pd.DataFrame({"campaign": []})
+    found = []
+    if file.endswith("campaigns.csv"):
+        asked = run.configuration["loop"]["campaigns"]
+        right = sorted(table["campaign"]) == sorted(asked)
+        found.append(held(file, "every campaign once", "config.yaml", right, f"{list(table['campaign'])}", len(asked)))
     for row in table.to_dict("records"):
         name = row["campaign"]
         if not run.there(f"reports/loop/{name}/verdict.json"):
