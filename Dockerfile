@@ -11,4 +11,6 @@ COPY profiles profiles
 COPY src src
 COPY workflow workflow
 RUN uv pip install --system --no-cache --no-deps --no-build-isolation -e .
+# Snakemake asks for a home to keep a cache in and for a name, which a user of another number than root's does not have here.
+ENV HOME=/tmp USER=elastocal
 ENTRYPOINT ["snakemake"]

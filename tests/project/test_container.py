@@ -21,3 +21,8 @@ def test_it_installs_by_digest_and_names_no_index():
 def test_an_engine_is_handed_what_is_copied_and_nothing_else():
     rules = (ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines()
     assert "*" in rules and {rule[1:] for rule in rules if rule.startswith("!")} == COPIED
+
+
+def test_a_user_whom_the_image_does_not_know_has_a_home_and_a_name():
+    """As with `docker run --user "$(id -u)"`; Snakemake stops without either."""
+    assert re.search(r"^ENV HOME=/tmp USER=\w+$", RECIPE, re.MULTILINE)
