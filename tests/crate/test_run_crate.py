@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -92,6 +93,19 @@ def test_every_file_has_its_size_and_digest(crate):
     for name, text in TEXTS.items():
         assert described[name]["sha256"] == hashlib.sha256(text.encode()).hexdigest()
         assert described[name]["contentSize"] == str(len(text))
+
+
+def test_a_folder_that_a_job_wrote_is_described_with_each_file_in_it(finished, tmp_path):
+    for name in ("data/cases 1/a/robot.yaml", "data/cases 1/b.json", "data/cases 1/.snakemake_timestamp"):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_text(name, encoding="utf-8")
+    jobs = [record("simulate", 1, [], "data/cases 1"), record("tabulate", 2, ["data/cases 1"], "reports/b.csv")]
+    write_json("ro-crate-metadata.json", run_crate(replace(finished, jobs=jobs), WORDS))
+    crate = ROCrate(tmp_path)
+    folder = crate.dereference("data/cases%201/")
+    assert [unquote(file.id) for file in folder["hasPart"]] == ["data/cases 1/a/robot.yaml", "data/cases 1/b.json"]
+    assert all(file["sha256"] for file in folder["hasPart"])
+    assert crate.dereference("#job-1")["result"] == [folder] == crate.dereference("#job-2")["object"]
 
 
 def test_packages_and_python_are_what_the_workflow_requires(crate):

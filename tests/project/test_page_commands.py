@@ -68,6 +68,11 @@ ELSEWHERE = {
     ),
     "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
     "snakemake -j2 store --config store=s3://BUCKET/FOLDER": ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),
+    "snakemake -j2 store --config store=s3://BUCKET/FOLDER "
+    "crate_of='[study, loop, measured, league, blind, closed_loop, planning]'": (
+        "tests/workflow/test_store.py",
+        '"crate_of=[blind]"',
+    ),
     "python -m zipfile -e reports/sources.zip .": (
         "tests/workflow/test_store.py",
         '("-m", "zipfile", "-e", "reports/sources.zip", ".")',

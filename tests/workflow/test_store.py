@@ -1,4 +1,4 @@
-"""A finished study on an object store, for which moto stands in: what is fetched is whole; only what changed goes up again."""
+"""A finished run on an object store, for which moto stands in: what is fetched is whole; only what changed goes up again."""
 
 import json
 import os
@@ -10,8 +10,9 @@ from urllib.parse import unquote
 import boto3
 import pytest
 from moto.server import ThreadedMotoServer
+from study_folder import Study
 
-BUCKET, FOLDER = "results", "of/study/"
+BUCKET, FOLDER, BLIND = "results", "of/study/", "of/blind/"
 STORE = ("store", "--config", f"store=s3://{BUCKET}/{FOLDER.rstrip('/')}")
 # Python imports this before all else: nothing finds the plugin.
 WITHOUT_PLUGIN = """
@@ -45,24 +46,43 @@ def study(small_study, bucket, tmp_path_factory):
     return study
 
 
-def uploaded(bucket):
+def uploaded(bucket, folder=FOLDER):
     """When each object was uploaded, by the name that its file has here."""
-    return {item.key.removeprefix(FOLDER): item.last_modified for item in bucket.objects.all()}
+    return {item.key.removeprefix(folder): item.last_modified for item in bucket.objects.filter(Prefix=folder)}
+
+
+def fetched(bucket, folder, place):
+    """What the crate of a run describes that was fetched from the store and unpacked, each file as it says."""
+    for name in uploaded(bucket, folder):
+        (place / name).parent.mkdir(parents=True, exist_ok=True)
+        bucket.download_file(folder + name, str(place / name))
+    for arguments in (("-m", "zipfile", "-e", "reports/sources.zip", "."), ("workflow/check_crate.py",)):
+        done = subprocess.run([sys.executable, *arguments], cwd=place, capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stdout
+    crate = json.loads((place / "ro-crate-metadata.json").read_text(encoding="utf-8"))
+    return {unquote(entity["@id"]) for entity in crate["@graph"] if "sha256" in entity}
 
 
 def test_what_is_fetched_from_the_store_is_the_run_that_its_crate_describes(study, bucket, tmp_path):
-    for name in uploaded(bucket):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        bucket.download_file(FOLDER + name, str(tmp_path / name))
-    for arguments in (("-m", "zipfile", "-e", "reports/sources.zip", "."), ("workflow/check_crate.py",)):
-        done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True, timeout=60)
-        assert done.returncode == 0, done.stdout
-    crate = json.loads((tmp_path / "ro-crate-metadata.json").read_text(encoding="utf-8"))
-    described = {unquote(entity["@id"]) for entity in crate["@graph"] if "sha256" in entity}
+    described = fetched(bucket, FOLDER, tmp_path)
     made = study.files("data/**/*.parquet", "results/**/*.parquet", "reports/tables/*", "reports/figures/*", "reports/*.pdf")
     assert len(made) > 60 and set(made) <= described
     # The store keeps no second copy here.
     assert study.files(".snakemake/storage/s3/**/*.parquet") == []
+
+
+def test_the_targets_that_are_named_are_described_and_uploaded_and_no_others(bucket, tmp_path):
+    """The smallest blind proof, two of whose jobs write folders of cases."""
+    proof = Study.of_sources(tmp_path / "proof")
+    # Not the seed of the proof: what is looked at here is not part of it.
+    proof.configure({"seed": 31})
+    proof.run("store", "--config", f"store=s3://{BUCKET}/{BLIND.rstrip('/')}", "crate_of=[blind]", "blind=smoke")
+    described = fetched(bucket, BLIND, tmp_path / "fetched")
+    cases = proof.files("data/blind/smoke_1/*/*", "data/sealed/smoke_1/*.json")
+    assert len(cases) > 10 and set(cases) <= described
+    assert not set(cases) & set(uploaded(bucket, BLIND))
+    assert {"reports/blind/blind.pdf", "results/blind/smoke_1.json"} <= described & set(uploaded(bucket, BLIND))
+    assert proof.files("data/simulated/*") == []
 
 
 def test_nothing_is_uploaded_twice(study):

@@ -66,10 +66,10 @@ try:
 except InputError as error:
     sys.exit(str(error))
 
-# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, and on which store
-# results are put, decides nothing.
+# All that decides what the results hold, but for code and measured data; which campaign of a user is asked for, what is put on
+# which store and what is described there decides nothing.
 RESOLVED = {
-    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "origin")},
+    "config": {key: value for key, value in config.items() if key not in ("campaign", "store", "crate_of", "origin")},
     "robots": STUDY.robots,
     "strategies": STUDY.strategies,
     "campaigns": SOURCES,
@@ -143,8 +143,8 @@ def watch_sources():
             each.set_params(**{SOURCES_DIGEST: digest_of(file for file in named if Path(file).is_file())})
 
 
-def files_behind(targets):
-    """All files that the jobs behind some targets write: one that was deleted is made again although later ones are there."""
+def outputs_behind(targets):
+    """All files and folders that the jobs behind some targets write, as their rules have them."""
     found, left = set(), [target for target in targets if isinstance(target, str)]
     while left:
         path = left.pop()
@@ -155,9 +155,14 @@ def files_behind(targets):
             # Of the user, who keeps it in a folder of the pipeline.
             continue
         wildcards = Wildcards(fromdict=maker.get_wildcards(path))
-        found.update(map(str, maker.expand_output(wildcards)[0]))
+        found.update(maker.expand_output(wildcards)[0])
         left += map(str, maker.expand_input(wildcards)[0])
     return sorted(found)
+
+
+def files_behind(targets):
+    """The names of these: one that was deleted is made again although later ones are there."""
+    return [str(output) for output in outputs_behind(targets)]
 
 
 def in_store(file):

@@ -2,13 +2,19 @@
 
 Makes what is not made yet, then writes ro-crate-metadata.json, which describes the folder that it lies in: every job with its start,
 end, inputs and outputs, every file with its SHA-256; and reports/configuration.json, software.csv and datapackage.json.
-`make crate` also validates it.
+`--config crate_of='[study, loop, blind]'` names what is described; study and loop are without. `make crate` also validates it.
 """
+
+
+def described():
+    """Inputs of the targets that the crate is of."""
+    named = config.get("crate_of", ["study", "loop"])
+    return [file for target in named for file in getattr(rules, target).input]
 
 
 rule write_crate:
     input:
-        files=lambda wildcards: files_behind([*rules.study.input, *rules.loop.input]),
+        files=lambda wildcards: files_behind(described()),
         workflow=placed(ROOT / "Snakefile"),
         rules=[placed(path) for path in sorted((ROOT / "workflow" / "rules").glob("*.smk"))],
         sources=sources("write_crate.py"),

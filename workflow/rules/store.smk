@@ -1,7 +1,8 @@
 """A finished run on an object store: `snakemake -j2 store --config store=s3://BUCKET/FOLDER`.
 
-Makes what is not made yet, then uploads the crate, every file that it describes and a job made, and the other files that it
-describes, sources and configuration, as one archive. What is on the store and has not changed here since stays as it is.
+Makes what is not made yet, then uploads the crate, every file that it describes and a job made, and as one archive the other
+files that it describes: sources, configuration, and what lies in folders of cases. What is on the store and has not changed here
+since stays as it is. Of which targets, says `crate_of` (crate.smk).
 """
 
 
@@ -48,5 +49,7 @@ if "store" in config:
 rule store:
     input:
         lambda wildcards: [
-            in_store(file) for file in files_behind([*rules.study.input, *rules.loop.input, *rules.pack_sources.output])
+            in_store(output)
+            for output in outputs_behind([*described(), *rules.pack_sources.output])
+            if not output.is_directory
         ],

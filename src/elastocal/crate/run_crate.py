@@ -22,7 +22,7 @@ from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
 from elastocal.errors import InputError
-from elastocal.io.checksums import checksum
+from elastocal.io.checksums import checksum, files_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -110,10 +110,15 @@ def run_crate(run: FinishedRun, words: Mapping[str, str]) -> dict[str, Any]:
     _describe(crate, run, words)
     scripts = {job.rule: _script(job) for job in run.jobs}
     inputs = _outside_inputs(run.jobs)
-    made = [file for job in run.jobs for file in job.outputs]
+    folders = [file for job in run.jobs for file in job.outputs if Path(file).is_dir()]
+    made = [file for job in run.jobs for each in job.outputs for file in files_of(each)]
     modules = {file for job in run.jobs for file in _sources(job)} - set(scripts.values())
     for file in sorted({*made, *inputs, *modules, run.configuration, run.software_list, *run.others}):
         crate.add_file(_inside(file), file, properties=_facts(file))
+    for folder in sorted(folders):
+        # A crate's writer would look for what it holds once more.
+        files = [_file(file) for file in files_of(folder)]
+        crate.add_directory(dest_path=_inside(folder), properties={"name": Path(folder).name, "hasPart": files})
     for file in run.rules:
         crate.add_file(_inside(file), file, properties=_facts(file) | _CODE)
     for rule, file in sorted(scripts.items()):
@@ -338,5 +343,5 @@ def _reference(identifier: str) -> dict[str, str]:
 
 
 def _file(name: str) -> dict[str, str]:
-    """A reference to a file; a crate has names of files as URIs have them."""
-    return _reference(quote(name))
+    """A reference to a file or folder; a crate has their names as URIs have them, a folder's with a stroke behind it."""
+    return _reference(quote(name) + ("/" if Path(name).is_dir() else ""))

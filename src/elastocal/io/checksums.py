@@ -31,7 +31,7 @@ def record_checksums(paths: Iterable[str]) -> None:
     for path in filter(_made, paths):
         place = _record_of(path)
         place.parent.mkdir(parents=True, exist_ok=True)
-        write_text(place, "".join(f"{checksum(file)}  {file}\n" for file in _files_of(path)))
+        write_text(place, "".join(f"{checksum(file)}  {file}\n" for file in files_of(path)))
 
 
 def check_checksums(paths: Iterable[str], within: str | Path = "") -> None:
@@ -55,7 +55,7 @@ def check_checksums(paths: Iterable[str], within: str | Path = "") -> None:
             continue
         lines = place.read_text("utf-8").splitlines()
         written = {file: digest for digest, _, file in (line.partition("  ") for line in lines)}
-        found = {file: checksum(Path(within, file)) for file in _files_of(path, within)}
+        found = {file: checksum(Path(within, file)) for file in files_of(path, within)}
         for file in sorted(written.keys() | found.keys()):
             if written.get(file) != found.get(file):
                 again = "it" if file == path else path
@@ -78,8 +78,20 @@ def checksum(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def _files_of(path: str, within: str | Path = "") -> list[str]:
-    """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step."""
+def files_of(path: str, within: str | Path = "") -> list[str]:
+    """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step.
+
+    Parameters
+    ----------
+    path : str
+    within : str or Path
+        Folder that `path` is in; the working directory without.
+
+    Returns
+    -------
+    list of str
+        Named as `path` is.
+    """
     folder = Path(within, path)
     if not folder.is_dir():
         return [path]
