@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from elastocal.audit.audited import WRENCH
-from elastocal.audit.elastic import Robot, Springs, far_off, readings
+from elastocal.audit.elastic import Robot, Springs, averages, far_off
 
 BEAM = {"name": "beam", "chain": "Rz(q1) Tx(2.0) [tip]", "compliance_urad_per_Nm": [0.5]}
 LENGTH, BENDING, TORSION = 2.0, 1e-6, 2e-6
@@ -65,7 +65,7 @@ def table(rows=4, far=None):
 
 def test_repeats_are_averaged():
     frame, turned = table()
-    seen = readings(frame, True)
+    seen = averages(frame, True)
     np.testing.assert_allclose(seen.position, [frame[list("xyz")].mean()])
     mean = Rotation.from_matrix(seen.rotation[0])
     assert (mean * turned.mean().inv()).magnitude() < 1e-8
@@ -75,6 +75,6 @@ def test_repeats_are_averaged():
 def test_a_repeat_far_from_the_others_is_left_out():
     frame, _ = table(far=2)
     assert far_off(frame).tolist() == [False, False, True, False]
-    assert readings(frame, False).repeats.tolist() == [3]
+    assert averages(frame, False).repeats.tolist() == [3]
     # Of two nothing tells which.
     assert not far_off(table(2, far=1)[0]).any()

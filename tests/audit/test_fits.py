@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.audit import fits
 from elastocal.audit.audited import COMPONENTS, WRENCH, Audited
-from elastocal.audit.elastic import Robot, Springs, readings
+from elastocal.audit.elastic import Robot, Springs, averages
 
 FOLDER, REPORTS = "results/loop/cell", "reports/loop/cell"
 TARGETS = {"hand": {"point": "hand", "offset_m": [0.0, 0.1, 0.0]}}
@@ -57,7 +57,7 @@ def made():
     robot = Robot(ROBOT, list(TARGETS.values()))
     frame = measured(robot)
     training = frame[frame["pose"] < 7]
-    seen = readings(training, True)
+    seen = averages(training, True)
     noise = noise_of(training)
     scale = np.repeat([noise["position_m"], noise["orientation_rad"]], 3) / np.sqrt(seen.repeats)[:, None]
 

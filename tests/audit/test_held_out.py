@@ -106,9 +106,9 @@ def test_a_verdict_that_says_what_the_residuals_say_holds(run):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (lambda d: d.update(verdict="class"), "what the diagnosis said"),
-        (lambda d: d["effects"][0].update(probability=0.95), "what the diagnosis said"),
-        (lambda d: d.update(warnings=["grew"]), "what the diagnosis said"),
+        (lambda d: d.update(verdict="class"), "what the diagnosis reported"),
+        (lambda d: d["effects"][0].update(probability=0.95), "what the diagnosis reported"),
+        (lambda d: d.update(warnings=["grew"]), "what the diagnosis reported"),
         (lambda d: d["effects"][0].update(heldout_gain=0.9), "gain of each effect"),
         (lambda d: d["compliance_urad_per_Nm"].update(before=[0.6]), "compliances of the declared model"),
         (lambda d: d["heldout"]["after"].update(p95_m=1e-4), "errors after"),

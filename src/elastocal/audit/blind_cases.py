@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Arms that nobody had looked at before the engine was frozen; all others were tuned on.
 _PROOF = ("iiwa14", "gp180")
-# What an effect cannot be told from, whatever is measured, by effect and joints; and robots that cannot have the other.
+# What no measurement can distinguish from an effect, by effect and joints; and robots that cannot have the other.
 _ALIASES = {
     ("force_scale", ()): "joint_compliance",
     ("compensator_torque", (2,)): "transmission_harmonic",
@@ -66,20 +66,20 @@ class Proof:
 
 
 def proof_of(run: Audited) -> Proof:
-    """Ground truths that the manifest lists, and what was said of them."""
+    """Ground truths that the manifest lists, with their verdicts and oracles."""
     names = {file.removesuffix(".json") for _, file in _manifest(run)}
     truths = {
         path.stem: json.loads(path.read_text("utf-8"))
         for path in sorted((run.folder / "data/sealed").glob("*/*.json"))
         if path.stem in names
     }
-    said = [
+    reported = [
         entry for path in sorted((run.folder / "results/blind").glob("*.json")) for entry in json.loads(path.read_text("utf-8"))
     ]
     oracles: dict[str, Mapping[str, Any] | None] = {}
     for path in sorted((run.folder / "results/blind/oracle").glob("*.json")):
         oracles |= json.loads(path.read_text("utf-8"))
-    return Proof(truths, {entry["campaign"]: entry for entry in said}, oracles)
+    return Proof(truths, {entry["campaign"]: entry for entry in reported}, oracles)
 
 
 def _manifest(run: Audited) -> list[tuple[str, str]]:
@@ -275,8 +275,8 @@ def _errors(verdict: Mapping[str, Any]) -> dict[str, Any]:
     adopted = any(effect.get("adopted") for effect in verdict["effects"])
     warned = any(" of the validation poses" in warning for warning in verdict["warnings"])
     figures = (before, after, np.nan if floor is None else floor, fallen, error)
-    said = (adopted, worse, worse and adopted, warned, worse and not warned)
-    return dict(zip(names, figures, strict=True)) | dict(zip(flags, said, strict=True))
+    outcomes = (adopted, worse, worse and adopted, warned, worse and not warned)
+    return dict(zip(names, figures, strict=True)) | dict(zip(flags, outcomes, strict=True))
 
 
 def probabilities(run: Audited, file: str) -> list[Finding]:
@@ -292,10 +292,17 @@ def probabilities(run: Audited, file: str) -> list[Finding]:
     list of Finding
     """
     proof, stated = proof_of(run), run.table(file)
-    said = [name for name in proof.truths if (proof.verdicts[name].get("probabilities") or {}).get("sets")]
-    every = sorted(stated["case"]) == sorted(said)
+    reported = [name for name in proof.truths if (proof.verdicts[name].get("probabilities") or {}).get("sets")]
+    every = sorted(stated["case"]) == sorted(reported)
     found = [
-        held(file, "every case of which something is stated", "counting", every, f"{len(stated)} of {len(said)}", len(said))
+        held(
+            file,
+            "every case of which something is stated",
+            "counting",
+            every,
+            f"{len(stated)} of {len(reported)}",
+            len(reported),
+        )
     ]
     if every and len(stated):
         rows = [_stated(proof.truths[name], proof.verdicts[name]["probabilities"]) for name in stated["case"]]

@@ -93,14 +93,14 @@ def summary(run: Audited, file: str) -> list[Finding]:
     -------
     list of Finding
     """
-    stated, cases, said = run.table(file), _cases(run, file), _probabilities(run, file)
+    stated, cases, statements = run.table(file), _cases(run, file), _probabilities(run, file)
     spans, rows = intervals(proof_of(run)), []
     for robots in ("proof", "tuned"):
         mine = cases[cases["robots"] == robots]
         if len(mine):
             parts = (
                 _of_verdicts(mine),
-                _of_statements(said[said["robots"] == robots], run.seed),
+                _of_statements(statements[statements["robots"] == robots], run.seed),
                 _of_errors(mine, run.seed),
                 _of_intervals(spans[spans["robots"] == robots]),
             )
@@ -148,9 +148,9 @@ def _of_verdicts(cases: pd.DataFrame) -> Iterator[_Row]:
         yield f"both of two effects, or classes with them, at {level:g} each", share(part["holds_truth"])
 
 
-def _of_statements(said: pd.DataFrame, seed: int) -> Iterator[_Row]:
-    stated, correct = said["stated"].to_numpy(float), said["correct"].to_numpy(float)
-    count, error = len(said), _calibration(stated, correct)
+def _of_statements(statements: pd.DataFrame, seed: int) -> Iterator[_Row]:
+    stated, correct = statements["stated"].to_numpy(float), statements["correct"].to_numpy(float)
+    count, error = len(statements), _calibration(stated, correct)
     low, high, chance = np.nan, np.nan, np.nan
     if count > 1:
         draws = numbers(seed, "blind", "calibration error", 0)
@@ -163,7 +163,7 @@ def _of_statements(said: pd.DataFrame, seed: int) -> Iterator[_Row]:
     yield head, {"hits": None, "cases": count, "rate": error, "low": low, "high": high}
     row = {"hits": None, "cases": count, "rate": chance, "low": np.nan, "high": np.nan}
     yield "the same of as many verdicts that are calibrated, on average", row
-    yield "95 % sets of hypotheses that hold the truth", share(said["held"])
+    yield "95 % sets of hypotheses that hold the truth", share(statements["held"])
 
 
 def _calibration(stated: np.ndarray, correct: np.ndarray) -> float:
@@ -232,10 +232,10 @@ def reliability(run: Audited, file: str) -> list[Finding]:
     -------
     list of Finding
     """
-    said, rows = _probabilities(run, file), []
-    said = said.assign(bin=np.minimum((said["stated"] * _BINS).astype(int), _BINS - 1))
+    statements, rows = _probabilities(run, file), []
+    statements = statements.assign(bin=np.minimum((statements["stated"] * _BINS).astype(int), _BINS - 1))
     for robots in ("proof", "tuned"):
-        mine = said[said["robots"] == robots]
+        mine = statements[statements["robots"] == robots]
         for group in ("all", *sorted(mine["group"].unique())):
             part = mine if group == "all" else mine[mine["group"] == group]
             for number, some in part.groupby("bin"):

@@ -78,8 +78,8 @@ def cases(run: Audited, file: str) -> list[Finding]:
     found.append(compared(file, "squares reached over squares predicted", "pandas", rows["calibration"], expected, _DIGITS))
     over = rows["found"] / rows["true"]
     found.append(compared(file, "over the floor", "pandas", rows["over_floor"], over, 2 * _DIGITS))
-    said = frame.groupby(_KEY)[["verdict", "named"]].first()
-    alike = bool((rows[["verdict", "named"]] == said).to_numpy().all())
+    reported = frame.groupby(_KEY)[["verdict", "named"]].first()
+    alike = bool((rows[["verdict", "named"]] == reported).to_numpy().all())
     return [*found, held(file, "verdicts", "pandas", alike, "others", len(rows))]
 
 

@@ -30,7 +30,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 @dataclass(frozen=True)
-class Readings:
+class Averages:
     """Measurements with the repeats of a state averaged.
 
     Attributes
@@ -62,7 +62,7 @@ class Readings:
         return self.states.groupby(["session", "pose"]).ngroup().to_numpy()[self.state]
 
 
-def readings(frame: pd.DataFrame, poses: bool) -> Readings:
+def averages(frame: pd.DataFrame, poses: bool) -> Averages:
     """Average the repeats of a table of measurements.
 
     Parameters
@@ -74,7 +74,7 @@ def readings(frame: pd.DataFrame, poses: bool) -> Readings:
 
     Returns
     -------
-    Readings
+    Averages
     """
     kept = frame[~far_off(frame)]
     angles = [name for name in map(str, kept) if name[0] == "q" and name[1:].isdigit()]
@@ -88,7 +88,7 @@ def readings(frame: pd.DataFrame, poses: bool) -> Readings:
     if poses:
         vectors = kept[["rx", "ry", "rz"]].to_numpy()
         rotation = tuple(_mean_rotation(vectors[places]) for places in grouped.indices.values())
-    return Readings(states, of_states.ngroup().to_numpy(), each["target"].to_numpy(), means.to_numpy(), rotation)
+    return Averages(states, of_states.ngroup().to_numpy(), each["target"].to_numpy(), means.to_numpy(), rotation)
 
 
 def far_off(frame: pd.DataFrame) -> np.ndarray:
@@ -175,13 +175,13 @@ class Robot:
             coordinates = commanded + compliance @ forces
         return coordinates, forces
 
-    def all_loaded(self, springs: Springs, seen: Readings) -> list[tuple[np.ndarray, np.ndarray]]:
+    def all_loaded(self, springs: Springs, seen: Averages) -> list[tuple[np.ndarray, np.ndarray]]:
         """`loaded` of every state."""
         angles = seen.states[[f"q{j}" for j in range(1, self.joints + 1)]].to_numpy()
         wrenches, compliance = seen.states[list(WRENCH)].to_numpy(), self.compliance(springs)
         return [self.loaded(compliance, *one) for one in zip(angles, wrenches, strict=True)]
 
-    def residuals(self, loaded: Sequence[tuple[np.ndarray, np.ndarray]], seen: Readings) -> np.ndarray:
+    def residuals(self, loaded: Sequence[tuple[np.ndarray, np.ndarray]], seen: Averages) -> np.ndarray:
         """Measured less predicted, (M, 3 or 6), m and rad, base axes."""
         found = []
         for number, (state, target) in enumerate(zip(seen.state, seen.target, strict=True)):
@@ -192,7 +192,7 @@ class Robot:
             found.append(np.concatenate(off))
         return np.array(found)
 
-    def jacobians(self, loaded: Sequence[tuple[np.ndarray, np.ndarray]], seen: Readings) -> np.ndarray:
+    def jacobians(self, loaded: Sequence[tuple[np.ndarray, np.ndarray]], seen: Averages) -> np.ndarray:
         """Of each target where the robot has yielded to, with respect to all coordinates, (M, 3 or 6, C)."""
         rows = 6 if seen.rotation else 3
         pairs = zip(seen.state, seen.target, strict=True)

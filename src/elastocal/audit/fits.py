@@ -19,7 +19,7 @@ from scipy import stats
 from statsmodels.robust.norms import HuberT
 
 from elastocal.audit.audited import COMPONENTS
-from elastocal.audit.elastic import STATE, Readings, Robot, Springs, far_off, readings
+from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off
 from elastocal.audit.findings import Finding, compared, held
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
     if known is None:
         return []
     training = run.table(file.replace("steps", "training"))
-    seen, found = readings(training, known.poses), []
+    seen, found = averages(training, known.poses), []
     for number, step in enumerate(known.steps):
         if step is None:
             continue
@@ -173,7 +173,7 @@ def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Ca
     ]
 
 
-def _fit(file: str, number: int, step: Step, seen: Readings, robot: Robot) -> list[Finding]:
+def _fit(file: str, number: int, step: Step, seen: Averages, robot: Robot) -> list[Finding]:
     """Whether a step stands still, and its standard errors."""
     free = ~step.parameters["held"].to_numpy(bool)
     error = step.parameters["std_error"].to_numpy()
@@ -206,7 +206,7 @@ def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
     if known is None or step is None or step.parameters["held"].all():
         return []
     table, free = run.table(file), ~step.parameters["held"].to_numpy(bool)
-    seen = readings(run.table(file.replace("correlations", "training")), known.poses)
+    seen = averages(run.table(file.replace("correlations", "training")), known.poses)
     names = (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[free]
     columns, residual, _ = _whitened(step, seen, known.robot)
     covariance = np.asarray(_least_squares(columns[:, free], residual).cov_params())
@@ -236,7 +236,7 @@ def _at_an_end(step: Step) -> np.ndarray:
 _LARGEST_TAPER = 0.6
 
 
-def _whitened(step: Step, seen: Readings, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
+def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
     """Weighted, whitened regressors and residual with rows for the priors below them, and the scale of the scatter."""
     loaded = robot.all_loaded(step.springs, seen)
     residual, jacobian = robot.residuals(loaded, seen), robot.jacobians(loaded, seen)
@@ -277,7 +277,7 @@ def _units(step: Step, robot: Robot) -> np.ndarray:
     return np.array(found)
 
 
-def _whitener(noise: Mapping[str, Any], seen: Readings, jacobian: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _whitener(noise: Mapping[str, Any], seen: Averages, jacobian: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """For each pose its measurements and the inverse Cholesky factor of their covariance.
 
     The sensor's part is of each measurement, that of the joints common to a state, another one to a pose.
@@ -353,7 +353,7 @@ def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.nda
     """
     approach = [*STATE, "repeat"]
     order = measured.reset_index(drop=True).sort_values([*approach, "target"])
-    seen = readings(order.assign(load=order.groupby(approach).ngroup()), known.poses)
+    seen = averages(order.assign(load=order.groupby(approach).ngroup()), known.poses)
     found = np.empty((len(measured), 6 if known.poses else 3))
     found[order.index] = known.robot.residuals(known.robot.all_loaded(step.springs, seen), seen)
     return found

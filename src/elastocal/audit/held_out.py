@@ -1,4 +1,4 @@
-"""What a campaign says of its held-out poses: errors of each model with intervals, and where they are said again."""
+"""What a campaign says of its held-out poses: errors of each model with intervals, and where they are reported again."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.audit.elastic import STATE, Readings, far_off, readings
+from elastocal.audit.elastic import STATE, Averages, averages, far_off
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.fits import Campaign, Step, campaign_of
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
@@ -48,7 +48,7 @@ def before_after(run: Audited, file: str, campaign: str) -> list[Finding]:
     table = run.table(file)
     found = [_counts(file, table, steps)]
     parts = {part: run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")}
-    fitted, unseen = (readings(parts[part], known.poses) for part in ("training", "held_out"))
+    fitted, unseen = (averages(parts[part], known.poses) for part in ("training", "held_out"))
     of_fitted, errors = (Errors(_distances(known, steps, seen), seen.pose) for seen in (fitted, unseen))
     counts = drawn(_stream(run, campaign, "held-out poses"), errors.poses)
     by = "pinocchio"
@@ -76,12 +76,12 @@ def _counts(file: str, table: pd.DataFrame, steps: Sequence[Step]) -> Finding:
     return compared(file, "parameters of each model", "counting", table["parameters"], expected, 0.0)
 
 
-def _distances(known: Campaign, steps: Sequence[Step], seen: Readings) -> tuple[np.ndarray, ...]:
+def _distances(known: Campaign, steps: Sequence[Step], seen: Averages) -> tuple[np.ndarray, ...]:
     robot = known.robot
     return distances([robot.residuals(robot.all_loaded(step.springs, seen), seen) for step in steps])
 
 
-def _floor(known: Campaign, step: Step, seen: Readings) -> float:
+def _floor(known: Campaign, step: Step, seen: Averages) -> float:
     """RMS error that the noise leaves: of the sensor in three directions, and of the joints as the target sees them."""
     noise, robot = step.noise, known.robot
     jacobian = robot.jacobians(robot.all_loaded(step.springs, seen), seen)[:, :3, : robot.joints]
@@ -90,7 +90,7 @@ def _floor(known: Campaign, step: Step, seen: Readings) -> float:
 
 
 def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
-    """The verdict says what the diagnosis said, and of held-out poses what the residuals say.
+    """The verdict says what the diagnosis reported, and of held-out poses what the residuals say.
 
     Parameters
     ----------
@@ -108,8 +108,10 @@ def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
     kept = stated["warnings"][: len(diagnosed["warnings"])] == diagnosed["warnings"]
     off += [] if kept else ["warnings"]
     pairs = zip(stated["effects"], diagnosed["effects"], strict=True)
-    off += [said["name"] for said, found in pairs if said | {"heldout_gain": None} != found | {"heldout_gain": None}]
-    found = [held(file, "what the diagnosis said", "diagnosis.json", not off, ", ".join(off), len(diagnosed))]
+    off += [
+        reported["name"] for reported, found in pairs if reported | {"heldout_gain": None} != found | {"heldout_gain": None}
+    ]
+    found = [held(file, "what the diagnosis reported", "diagnosis.json", not off, ", ".join(off), len(diagnosed))]
     springs = run.table(f"results/loop/{campaign}/steps.parquet").query("owner == 'joint_compliance'")
     declared = springs[springs["step"] == springs["step"].min()]["value"]
     if len(declared):
@@ -121,30 +123,30 @@ def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
     return [*found, *_stated_errors(run, file, campaign, stated["heldout"], errors), _gains(run, file, campaign, stated)]
 
 
-def _stated_errors(run: Audited, file: str, campaign: str, said: dict[str, Any], errors: Errors) -> list[Finding]:
+def _stated_errors(run: Audited, file: str, campaign: str, reported: dict[str, Any], errors: Errors) -> list[Finding]:
     found = []
     for number, state in enumerate(("before", "after")):
         everywhere = metrics(errors.distances[number])
-        checked = [(f"errors {state}", said[state], everywhere)]
+        checked = [(f"errors {state}", reported[state], everywhere)]
         for name, chosen in (("inside", ~errors.outside), ("outside", errors.outside)):
             if chosen.any():
                 some = metrics(errors.distances[number][chosen])
                 checked.append(
-                    (f"errors {state} {name} the range of the fitted poses", said["outside_range"][name][state], some)
+                    (f"errors {state} {name} the range of the fitted poses", reported["outside_range"][name][state], some)
                 )
         for words, stored, expected in checked:
             values = [stored[f"{name}_m"] for name in _METRICS]
             found.append(compared(file, words, "pandas", values, [expected[name] for name in _METRICS], _DIGITS))
     counts = drawn(_stream(run, campaign, "held-out poses"), errors.poses)
     fallen = reduction(errors, counts, 0, 1)
-    stored = [*said["reduction_ci95"], said["reduction_std_error"]]
+    stored = [*reported["reduction_ci95"], reported["reduction_std_error"]]
     found.append(compared(file, "reduction: interval and standard error", _BY, stored, fallen, _DIGITS))
-    stored = [said["poses"], said["share_below_max"], said["outside_range"]["poses"]]
+    stored = [reported["poses"], reported["share_below_max"], reported["outside_range"]["poses"]]
     numbered = [errors.poses, 0.05 ** (1 / errors.poses), len(np.unique(errors.pose[errors.outside]))]
     found.append(compared(file, "poses, share below the largest error", "Wilks' limit", stored, numbered))
     last = run.table(f"reports/loop/{campaign}/before_after.csv").iloc[-1]
     floor = last["heldout_rms_m"] / last["heldout_rms_over_floor"]
-    stated = np.nan if said["noise_floor_rms_m"] is None else said["noise_floor_rms_m"]
+    stated = np.nan if reported["noise_floor_rms_m"] is None else reported["noise_floor_rms_m"]
     return [*found, compared(file, "what the noise leaves", "pandas", stated, floor, 2 * _DIGITS)]
 
 

@@ -29,7 +29,7 @@ class Errors:
     pose : ndarray (M,)
         By any name of the pose.
     outside : ndarray of bool (M,)
-        Whether the pose is said to lie beyond those that were fitted.
+        Whether the pose is known to lie beyond those that were fitted.
     """
 
     distances: tuple[np.ndarray, ...]

@@ -32,7 +32,7 @@ MEANINGS = {
     "reports/planning/*.csv": "worth of planned poses",
     "reports/loop/*.csv": "of all campaigns: verdicts, errors before and after",
     "reports/loop/*/splits.csv": "of a campaign: errors by how poses were held out",
-    "reports/loop/*/verdict.json": "of a campaign: what is said of it",
+    "reports/loop/*/verdict.json": "of a campaign: its verdict",
     "reports/loop/*/residuals.parquet": "of a campaign: what the model leaves of each measurement",
     "reports/tables/*.csv": "tables of the study",
     "reports/tables/*.md": "the paper's tables as they are printed, Markdown",
