@@ -48,6 +48,18 @@ def test_a_held_out_pose_that_was_fitted_is_found(run):
     assert "no pose is fitted and held out" in failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell"))
 
 
+def test_a_pose_of_another_campaign_may_have_the_same_number_but_not_the_same_measurement(run):
+    (run.folder / FOLDER / "campaign.json").write_text(json.dumps({"held_out": "other"}))
+    frame = pd.read_parquet(run.folder / FOLDER / "held_out.parquet")
+    frame.assign(pose=range(3)).to_parquet(run.folder / FOLDER / "held_out.parquet")
+    assert failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell")) == []
+    run.table.cache_clear()
+    fitted = pd.read_parquet(run.folder / FOLDER / "training.parquet")
+    pd.concat([frame, fitted[:1]]).to_parquet(run.folder / FOLDER / "held_out.parquet")
+    found = failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell"))
+    assert found == ["no measurement is fitted and held out"]
+
+
 def test_a_probability_that_is_no_sum_over_models_is_found(run):
     assert state(run, joint_offset=1.0, payload=0.6) == ["probability of payload"]
 

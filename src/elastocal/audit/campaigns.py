@@ -34,9 +34,13 @@ def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
     """
     held_out = run.table(file.replace("training", "held_out"))
     fitted, source = run.table(file), f"data/campaigns/{campaign}/measurements.parquet"
-    poses = [set(map(tuple, frame[_POSE].to_numpy())) for frame in (fitted, held_out)]
+    # Poses of another campaign are numbered anew; measurements of it are others all the same.
+    another = _session(run, campaign)
+    names, words = (list("xyz"), "measurement") if another else (_POSE, "pose")
+    poses = [set(map(tuple, frame[names].to_numpy())) for frame in (fitted, held_out)]
     shared = poses[0] & poses[1]
-    found = [held(file, "no pose is fitted and held out", "pandas", not shared, f"poses {sorted(shared)[:3]}", len(poses[0]))]
+    note = f"{words}s {sorted(shared)[:3]}"
+    found = [held(file, f"no {words} is fitted and held out", "pandas", not shared, note, len(poses[0]))]
     if run.there(source) and _document(run, campaign).get("held_out") is None:
         rows, original = pd.concat([fitted, held_out]).sort_values("row"), run.table(source)
         numbered = compared(
