@@ -38,7 +38,9 @@ _OF_ERRORS = 1e-3
 _STEP_BACK = 2e-8
 # Beyond this quantile of the distance from the prediction a measurement loses weight.
 _HUBER = 0.99
-# Of the half width of a taper's range; for its slope.
+# A link's taper is between none and this.
+_LARGEST_TAPER = 0.6
+# Of a taper; for its slope.
 _DIFFERENCE = 1e-4
 
 
@@ -231,9 +233,6 @@ def _at_an_end(step: Step) -> np.ndarray:
     """Which parameters are a taper that is as small as it may be, or as large."""
     ends = step.parameters["value"].isin([0.0, _LARGEST_TAPER])
     return (ends & (step.parameters["parameter"] == _TAPER)).to_numpy()
-
-
-_LARGEST_TAPER = 0.6
 
 
 def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.ndarray, float]:
