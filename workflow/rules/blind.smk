@@ -27,7 +27,6 @@ rule make_cases:
         number=lambda wildcards: int(wildcards.block.rsplit("_", 1)[1]),
         blocks=BLIND_BLOCKS,
         seed=config["seed"],
-        robots=f"{CONFIG}/robots",
     script:
         "../scripts/make_cases.py"
 

@@ -39,7 +39,6 @@ rule carry_out_follow_ups:
     params:
         size=config["blind"],
         seed=config["seed"],
-        robots=f"{CONFIG}/robots",
     script:
         "../scripts/carry_out_follow_ups.py"
 

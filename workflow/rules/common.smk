@@ -165,6 +165,12 @@ def files_behind(targets):
     return [str(output) for output in outputs_behind(targets)]
 
 
+def described():
+    """Inputs of the targets that the crate is of."""
+    named = config.get("crate_of", ["study", "loop"])
+    return [file for target in named for file in getattr(rules, target).input]
+
+
 def in_store(file):
     """A file's object on the object store, which the configuration names."""
     if "store" not in config:

@@ -6,12 +6,6 @@ end, inputs and outputs, every file with its SHA-256; and reports/configuration.
 """
 
 
-def described():
-    """Inputs of the targets that the crate is of."""
-    named = config.get("crate_of", ["study", "loop"])
-    return [file for target in named for file in getattr(rules, target).input]
-
-
 rule write_crate:
     input:
         files=lambda wildcards: files_behind(described()),

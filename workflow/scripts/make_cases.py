@@ -8,11 +8,11 @@ from elastocal.blind.cases import SIZES, block_of, cases_of, make_case
 
 
 def make_cases(job: Job) -> None:
-    settings = job.params
+    settings, robots = job.params, Path(job.input.robots[0]).parent
     for folder in (job.output.blind, job.output.sealed):
         Path(folder).mkdir(parents=True, exist_ok=True)
     for case in block_of(cases_of(SIZES[settings.size], settings.seed), settings.number, settings.blocks):
-        make_case(case, job.output.blind, job.output.sealed, job.params.robots)
+        make_case(case, job.output.blind, job.output.sealed, robots)
 
 
 run(make_cases, snakemake)
