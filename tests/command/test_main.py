@@ -5,7 +5,7 @@ import pytest
 from elastocal.command import main
 from elastocal.errors import InputError
 
-NO_SUBCOMMANDS = {"__init__", "main", "pipeline", "campaign", "quantities"}
+NO_SUBCOMMANDS = {"__init__", "main", "pipeline", "campaign", "printed", "quantities"}
 
 
 def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch):

@@ -141,7 +141,8 @@ def run_of(script, tmp_path, monkeypatch, verdict, **parts):
     path, one_call = tmp_path / f"{script}.json", OneCall(verdict)
     monkeypatch.setattr(whole, "diagnosed", one_call)
     output, log = _Named(verdicts=path.as_posix()), [(tmp_path / f"{script}.log").as_posix()]
-    run_script(script, _Job(output=output, params=_Named(seed=SEED), wildcards=_Named(block="block"), log=log, **parts))
+    params = _Named(seed=SEED, robots=ROBOTS.as_posix())
+    run_script(script, _Job(output=output, params=params, wildcards=_Named(block="block"), log=log, **parts))
     return json.loads(path.read_text(encoding="utf-8")), one_call.asked
 
 

@@ -30,7 +30,7 @@ _RATIO = 1.7
 _WELL_KNOWN, _FEWEST_JOINTS = 0.15, 3
 # Share of the deflections that loads as written must leave, and share of that which corrected loads may leave.
 _UNEXPLAINED = 0.5
-# Units that explain the deflections as well as each other, but for so much, are told apart by the compliances alone.
+# Units that explain the deflections as well as each other, but for so much, are distinguished by the compliances alone.
 _AS_WELL = 1.1
 _FEWEST_POSES = 4
 _ROUNDING_M = 1e-9
