@@ -166,6 +166,8 @@ def mechanism_table(run: Audited, file: str, league: str) -> list[Finding]:
     robot_of = {data: robot for robot, names in settings["data"][league].items() for data in names}
     for data, rows in stated.groupby("data", sort=False):
         frame = run.table(f"results/league/{data}/random/mechanisms.parquet")
+        # As many as were dealt: the league may have been asked for others than the configuration has.
+        count = int(run.table(f"results/league/{data}/folds.parquet")["random"].max())
         names = set(frame["mechanism"]) == set(rows["mechanism"]) and len(rows) == frame["mechanism"].nunique()
         right = names and bool((rows["robot"] == robot_of[str(data)]).all())
         found.append(held(file, f"mechanisms of {data}", "pandas", right, "others", len(rows)))
@@ -173,7 +175,7 @@ def mechanism_table(run: Audited, file: str, league: str) -> list[Finding]:
             continue
         for quantity in ("probability", "share"):
             wide = frame.pivot(index="mechanism", columns="fold", values=quantity)
-            wide = wide.reindex(columns=range(1, settings["folds"] + 1)).fillna(0).loc[rows["mechanism"]]
+            wide = wide.reindex(columns=range(1, count + 1)).fillna(0).loc[rows["mechanism"]]
             expected = np.stack([wide.mean(axis=1), wide.min(axis=1), wide.max(axis=1)], axis=1)
             values = rows[[quantity, f"{quantity}_low", f"{quantity}_high"]]
             found.append(compared(file, f"{quantity} of {data}", "pandas", values, expected, _DIGITS))
