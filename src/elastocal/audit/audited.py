@@ -105,6 +105,10 @@ class Audited:
         path = self.folder / file
         return pq.ParquetFile(path).read().to_pandas() if file.endswith(".parquet") else pd.read_csv(path)
 
+    def document(self, file: str) -> Any:
+        """A JSON file."""
+        return json.loads((self.folder / file).read_text("utf-8"))
+
     def metadata(self, file: str) -> dict[str, Any]:
         """The entries of a Parquet file's own metadata that the pipeline wrote."""
         raw = pq.ParquetFile(self.folder / file).metadata.metadata or {}

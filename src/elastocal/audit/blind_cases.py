@@ -7,6 +7,7 @@ import json
 import re
 from collections import defaultdict
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import permutations
 from typing import TYPE_CHECKING, Any
 
@@ -65,8 +66,9 @@ class Proof:
     oracles: dict[str, Mapping[str, Any] | None]
 
 
+@lru_cache(1)
 def proof_of(run: Audited) -> Proof:
-    """Ground truths that the manifest lists, with their verdicts and oracles."""
+    """Ground truths that the manifest lists, with their verdicts and oracles; kept for the next table of the same run."""
     names = {file.removesuffix(".json") for _, file in _manifest(run)}
     truths = {
         path.stem: json.loads(path.read_text("utf-8"))

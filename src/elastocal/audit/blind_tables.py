@@ -53,6 +53,11 @@ _TARGETS: dict[str, tuple[str, float, float, float, float]] = {
 }
 # Of a table with nine digits, by what is worked out of another with nine.
 _DIGITS = 1e-7
+# Columns of cases.csv.
+_NUMBERS = (
+    *("level", "raw", "retained", "signal_rms_m", "signal_over_noise", "times_plausible", "before_rms_m", "after_rms_m"),
+    *("noise_floor_rms_m", "reduction", "reduction_std_error", "oracle_p_value", "oracle_detected", "oracle_rms_m"),
+)
 
 
 def share(hits: Iterable[Any]) -> dict[str, float]:
@@ -69,12 +74,6 @@ def _cases(run: Audited, file: str) -> pd.DataFrame:
     """Rows of cases.csv, among whose names "none" and nothing are words."""
     path = run.folder / file.rpartition("/")[0] / "cases.csv"
     return pd.read_csv(path, keep_default_na=False, na_values={name: [""] for name in _NUMBERS})
-
-
-_NUMBERS = (
-    *("level", "raw", "retained", "signal_rms_m", "signal_over_noise", "times_plausible", "before_rms_m", "after_rms_m"),
-    *("noise_floor_rms_m", "reduction", "reduction_std_error", "oracle_p_value", "oracle_detected", "oracle_rms_m"),
-)
 
 
 def _probabilities(run: Audited, file: str) -> pd.DataFrame:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -110,7 +109,7 @@ def diagnosis(run: Audited, file: str, campaign: str) -> list[Finding]:
     -------
     list of Finding
     """
-    document = json.loads((run.folder / file).read_text("utf-8"))["document"]
+    document = run.document(file)["document"]
     models = run.table(f"results/loop/{campaign}/models.parquet")
     probability = models["probability"].to_numpy()
     total = bool(probability.min(initial=0.0) >= 0 and probability.sum() <= 1 + 1e-9)
@@ -186,10 +185,7 @@ def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
 def _predicted(run: Audited, file: str, campaign: str, frame: pd.DataFrame) -> list[Finding]:
     """Residuals of sampled rows by pinocchio, in the base frame with known targets and nothing declared but springs."""
     described = _document(run, campaign)
-    asked, verdict = (
-        described["campaign"],
-        json.loads((run.folder / f"reports/loop/{campaign}/verdict.json").read_text("utf-8")),
-    )
+    asked, verdict = described["campaign"], run.document(f"reports/loop/{campaign}/verdict.json")
     targets = asked["targets"]
     known = all(target["offset_m"] != "unknown" for target in targets.values())
     compliance = (verdict.get("compliance_urad_per_Nm") or {}).get("before")
@@ -220,7 +216,7 @@ _SECOND_ORDER = 1e-2
 
 
 def _document(run: Audited, campaign: str) -> dict[str, Any]:
-    return dict(json.loads((run.folder / f"results/loop/{campaign}/campaign.json").read_text("utf-8")))
+    return dict(run.document(f"results/loop/{campaign}/campaign.json"))
 
 
 def _session(run: Audited, campaign: str) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from typing import TYPE_CHECKING, Any
 
@@ -185,8 +184,7 @@ def gains(run: Audited, file: str) -> list[Finding]:
     """
     stated, found = run.table(file), []
     for row in stated.to_dict("records"):
-        path = run.folder / f"results/planning/{row['robot']}.json"
-        document = json.loads(path.read_text("utf-8"))
+        document = run.document(f"results/planning/{row['robot']}.json")
         names = set(document) | {"robot"} == set(row)
         found.append(held(file, f"columns of {row['robot']}", "pandas", names, f"{set(document) ^ set(row)}", len(row)))
         values = [(row[name], value) for name, value in document.items() if not isinstance(value, str)]

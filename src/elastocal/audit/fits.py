@@ -7,7 +7,6 @@ frames or targets, or declared masses is left out.
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -95,7 +94,7 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
     Campaign or None
         None where frames or targets are fitted, the approach is recorded, or the robot file declares masses or no springs.
     """
-    described = _document(run, f"results/loop/{name}/campaign.json")
+    described = run.document(f"results/loop/{name}/campaign.json")
     asked, robot = described["campaign"], described["robot"]
     targets = list(asked["targets"].values())
     placed = asked["frame"] == "base" and all(target["offset_m"] != "unknown" for target in targets)
@@ -104,7 +103,7 @@ def campaign_of(run: Audited, name: str) -> Campaign | None:
         return None
     if run.table(f"results/loop/{name}/training.parquet")["approach1"].notna().any():
         return None
-    compliant, facts = Robot(robot, targets), _document(run, f"results/loop/{name}/diagnosis.json")
+    compliant, facts = Robot(robot, targets), run.document(f"results/loop/{name}/diagnosis.json")
     table = run.table(f"results/loop/{name}/steps.parquet")
     nominal = 1e-6 * np.array(robot["compliance_urad_per_Nm"], float)
     # Where a fixed rotation or a coupled joint parts a link, its ends are not those of a stretch of translations.
@@ -356,10 +355,6 @@ def each_residual(known: Campaign, step: Step, measured: pd.DataFrame) -> np.nda
     found = np.empty((len(measured), 6 if known.poses else 3))
     found[order.index] = known.robot.residuals(known.robot.all_loaded(step.springs, seen), seen)
     return found
-
-
-def _document(run: Audited, file: str) -> dict[str, Any]:
-    return dict(json.loads((run.folder / file).read_text("utf-8")))
 
 
 CHECKS = (

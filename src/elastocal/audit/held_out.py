@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -101,8 +101,7 @@ def verdict(run: Audited, file: str, campaign: str) -> list[Finding]:
     -------
     list of Finding
     """
-    stated = json.loads((run.folder / file).read_text("utf-8"))
-    diagnosed = json.loads((run.folder / f"results/loop/{campaign}/diagnosis.json").read_text("utf-8"))["document"]
+    stated, diagnosed = run.document(file), run.document(f"results/loop/{campaign}/diagnosis.json")["document"]
     own = ("effects", "heldout", "remainder", "warnings")
     off = [name for name in diagnosed if name not in own and stated.get(name) != diagnosed[name]]
     kept = stated["warnings"][: len(diagnosed["warnings"])] == diagnosed["warnings"]
@@ -203,19 +202,23 @@ def splits(run: Audited, file: str, campaign: str) -> list[Finding]:
 
 def _of_residuals(run: Audited, campaign: str) -> Errors | None:
     """Held-out errors before and after from the residuals of a campaign whose test is part of it."""
-    described = json.loads((run.folder / f"results/loop/{campaign}/campaign.json").read_text("utf-8"))
+    described = run.document(f"results/loop/{campaign}/campaign.json")
     unseen = run.table(f"results/loop/{campaign}/held_out.parquet")
     # Of approaches the residuals do not say which they were.
     if described.get("held_out") is not None or unseen["approach1"].notna().any():
         return None
     frame = run.table(f"reports/loop/{campaign}/residuals.parquet")
     rows = frame[frame["held_out"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
+    errors = _errors(rows)
+    outside = rows.groupby(["session", "pose"])["outside_range"].any().to_numpy()[errors.pose]
+    return replace(errors, outside=outside)
+
+
+def _errors(rows: pd.DataFrame) -> Errors:
+    """Errors before and after of the mean of what was repeated, from rows of residuals; poses by their number."""
     means = rows.groupby([*STATE, "target"])[[f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]].mean()
     values = means.to_numpy()
-    named = means.reset_index()
-    pose = named.groupby(["session", "pose"]).ngroup().to_numpy()
-    outside = rows.groupby(["session", "pose"])["outside_range"].any().to_numpy()[pose]
-    return Errors(distances([values[:, :3], values[:, 3:]]), pose, outside)
+    return Errors(distances([values[:, :3], values[:, 3:]]), means.groupby(["session", "pose"]).ngroup().to_numpy())
 
 
 def summary(run: Audited, file: str) -> list[Finding]:
@@ -242,7 +245,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
         name = row["campaign"]
         if not run.there(f"reports/loop/{name}/verdict.json"):
             continue
-        stated = json.loads((run.folder / f"reports/loop/{name}/verdict.json").read_text("utf-8"))
+        stated = run.document(f"reports/loop/{name}/verdict.json")
         named = [
             f"{effect['name']} (joint {', '.join(map(str, effect['joints']))})" if effect["joints"] else effect["name"]
             for effect in stated["effects"]
@@ -250,11 +253,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
         words = [row["verdict"], row["effects"]] == [stated["verdict"], " + ".join(named) or "none"]
         found.append(held(file, f"verdict of {name}", "verdict.json", words, str(row["effects"])))
         frame = run.table(f"reports/loop/{name}/residuals.parquet")
-        rows = frame[frame["held_out"] & (frame["session"] == row["session"])]
-        columns = [f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]
-        means = rows.groupby(["pose", "load", "target"])[columns].mean()
-        values = means.to_numpy()
-        errors = Errors(distances([values[:, :3], values[:, 3:]]), means.index.get_level_values("pose").to_numpy())
+        errors = _errors(frame[frame["held_out"] & (frame["session"] == row["session"])])
         counts = drawn(numbers(run.seed, name, "summary", row["session"]), errors.poses)
         expected, stored = [float(errors.poses)], [row["poses"]]
         for model, state in enumerate(("before", "after")):
@@ -274,7 +273,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
 
 
 def _stream(run: Audited, campaign: str, purpose: str) -> np.random.Generator:
-    described: dict[str, Any] = json.loads((run.folder / f"results/loop/{campaign}/campaign.json").read_text("utf-8"))
+    described = run.document(f"results/loop/{campaign}/campaign.json")
     return numbers(run.seed, described["campaign"]["campaign"], purpose, 0)
 
 
