@@ -100,7 +100,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
 
 def _gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
-    """Held-out rows that the final model does not explain, by the rule that training rows were judged by; and the case without."""
+    """Held-out rows that the final model does not explain, by the rule of the training rows; and the case without."""
     final, count = diagnosis.final, len(held_out.campaign.measurements)
     if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
         return Deviations.none(count, held_out.model.rows), held_out
@@ -219,7 +219,7 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
 
 
 def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: every measurement before and after, fitted and held out, gross errors behind the others."""
+    """Blocks of the residuals table: every measurement before and after, gross errors behind the others."""
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
         there = [placed(fitted, case, part) for fitted in (before, after)]
