@@ -155,7 +155,7 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     # A pose that was not there at all is far off; the others bear the effect out.
     assert beyond["outside"]["after"]["rms_m"] > 0.1 > beyond["inside"]["after"]["rms_m"]
     assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
-    training, unseen = residual_blocks(diagnosis_of(case, steps), away)
+    training, unseen = blocks_of(diagnosis_of(case, steps), away)
     assert not training["outside_range"].any()
     assert unseen["outside_range"][unseen["pose"] == first].all()
     assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
