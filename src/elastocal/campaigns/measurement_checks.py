@@ -9,6 +9,7 @@ import numpy as np
 
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
+from elastocal.campaigns.joint_space import SAME_POSE_RAD
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.measurements import MeasurementFile
     from elastocal.mechanics.robot import Robot
 
-# Measurements of one pose share their joint angles up to what a controller's servo error can differ.
-_SAME_POSE_RAD = 0.02
 # No joint of a serial arm reports more than one and a half turns unless its limits say so.
 _FARTHEST_RAD = 3.0 * np.pi
 # From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
@@ -139,12 +138,12 @@ def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
     np.minimum.at(first, pose_of, np.arange(len(measurements)))
     reported = table.numbers(table.angles)
     away = np.abs(reported - reported[first[pose_of]])
-    wrong = away > _SAME_POSE_RAD
+    wrong = away > SAME_POSE_RAD
     if wrong.any():
         index, joint = np.argwhere(wrong)[0]
         earlier = table.rows[first[pose_of[index]]]
         found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
-        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {_SAME_POSE_RAD} rad")
+        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {SAME_POSE_RAD} rad")
 
 
 def _check_times(measurements: Measurements, table: MeasurementFile) -> None:

@@ -1,6 +1,6 @@
 """What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
 
-Held-out poses are counted and no more.
+Held-out poses are counted, and their joint angles compared with those fitted; what was measured at them is not looked at.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.loop.loading import load_campaign
+from elastocal.validation.fitted_range import repeat_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -87,7 +88,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         facts
         | _identified(declared)
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case)]}
+        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case), *repeat_warnings(training, held_out)]}
     )
 
 
