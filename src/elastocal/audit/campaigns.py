@@ -237,7 +237,7 @@ def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd
     stands = list(model.standing(rows))
     expected = rows[list("xyz")].to_numpy(float) - [stand.position for stand in stands]
     stored = frame[["before_dx", "before_dy", "before_dz"]]
-    # Springs may still settle, all rows together, by some hundredths of a standard error of the scatter that is there.
+    # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
     scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
     columns = np.concatenate([stand.doubt_m for stand in stands])
     stored = stored.loc[rows.index].to_numpy(float)

@@ -29,9 +29,8 @@ if TYPE_CHECKING:
 # Effects whose formulas are written down here a second time.
 _SPRINGS, _LINKS = "joint_compliance", "link_elasticity"
 _BENDING, _TORSION, _TAPER = "bending_1_over_EI", "torsion_1_over_GJ", "taper"
-# A fit stops at steps of a thousandth of a standard error of the scatter that is there, under the loads of the step before: of
-# ten standard errors, on an arm that yields by a few thousandths of its reach, some hundredths of one are still to come.
-SETTLED = 5e-2
+# A fit stops at steps of a thousandth of a standard error of the scatter that is there.
+SETTLED = 2e-3
 # Standard errors belong to the estimates one such step before.
 _OF_ERRORS = 1e-3
 # A fit that is read from a file goes on from there: a thousandth of a standard error displaces by less than this (m, rad).
