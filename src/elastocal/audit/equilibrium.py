@@ -117,9 +117,9 @@ def sagging(run: Audited, campaign: str) -> Sagging | None:
     """
     described = run.document(f"results/loop/{campaign}/campaign.json")
     compliance = run.document(f"reports/loop/{campaign}/verdict.json").get("compliance_urad_per_Nm") or {}
-    bare = {key: value for key, value in described["robot"].items() if key != "links"}
     if compliance.get("before") is None:
         return None
+    bare = {key: value for key, value in described["robot"].items() if key != "links"}
     targets = list(described["campaign"]["targets"].values())
     arms = [Arm(bare, [0.0] * 3 if each["offset_m"] == "unknown" else each["offset_m"]) for each in targets]
     # A joint that moves twice has two frames behind it.
