@@ -109,6 +109,8 @@ def test_rows_without_a_position_are_left_out_only_where_asked(tmp_path):
         ("q1,x,y,z\n0,1,nan,3\n", PLAIN, ["line 2, column y", "a number such as"]),
         ("q1,x,y,z\n0,1,1_0,3\n", PLAIN, ["line 2, column y", "'1_0'"]),
         ("q1,x,y,z\n0,1,1e308,3\n", PLAIN, ["line 2, column y", "'1e308'"]),
+        ("q1,x,y,z,temperature_c\n0,1,2,3,-500\n", PLAIN, ["line 2, column temperature_c", "'-500'", "-200 to 200"]),
+        ("q1,x,y,z,u95 [mm]\n0,1,2,3,1e-20\n", PLAIN, ["line 2, column u95 [mm]", "'1e-20'", "laser"]),
         ("q1,x,y,z,pose\n0,1,2,3,99999999999\n", PLAIN, ["line 2, column pose", "an integer, up to"]),
         ("q999999999,x,y,z\n0,1,2,3\n", PLAIN, ["no joint angles"]),
         ("q1,x,y,z,repeat\n0,1,2,3,0.5\n", PLAIN, ["line 2, column repeat", "an integer"]),

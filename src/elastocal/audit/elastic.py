@@ -103,7 +103,8 @@ def far_off(frame: pd.DataFrame) -> np.ndarray:
     -------
     ndarray of bool (N,)
     """
-    group = frame.groupby([*STATE, "target"])[list("xyz")]
+    approach = [name for name in map(str, frame) if name.startswith("approach")]
+    group = frame.groupby([*STATE, "target", *approach], dropna=False)[list("xyz")]
     off = (frame[list("xyz")] - group.transform("median")).abs().to_numpy()
     repeated = group.transform("size").to_numpy() > 2 if len(frame) else np.zeros(0, bool)
     apart = off[repeated]

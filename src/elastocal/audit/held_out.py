@@ -11,7 +11,7 @@ import pandas as pd
 
 from elastocal.audit.elastic import STATE, Averages, averages, far_off
 from elastocal.audit.findings import Finding, compared, held
-from elastocal.audit.fits import Campaign, Step, campaign_of
+from elastocal.audit.fits import Campaign, Step, campaign_of, unsettled
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
 from elastocal.audit.streams import numbers
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
 
 _METRICS = ("mean", "rms", "p95", "max")
-# Nine digits of a table; beside them, of the metres that a fit read from a file moves on by.
-_DIGITS, _STEP_BACK = 1e-8, 2e-8
-# The same as a share of an interval's end.
+# Nine digits of a table.
+_DIGITS = 1e-8
+# What a fit that is read from a file moves on by, as a share of an interval's end.
 _OF_ENDS = 1e-5
 _BY = "numpy's Philox stream, jackknife"
 
@@ -54,17 +54,17 @@ def before_after(run: Audited, file: str, campaign: str) -> list[Finding]:
     by = "pinocchio"
     for number, row in table.iterrows():
         place = int(str(number))
-        head = f"of step {place}"
+        head, settled = f"of step {place}", unsettled(steps[place], fitted, known.robot)
         for part, of_part in (("train", of_fitted), ("heldout", errors)):
             expected = metrics(of_part.distances[place])
             stored = [row[f"{part}_{name}_m"] for name in _METRICS]
             found.append(
-                compared(file, f"{part} errors {head}", by, stored, [expected[name] for name in _METRICS], _DIGITS, _STEP_BACK)
+                compared(file, f"{part} errors {head}", by, stored, [expected[name] for name in _METRICS], _DIGITS, settled)
             )
         ends = limits(errors, counts, place)
         for name in _METRICS:
             stored = [row[f"heldout_{name}_m_{end}"] for end in ("low", "high")]
-            found.append(compared(file, f"interval of the {name} {head}", _BY, stored, ends[name], _OF_ENDS))
+            found.append(compared(file, f"interval of the {name} {head}", _BY, stored, ends[name], _OF_ENDS, settled))
     over_floor = table[[f"heldout_{name}_over_floor" for name in _METRICS]]
     errors_m = table[[f"heldout_{name}_m" for name in _METRICS]]
     floor = _floor(known, steps[-1], unseen)

@@ -1,6 +1,6 @@
 """What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
 
-Held-out poses are counted and no more.
+Held-out poses are counted, and their joint angles compared with those fitted; what was measured at them is not looked at.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.loop.loading import load_campaign
+from elastocal.validation.fitted_range import repeat_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -90,7 +91,14 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         facts
         | _identified(declared)
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case)]}
+        | {
+            "suspicious": [
+                *warnings,
+                *warnings_of(left_out),
+                *_suspicious(campaign, facts, case),
+                *repeat_warnings(training, held_out),
+            ]
+        }
     )
 
 
