@@ -2,6 +2,8 @@
 
 import subprocess
 
+from durations import HUNG_S
+
 TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "planning", "audit", "crate")
 
 
@@ -9,5 +11,5 @@ def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_pat
     place = tmp_path / "results of mine"
     place.mkdir()
     command = unstarted.command("-n", "--quiet", "--snakefile", str(unstarted.path("Snakefile")), "--", *TARGETS)
-    done = subprocess.run(**command | {"cwd": place}, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(**command | {"cwd": place}, capture_output=True, text=True, timeout=HUNG_S)
     assert done.returncode == 0, done.stderr[-3000:]
