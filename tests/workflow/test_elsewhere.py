@@ -2,7 +2,7 @@
 
 import subprocess
 
-TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "planning", "audit", "crate")
+TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "bad_rows", "planning", "audit", "crate")
 
 
 def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from study_folder import REPOSITORY
 
 # Those of the page, and the others of hours.
-TARGETS = ("study", "measured", "league", "blind", "closed_loop", "planning", "extended_study")
+TARGETS = ("study", "measured", "league", "blind", "closed_loop", "bad_rows", "planning", "extended_study")
 
 
 @pytest.fixture
