@@ -63,6 +63,22 @@ class Settings:
         0.65, "least probability at which one mechanism is named, from the reliability diagram of the development cases"
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
+    gross_error_level: float = _setting(
+        0.01,
+        "probability that a row of good measurements is left out as a gross error, by Bonferroni's bound; half for what is held"
+        " out, so that 98 % of good campaigns lose no row",
+    )
+    gross_error_share: float = _setting(
+        0.2, "share of rows beyond which none counts as a gross error: below the quarter at which the scale breaks down"
+    )
+    gross_start_numbers: int = _setting(
+        1200,
+        "numbers up to which rows are judged by all candidates at once before the search; of more, rows that do not stand out"
+        " beside the declared model hardly move what a search finds",
+    )
+    gross_error_rounds: int = _setting(
+        4, "times that a model is searched for at most, each without the rows that the one before does not explain"
+    )
     linearizations: int = _setting(
         2, "times that the problem is linearised at most, each about the model found before; a third moves no verdict"
     )
