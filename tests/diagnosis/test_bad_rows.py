@@ -85,8 +85,8 @@ def test_the_clean_file_is_diagnosed_right_and_loses_no_row(clean):
 
 @pytest.mark.parametrize(
     "damage",
-    [*map(off_by, (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 3.0)), lost_beam, held_point, wrong_angle],
-    ids=["1 mm", "3 mm", "10 mm", "30 mm", "100 mm", "3 m", "lost beam", "held point", "wrong angle"],
+    [*map(off_by, (1e-3, 1e-2, 0.1, 3.0)), lost_beam, held_point, wrong_angle],
+    ids=["1 mm", "10 mm", "100 mm", "3 m", "lost beam", "held point", "wrong angle"],
 )
 def test_one_bad_row_leaves_the_verdict_and_is_named_with_its_line(tmp_path, clean, damage):
     found = verdict_on(tmp_path, [(damage, 8)])

@@ -51,7 +51,14 @@ def made_proofs(folder):
     """Write all of it, with the checksums that jobs would have kept."""
     for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", "results/closed_loop", "reports/closed_loop"):
         (folder / name).mkdir(parents=True)
-    for name in ("results/bad_rows", "reports/bad_rows", "results/planning", "reports/planning", "results/league/one/random", "reports/league/small"):
+    for name in (
+        "results/bad_rows",
+        "reports/bad_rows",
+        "results/planning",
+        "reports/planning",
+        "results/league/one/random",
+        "reports/league/small",
+    ):
         (folder / name).mkdir(parents=True)
     _blind(folder)
     _closed_loop(folder)

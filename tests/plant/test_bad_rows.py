@@ -110,7 +110,7 @@ def test_the_size_of_a_wrong_angle_is_how_far_it_would_have_moved_the_point(camp
     table = campaign[0]
     for seed in range(100):
         after, (slip,) = planted(campaign, "joint_angle", seed, 1)
-        (name,), rows = changed(table, after)
+        (name,) = changed(table, after)[0]
         off = (after[name] - table[name])[slip.rows[0]]
         if name == "q1" and abs(off) < 0.3:
             break

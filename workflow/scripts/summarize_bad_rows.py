@@ -8,9 +8,7 @@ from elastocal.io.data_frames import read_frame, write_csv
 
 
 def summarize_bad_rows(job: Job) -> None:
-    tables = {
-        robot: read_frame(path, schemas.BAD_ROWS) for robot, path in zip(job.params.robots, job.input.slips, strict=True)
-    }
+    tables = {robot: read_frame(path, schemas.BAD_ROWS) for robot, path in zip(job.params.robots, job.input.slips, strict=True)}
     slips = judge_cases(tables)
     write_csv(job.output.cases, slips)
     write_csv(job.output.summary, summarize(slips))

@@ -31,7 +31,9 @@ def cases(run: Audited, file: str) -> list[Finding]:
     stated = run.table(file)
     robots = list(dict.fromkeys(stated["robot"]))
     slips = pd.concat([run.table(f"results/bad_rows/{robot}.parquet").assign(robot=robot) for robot in robots])
-    every = len(slips) == len(stated) and bool((slips["bad_rows"].astype(str).to_numpy() == stated["bad_rows"].astype(str)).all())
+    every = len(slips) == len(stated) and bool(
+        (slips["bad_rows"].astype(str).to_numpy() == stated["bad_rows"].astype(str)).all()
+    )
     found = [held(file, "every slip once", "counting", every, f"{len(stated)} of {len(slips)}", len(stated))]
     if every:
         for version in ("damaged", "fewer"):

@@ -226,9 +226,7 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
     true, names = list(case["effects"]), [effect["name"] for effect in effects]
     stated = bool(true) and word in ("named", "class", "several")
     exact = stated and sorted(true) == sorted(names)
-    meant = [
-        {effect["name"], *(re.split(r"[@\[]", other)[0] for other in effect["alternatives"])} for effect in effects
-    ]
+    meant = [{effect["name"], *(re.split(r"[@\[]", other)[0] for other in effect["alternatives"])} for effect in effects]
     matched = len(true) == len(meant) and any(
         all(name in among for name, among in zip(true, order, strict=True)) for order in permutations(meant)
     )

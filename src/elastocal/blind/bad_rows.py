@@ -101,7 +101,13 @@ def draw_campaign(robot_file: str | Path, seed: int) -> MadeCampaign:
     hidden = any(defect.effect == _WEIGHT for defect in defects)
     robot = with_defects(specimen(arm, seed, weighs=not hidden), defects)
     return MadeCampaign(
-        f"bad_rows_{seed}", robot, design, schedule, () if hidden else declared_masses(arm), kind if defects else NOTHING, defects
+        f"bad_rows_{seed}",
+        robot,
+        design,
+        schedule,
+        () if hidden else declared_masses(arm),
+        kind if defects else NOTHING,
+        defects,
     )
 
 
@@ -275,6 +281,7 @@ def _words_of(verdict: Mapping[str, Any] | str) -> dict[str, Any]:
     return {
         "verdict": verdict["verdict"],
         "found": " + ".join(sorted(places)) or "none",
-        "found_at": " + ".join(f"{name} {'-'.join(map(str, sorted(places[name])))}".strip() for name in sorted(places)) or "none",
+        "found_at": " + ".join(f"{name} {'-'.join(map(str, sorted(places[name])))}".strip() for name in sorted(places))
+        or "none",
         "heldout_rms_m": np.nan if heldout is None else heldout["after"]["rms_m"],
     }

@@ -45,7 +45,9 @@ def summarize(slips: pd.DataFrame) -> pd.DataFrame:
     slips : pandas.DataFrame
         Of `judge_cases`.
     """
-    return pd.DataFrame([row for part in (_of_cases(slips), _of_slips(slips), _of_errors(slips)) for row in part], columns=_COLUMNS)
+    return pd.DataFrame(
+        [row for part in (_of_cases(slips), _of_slips(slips), _of_errors(slips)) for row in part], columns=_COLUMNS
+    )
 
 
 def _of_cases(slips: pd.DataFrame) -> Iterator[dict[str, Any]]:

@@ -2,7 +2,11 @@
 
 from elastocal.io.storage import Column, TableSchema
 
-_VERSIONS = {"clean": "the clean file", "damaged": "the file with bad rows", "fewer": "the clean file with as many rows deleted"}
+_VERSIONS = {
+    "clean": "the clean file",
+    "damaged": "the file with bad rows",
+    "fewer": "the clean file with as many rows deleted",
+}
 BAD_ROWS = TableSchema(
     "bad_rows",
     (

@@ -1,8 +1,8 @@
 """Rows of a measured table that went wrong: what a lost beam, a slipped decimal point or a muddled sheet leave of a few rows.
 
-Sizes are in standard deviations of the tracker: by how much a row contradicts the robot that was measured, its position, or its
-orientation where that contradicts more. Of a wrong angle or load it is how far the robot would have stood from where it was read
-had it been as the row says.
+Sizes are in standard deviations of the tracker: by how much a row contradicts the robot that was measured, its position, or
+its orientation where that contradicts more. Of a wrong angle or load it is how far the robot would have stood from where it was
+read had it been as the row says.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ HELD_POINT, ZEROS, SWAPPED = "held_point", "zeros", "swapped"
 KINDS = (POSITION, ROTATION, JOINT_ANGLE, LOAD, HELD_POINT, ZEROS, SWAPPED)
 # In standard deviations, evenly in the logarithm.
 SMALLEST, LARGEST = 5.0, 1e5
-# A campaign's reader refuses rows of one pose whose angles differ by more than 0.02 rad: beyond this the whole pose has the angle,
-# as in a sheet that has the angles of each pose once.
+# A campaign's reader refuses rows of one pose whose angles differ by more than 0.02 rad: beyond this the whole pose has the
+# angle, as in a sheet that has the angles of each pose once.
 _OF_ONE_ROW_RAD = 0.019
 # A wrong load is at most so many times the largest one; a joint is drawn among those that move a point by more than this.
 _LARGEST_LOAD, _LEVER_M = 100.0, 0.01
