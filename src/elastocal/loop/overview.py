@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
+from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
+from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized, searched_part
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.loop.loading import load_campaign
 
 if TYPE_CHECKING:
@@ -57,11 +58,13 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     InputError
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
-    case = case_from(descriptions, columns_of(training))
+    whole, settings = case_from(descriptions, columns_of(training)), Settings()
+    part = first_kept(whole, settings)
+    errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
+    left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
+    case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
-    noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise)
     decisive = any(fault.decisive for fault in found)
     facts: dict[str, Any] = {
         "campaign": campaign.name,
@@ -87,7 +90,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         facts
         | _identified(declared)
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case)]}
+        | {"suspicious": [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case)]}
     )
 
 
