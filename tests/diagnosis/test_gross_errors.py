@@ -117,7 +117,7 @@ def test_clean_rows_are_all_kept(cases, clean):
 
 
 def test_a_bad_held_out_row_is_judged_by_the_same_rule_and_both_errors_are_given(cases, clean):
-    case, held_out = cases
+    held_out = cases[1]
     without = judge(clean, held_out, 1).document["heldout"]
     verdict = judge(clean, damaged(held_out, {2: 0.5}), 1)
     (entry,) = verdict.document["gross_errors"]
