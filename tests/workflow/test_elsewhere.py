@@ -4,7 +4,7 @@ import subprocess
 
 from durations import HUNG_S
 
-TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "planning", "audit", "crate")
+TARGETS = ("study", "extended_study", "loop", "measured", "blind", "closed_loop", "bad_rows", "planning", "audit", "crate")
 
 
 def test_every_target_finds_its_sources_and_its_configuration(unstarted, tmp_path):

@@ -9,7 +9,7 @@ from durations import HUNG_S
 from study_folder import REPOSITORY
 
 # Those of the page, and the others of hours.
-TARGETS = ("study", "measured", "league", "blind", "closed_loop", "planning", "extended_study")
+TARGETS = ("study", "measured", "league", "blind", "closed_loop", "bad_rows", "planning", "extended_study")
 
 
 @pytest.fixture

@@ -30,10 +30,12 @@ from elastocal.fitting.observations import select_states
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal.plant.campaigns import Design, schedule_of, usual_force_N
 from elastocal.plant.defects import KINDS
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.random_numbers import stream
+from elastocal.plant.tracker import misplaced_base
 from elastocal.plant.weights import declared_masses
 
 if TYPE_CHECKING:
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.mechanics.robot import Robot
+    from elastocal.plant.bad_rows import BadReading
     from elastocal.plant.physical_robot import PhysicalRobot
 
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
@@ -103,7 +106,9 @@ def hidden_effects(robot: PhysicalRobot) -> list[str]:
     )
 
 
-def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int) -> dict[str, np.ndarray]:
+def closed_loop(
+    robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int, slips: bool = False
+) -> dict[str, np.ndarray]:
     """One robot with one hidden defect, from campaign to corrected targets that were measured.
 
     Parameters
@@ -112,6 +117,9 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
     effect : str
         Hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights.
     seed : int
+    slips : bool
+        Whether the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and
+        whether the robot reached it, is then of the declared base.
 
     Returns
     -------
@@ -119,7 +127,9 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
         One row for each wanted pose and model, columns as `schema` has them.
     """
     plant, _ = hidden_robot(robot_file, seed, [effect])
-    training = _measured(plant, robot_file, robots_folder, seed)
+    if slips:
+        plant = replace(plant, tracker=replace(plant.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
+    training = _measured(plant, robot_file, robots_folder, seed, slips)
     found = diagnose(training, Settings(), seed)
     robot = training.campaign.robot
     wanted = _wanted(robot, plant, seed)
@@ -145,11 +155,21 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
     return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
 
 
-def _measured(plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, seed: int) -> Case:
+def _measured(plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, seed: int, slips: bool) -> Case:
     """The training part of a campaign of the plant, by way of its folder."""
-    schedule = schedule_of(plant.arm, _DESIGN, seed)
+    schedule, declared = schedule_of(plant.arm, _DESIGN, seed), declared_masses(plant.arm)
+    draws = stream(seed, "lost beam")
+
+    def lost(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[BadReading]]:
+        """One lost row, of a pose that is fitted."""
+        kind, held_out = str(draws.choice([ZEROS, HELD_POINT])), _DESIGN.poses - _DESIGN.held_out
+        tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
+        return next((bad, lost) for bad, lost in tries if table["pose"][lost[0].rows[0]] < held_out)
+
     with tempfile.TemporaryDirectory() as folder:
-        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, _DESIGN, schedule, declared_masses(plant.arm))
+        write_blind_campaign(
+            Path(folder), "closed_loop", robot_file, plant, _DESIGN, schedule, declared, slipped=lost if slips else None
+        )
         return cases_in(folder, robots_folder)[0]
 
 
@@ -237,16 +257,23 @@ def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> 
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
     for _ in range(_STEPS):
-        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+        off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
         step = (inverse @ off[..., None])[..., 0]
         commands = robot.reported_angles(robot.model_angles(commands) + step)
-    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+    off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
     return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
+
+
+def _reached(plant: PhysicalRobot, commands: np.ndarray, wrench: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector comes to rest, in the frame that is declared as the base's."""
+    position, rotation = reached(plant, commands, wrench, seed)
+    seen = plant.tracker.seen(position[:, None], rotation[:, None], np.zeros(len(position)))
+    return seen[0][:, 0], seen[1][:, 0]
 
 
 def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
-    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
+    position, rotation = _reached(plant, commands, wanted.wrench, seed + 1)
     read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,
