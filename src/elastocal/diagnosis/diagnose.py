@@ -19,6 +19,7 @@ from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.random_streams import stream
 
 if TYPE_CHECKING:
@@ -126,7 +127,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     known = faults(case.campaign, case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
     noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise)
+    declared = fit_declared(case.model, case.observations, noise)
     tell(f"declared model fitted to {len(case.observations)} measurements")
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
@@ -173,7 +174,7 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
     if named:
         final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
     else:
-        final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
+        final = fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
     return Evidence(problem, found, alarm, conclusion, adopted), final
 

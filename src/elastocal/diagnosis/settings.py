@@ -49,9 +49,6 @@ class Settings:
     scale_spread: tuple[float, float] = _setting(
         (3.0, 0.7), "spread of the logarithm of the size below and above the center: small effects are common"
     )
-    declared_sizes: tuple[float, ...] = _setting(
-        (0.1, 0.3, 1.0, 3.0, 10.0), "sizes of declared geometry: measured robots exceed data-sheet tolerances tenfold"
-    )
     pose_steps: tuple[float, ...] = _setting(
         (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
         "grid of the error common to the measurements of a pose, in standard errors of a joint angle from one pose",

@@ -17,8 +17,8 @@ from elastocal.diagnosis.linearize import linearized, searched_part
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.loading import load_campaign
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
     noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise)
+    declared = fit_declared(case.model, case.observations, noise)
     decisive = any(fault.decisive for fault in found)
     facts: dict[str, Any] = {
         "campaign": campaign.name,
