@@ -303,6 +303,13 @@ class MeasurementFile:
                 unit = f" in {known[name].unit}" if known[name].unit else ""
                 raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
 
+    @property
+    def header_line(self) -> int | None:
+        """Line of the header, where every row of data is a line of a text."""
+        if self.lines is None or np.ptp(self.lines - self.rows):
+            return None
+        return int(self.lines[0] - self.rows[0])
+
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """InputError of this file."""
         return InputError(self.path, key, found, allowed)

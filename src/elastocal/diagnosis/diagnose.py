@@ -12,6 +12,7 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, improbable, warnings_of
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
@@ -19,12 +20,15 @@ from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.observations import measured_in
+from elastocal.fitting.tolerances import effective_parameters, fit_declared
 from elastocal.random_streams import stream
+from elastocal.validation.left_out import certain_loss, left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Posterior
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -45,7 +50,8 @@ class Step:
     Attributes
     ----------
     name : str
-    kind : {"frames", "declared", "effect"}
+    kind : {"frames", "declared", "effect", "kept"}
+        Of the last, "kept" where frames alone predict training poses better than what was fitted.
     fitted : Fit
         To the training poses.
     """
@@ -88,12 +94,15 @@ class Diagnosis:
     evidence : Evidence or None
     document : dict
         Contents of verdict.json, but for what held-out poses say.
+    left_out : Measurements
+        Gross errors, which are no part of the case.
     """
 
     case: Case
     steps: tuple[Step, ...]
     evidence: Evidence | None
     document: dict[str, Any] = field(repr=False)
+    left_out: Measurements
 
     @property
     def declared(self) -> Fit:
@@ -123,24 +132,99 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     -------
     Diagnosis
     """
+    whole = case.campaign
     tell = progress or (lambda line: None)
-    known = faults(case.campaign, case.campaign.measurements)
+    part = _without_improbable(case, settings)
+    known = faults(part.case.campaign, part.case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
-    noise, warnings = estimated_noise(case)
-    declared = fit_declared(case.model, case.observations, noise)
-    tell(f"declared model fitted to {len(case.observations)} measurements")
+    if decisive:
+        # Of measurements that mean something else no row can be told to be wrong.
+        part = _fitted(case, np.ones(len(case.campaign.measurements), bool))
+    tell(f"declared model fitted to {len(part.case.observations)} measurements")
+    found, final = None, part.declared
+    errors = Deviations.none(len(part.kept), case.model.rows)
+    for _ in range(0 if decisive else settings.gross_error_rounds):
+        found, final = _explained(part.case, part.declared, settings, seed, tell)
+        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
+        last, part = part, _fitted(case, ~errors.gross, part)
+        if part is last:
+            break
+    errors = replace(errors, gross=~part.kept)
+    case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
-    if decisive:
-        found, final = None, declared
-    else:
-        found, final = _explained(case, declared, settings, seed, tell)
+    lost: list[str] = []
+    if found:
         if not found.conclusion.best.named:
             steps[-1] = replace(steps[-1], fitted=final)
+        lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
+        found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
             steps += _effect_steps(case, declared, final, found)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
-    return Diagnosis(case, tuple(steps), found, document)
+        elif lost and lost[0]:
+            kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
+            steps.append(Step("frames and targets, kept", "kept", kept))
+    document = _document(case, noise, steps, final, found, known, settings, [*part.warnings, *filter(None, lost)])
+    left_out = entries_of(errors, whole, held_out=False)
+    document |= {"gross_errors": left_out, "warnings": [*document["warnings"], *warnings_of(left_out)]}
+    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+
+
+def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
+    """What cross-validation says against the declared model and, if it is given, that with effects; nothing where the last holds.
+
+    A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
+    """
+    found: list[str] = []
+    for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
+        numbers, words = fitted.residual.size, ""
+        if numbers < settings.numbers_a_parameter * effective_parameters(fitted):
+            mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
+            if certain_loss(mine, others):
+                rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
+                words = (
+                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and targets"
+                    f" alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the {name} is not"
+                    " kept"
+                )
+        found.append(words)
+    return found if found[-1] else []
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The measurements of a case that are fitted, ``kept`` of all (N,), with their noise and the declared model."""
+
+    case: Case
+    kept: np.ndarray
+    noise: Noise
+    warnings: list[str]
+    declared: Fit
+
+
+def _fitted(case: Case, kept: np.ndarray, last: _Part | None = None) -> _Part:
+    """The part of a case that is kept, or the last one where that is the same."""
+    if last is not None and (kept == last.kept).all():
+        return last
+    part = case.select(kept)
+    noise, warnings = estimated_noise(part)
+    return _Part(part, kept, noise, warnings, fit_declared(part.model, part.observations, noise))
+
+
+def _without_improbable(case: Case, settings: Settings) -> _Part:
+    """The part of a case that its declared model, and then all candidates together, might explain."""
+    measurements = case.campaign.measurements
+    part = _fitted(case, np.ones(len(measurements), bool))
+    for _ in range(settings.gross_error_rounds):
+        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
+        last, part = part, _fitted(case, ~errors.gross, part)
+        if part is last:
+            break
+    if part.case.observations.position.size * case.model.rows // 3 > settings.gross_start_numbers:
+        return part
+    problem = linearized(part.declared, part.case.observations, list(case.candidates.values()), settings)
+    taken = measured_in(measurements, part.case.observations, improbable(problem, settings))
+    return _fitted(case, part.kept & ~taken, part)
 
 
 def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:
@@ -245,6 +329,7 @@ def _document(
         "noise": _noise_facts(noise, final.noise),
         "misfit": misfit,
         "heldout": None,
+        "kept": steps[-1].kind.replace("kept", "frames"),
         "compliance_urad_per_Nm": _compliances(declared, final, springs),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.case import noise_from
 from elastocal.fitting.displacement import conditions
-from elastocal.fitting.observations import each_approach, state_clusters
+from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan
@@ -34,7 +37,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.case import Case
-    from elastocal.fitting.observations import Observations
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
@@ -53,10 +55,16 @@ class Verdict:
         Contents of verdict.json.
     rows : list of dict
         Of before_after.csv.
+    held_out : Case
+        What was held out, without its gross errors.
+    left_out : Measurements
+        These.
     """
 
     document: dict[str, Any]
     rows: list[dict[str, Any]]
+    held_out: Case
+    left_out: Measurements
 
 
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -75,16 +83,38 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     Verdict
     """
     case, steps = diagnosis.case, diagnosis.steps
-    rows, heldout, warnings = heldout_errors(steps, case, held_out, seed)
+    errors, part = _gross_errors(diagnosis, held_out)
+    left_out = entries_of(errors, held_out.campaign, held_out=True)
+    rows, heldout, warnings = heldout_errors(steps, case, part, seed)
+    heldout["with_gross_errors"] = heldout_errors(steps, case, held_out, seed)[1] if left_out else None
     gains = _gains(rows)
     effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
     document = diagnosis.document | {
         "effects": effects,
         "heldout": heldout,
-        "remainder": _remainder(diagnosis, held_out, seed),
-        "warnings": [*diagnosis.document["warnings"], *warnings],
+        "remainder": _remainder(diagnosis, part, seed),
+        "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
+        "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
     }
-    return Verdict(document, rows)
+    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross))
+
+
+def _gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
+    """Held-out rows that the final model does not explain, by the rule that training rows were judged by; and the case without."""
+    final, count = diagnosis.final, len(held_out.campaign.measurements)
+    if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+        return Deviations.none(count, held_out.model.rows), held_out
+    part, settings = held_out, Settings()
+    errors = Deviations.none(count, held_out.model.rows)
+    for _ in range(settings.gross_error_rounds):
+        # Frames of another campaign are fitted to what is kept of it.
+        there, last = placed(final, diagnosis.case, part), errors.gross
+        noise = noise_from(diagnosis.document).of_measurements
+        errors = held_out_gross_errors(final, there, noise, held_out, settings)
+        part = held_out.select(~errors.gross) if errors.gross.any() else held_out
+        if (errors.gross == last).all():
+            break
+    return errors, part
 
 
 def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
@@ -170,7 +200,10 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
 
     Parameters
     ----------
-    diagnosis, held_out, seed
+    diagnosis : Diagnosis
+    held_out : Case
+        Of the verdict.
+    seed : int
         As in `judge`.
 
     Returns
@@ -185,26 +218,20 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
-def residual_blocks(diagnosis: Diagnosis, held_out: Case) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: training measurements, then held-out ones; every measurement before and after."""
+def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:
+    """Blocks of the residuals table: every measurement before and after, fitted and held out, gross errors behind the others."""
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
-    inside = np.zeros(case.observations.cluster.max() + 1, bool)
-    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(after, case, held_out))):
-        observations, order = _in_order(part.campaign.measurements)
+    for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
         there = [placed(fitted, case, part) for fitted in (before, after)]
-        off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
-        position = measured_in_base(there[-1][1], observations)[0]
-        measurements = part.campaign.measurements.select(order)
-        yield residual_columns(measurements, unseen, outside[state_clusters(measurements)], position, *off)
-
-
-def _in_order(measurements: Measurements) -> tuple[Observations, np.ndarray]:
-    """Every measurement as an observation of its own, and the order of the measurements in which they come."""
-    observations, _ = each_approach(measurements)
-    approach = () if measurements.approach is None else tuple(measurements.approach.T[::-1])
-    return observations, np.lexsort(
-        (measurements.target, measurements.repeat, *approach, measurements.load, measurements.pose, measurements.session)
-    )
+        outside = outside_poses(after, case, part) if unseen else np.zeros(part.observations.cluster.max() + 1, bool)
+        measurements = part.campaign.measurements
+        for some, beyond in ((measurements, outside[state_clusters(measurements)]), (left_out, np.zeros(len(left_out), bool))):
+            if not len(some):
+                continue
+            observations = single_observations(some)
+            off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
+            position = measured_in_base(there[-1][1], observations)[0]
+            yield residual_columns(some, unseen, some is left_out, beyond, position, *off)
 
 
 def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:

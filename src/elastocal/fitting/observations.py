@@ -160,6 +160,27 @@ def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]
     return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
 
 
+def single_observations(measurements: Measurements) -> Observations:
+    """Every measurement as an observation in a state of its own, in the order of the measurements."""
+    states = States(
+        measurements.session,
+        measurements.pose,
+        measurements.load,
+        measurements.joint_angles,
+        measurements.wrench,
+        np.ones(len(measurements), int),
+        measurements.approach,
+        measurements.time_s,
+        measurements.temperature_c,
+        measurements.row,
+    )
+    rotation = None if measurements.rotation_vector is None else Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
+    spread = None if measurements.u95_m is None else standard_uncertainty(measurements.u95_m)
+    return Observations(
+        states, np.arange(len(measurements)), measurements.target, measurements.position, rotation, spread
+    )
+
+
 def without_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and target.
 
@@ -201,6 +222,18 @@ def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 def _approached_alike(measurements: Measurements) -> np.ndarray:
     key = np.column_stack([measurements.session, measurements.pose, measurements.load])
     return key if measurements.approach is None else np.column_stack([key, measurements.approach])
+
+
+def measured_in(measurements: Measurements, observations: Observations, chosen: np.ndarray) -> np.ndarray:
+    """Which measurements some observations are averages of, (N,); ``chosen`` of the observations, (M,)."""
+    states = observations.states
+    of_states = np.column_stack([states.session, states.pose, states.load])
+    if states.approach is not None:
+        of_states = np.column_stack([of_states, states.approach])
+    theirs = np.column_stack([of_states[observations.state], observations.target])
+    mine = np.column_stack([_approached_alike(measurements), measurements.target])
+    group = groups_of(np.concatenate([mine, theirs]))[1]
+    return np.isin(group[: len(mine)], group[len(mine) :][chosen])
 
 
 def _observations(measurements: Measurements, key: np.ndarray) -> Observations:
