@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -43,8 +44,9 @@ def diagnosis_of(case, steps):
     """A diagnosis whose document has what `judge` adds to and one thing that it must leave alone."""
     names = [step.name.removeprefix("+ ") for step in steps if step.kind == "effect"]
     effects = [{"name": name, "heldout_gain": None} for name in names]
-    document = {"verdict": "named", "effects": effects, "heldout": None, "warnings": ["as it was"]}
-    return Diagnosis(case, tuple(steps), None, document)
+    document = {"verdict": "named", "effects": effects, "heldout": None, "warnings": ["as it was"], "gross_errors": []}
+    document["noise"] = noise_facts(NOISE)
+    return Diagnosis(case, tuple(steps), None, document, case.campaign.measurements.select(np.zeros(0, int)))
 
 
 @pytest.fixture(scope="module")

@@ -208,7 +208,7 @@ def _of_residuals(run: Audited, campaign: str) -> Errors | None:
     if described.get("held_out") is not None or unseen["approach1"].notna().any():
         return None
     frame = run.table(f"reports/loop/{campaign}/residuals.parquet")
-    rows = frame[frame["held_out"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
+    rows = frame[frame["held_out"] & ~frame["gross_error"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
     errors = _errors(rows)
     outside = rows.groupby(["session", "pose"])["outside_range"].any().to_numpy()[errors.pose]
     return replace(errors, outside=outside)
@@ -253,7 +253,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
         words = [row["verdict"], row["effects"]] == [stated["verdict"], " + ".join(named) or "none"]
         found.append(held(file, f"verdict of {name}", "verdict.json", words, str(row["effects"])))
         frame = run.table(f"reports/loop/{name}/residuals.parquet")
-        errors = _errors(frame[frame["held_out"] & (frame["session"] == row["session"])])
+        errors = _errors(frame[frame["held_out"] & ~frame["gross_error"] & (frame["session"] == row["session"])])
         counts = drawn(numbers(run.seed, name, "summary", row["session"]), errors.poses)
         expected, stored = [float(errors.poses)], [row["poses"]]
         for model, state in enumerate(("before", "after")):

@@ -57,7 +57,7 @@ def certificate(
     verdict = read_json(needed[0])
     if any(effect["family"] == "data" for effect in verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2])
+    steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2]).query("not gross_error")
     wanted = Wanted(limit, risk, number, day, seed)
     with console.status("working"):
         document, maps = certified(folder, pipeline() / "config" / "robots", found, verdict, steps, residuals, wanted, other)

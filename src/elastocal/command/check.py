@@ -65,7 +65,11 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("", f"{loads}; up to {facts['repeats']} repeats"),
         ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, by {_SOURCES[noise['source']]}"),
         ("declared model", f"leaves {1e3 * facts['residual_rms_m']:.3f} mm RMS on the poses that it was fitted to"),
-        ("identified", f"{facts['parameters']} parameters" + (f"; not identifiable: {_listed(held)}" if held else "")),
+        (
+            "identified",
+            f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}"
+            + (f"; not identifiable: {_listed(held)}" if held else ""),
+        ),
     ]
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]

@@ -12,16 +12,15 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
-from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, improbable, warnings_of
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
+from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.observations import measured_in
-from elastocal.fitting.tolerances import effective_parameters, fit_declared
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
 from elastocal.validation.left_out import certain_loss, left_out_squares
 
@@ -134,21 +133,26 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     """
     whole = case.campaign
     tell = progress or (lambda line: None)
-    part = _without_improbable(case, settings)
+    part = first_kept(case, settings)
     known = faults(part.case.campaign, part.case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
     if decisive:
         # Of measurements that mean something else no row can be told to be wrong.
-        part = _fitted(case, np.ones(len(case.campaign.measurements), bool))
+        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
     tell(f"declared model fitted to {len(part.case.observations)} measurements")
     found, final = None, part.declared
     errors = Deviations.none(len(part.kept), case.model.rows)
-    for _ in range(0 if decisive else settings.gross_error_rounds):
+    good = np.zeros(len(part.kept), bool)
+    for number in range(0 if decisive else settings.gross_error_rounds):
         found, final = _explained(part.case, part.declared, settings, seed, tell)
         errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
-        last, part = part, _fitted(case, ~errors.gross, part)
-        if part is last:
+        # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
+        good |= ~part.kept & ~errors.gross
+        without = fitted_to(case, ~errors.gross | good, part)
+        if without is part or number + 1 == settings.gross_error_rounds:
             break
+        tell(f"{(~without.kept).sum()} of {len(good)} rows are gross errors: once more without them")
+        part = without
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
@@ -189,42 +193,6 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
                 )
         found.append(words)
     return found if found[-1] else []
-
-
-@dataclass(frozen=True)
-class _Part:
-    """The measurements of a case that are fitted, ``kept`` of all (N,), with their noise and the declared model."""
-
-    case: Case
-    kept: np.ndarray
-    noise: Noise
-    warnings: list[str]
-    declared: Fit
-
-
-def _fitted(case: Case, kept: np.ndarray, last: _Part | None = None) -> _Part:
-    """The part of a case that is kept, or the last one where that is the same."""
-    if last is not None and (kept == last.kept).all():
-        return last
-    part = case.select(kept)
-    noise, warnings = estimated_noise(part)
-    return _Part(part, kept, noise, warnings, fit_declared(part.model, part.observations, noise))
-
-
-def _without_improbable(case: Case, settings: Settings) -> _Part:
-    """The part of a case that its declared model, and then all candidates together, might explain."""
-    measurements = case.campaign.measurements
-    part = _fitted(case, np.ones(len(measurements), bool))
-    for _ in range(settings.gross_error_rounds):
-        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
-        last, part = part, _fitted(case, ~errors.gross, part)
-        if part is last:
-            break
-    if part.case.observations.position.size * case.model.rows // 3 > settings.gross_start_numbers:
-        return part
-    problem = linearized(part.declared, part.case.observations, list(case.candidates.values()), settings)
-    taken = measured_in(measurements, part.case.observations, improbable(problem, settings))
-    return _fitted(case, part.kept & ~taken, part)
 
 
 def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:

@@ -1,7 +1,7 @@
 """Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
 
-A row is judged by its deletion residual: its distance from what the other rows predict, in units of its standard deviation there
-(the externally studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows
+A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
+studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows
 exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is the larger of one
 standard deviation and of two robust estimates of scale, so that a model that does not fit makes no row stand out.
 
@@ -17,7 +17,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,7 +77,12 @@ class Deviations:
 
 
 def deviations(
-    model: Model, estimate: Estimate, measurements: Measurements, noise: Noise, covariance: np.ndarray | None, fitted: np.ndarray
+    model: Model,
+    estimate: Estimate,
+    measurements: Measurements,
+    noise: Noise,
+    covariance: np.ndarray | None,
+    fitted: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals of rows and their distances from the prediction, in standard deviations by the noise given.
 
@@ -100,10 +105,7 @@ def deviations(
     some = select_states(single, closely)
     parts = parts_of(some, observations_at_once(model.rows, 0 if covariance is None else len(covariance)))
     distance[closely] = np.concatenate(
-        [
-            _distances(model, estimate, part_at(some, *edges), noise, covariance, fitted[closely][edges[1]])
-            for edges in parts
-        ]
+        [_distances(model, estimate, part_at(some, *edges), noise, covariance, fitted[closely][edges[1]]) for edges in parts]
     )
     return residual, distance
 
@@ -115,6 +117,7 @@ def _distances(
     spread = noise.spread(some)
     jacobian = line.coordinate_jacobian[..., : model.sites.joints]
     variance = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+    variance += noise.pose_rad**2 * (jacobian @ jacobian.transpose(0, 2, 1))
     root = np.linalg.cholesky(variance)
     white = np.linalg.solve(root, line.residual[..., None])[..., 0]
     if covariance is None:
@@ -145,11 +148,16 @@ def _limit(count: int, rows: int, settings: Settings) -> float:
 
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
-    """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise that was declared or repeats show."""
-    # The noise that the fit was left with may be that of the very errors that are looked for.
-    smaller = (noise.position_m / fitted.noise.position_m) ** 2
-    found = deviations(fitted.model, fitted.estimate, measurements, noise, smaller * fitted.covariance, kept)
+    """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
+    noise, covariance = _without_their_share(fitted, noise)
+    found = deviations(fitted.model, fitted.estimate, measurements, noise, covariance, kept)
     return Deviations(found[0], *beyond_chance(found[1], fitted.model.rows, kept, settings))
+
+
+def _without_their_share(fitted: Fit, noise: Noise) -> tuple[Noise, np.ndarray]:
+    """Noise and covariance by which rows are judged: what the fit leaves may be the very errors that are looked for."""
+    smaller = (noise.position_m / fitted.noise.position_m) ** 2
+    return replace(noise, pose_rad=fitted.noise.pose_rad), smaller * fitted.covariance
 
 
 def held_out_gross_errors(
@@ -158,24 +166,24 @@ def held_out_gross_errors(
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them."""
     model, estimate = there
     measurements = held_out.campaign.measurements
-    smaller = (noise.position_m / fitted.noise.position_m) ** 2
-    covariance = smaller * fitted.covariance if model is fitted.model and estimate is fitted.estimate else None
+    noise, covariance = _without_their_share(fitted, noise)
+    carried = model is not fitted.model or estimate is not fitted.estimate
     unseen, every = np.zeros(len(measurements), bool), np.ones(len(measurements), bool)
-    residual, distance = deviations(model, estimate, measurements, noise, covariance, unseen)
+    residual, distance = deviations(model, estimate, measurements, noise, None if carried else covariance, unseen)
     return Deviations(residual, *beyond_chance(distance, model.rows, every, settings))
 
 
 def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
-    """Which observations all candidates together do not explain, ndarray of bool (M,); of too many numbers, none.
+    """Which observations all candidates together do not explain, ndarray of bool (M,).
 
-    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those of all
-    candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees; then those
-    come back that it predicts.
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
+    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
+    then those come back that it predicts.
     """
     products, about = problem.products, problem.about
     observed, own = about.residual.shape
     kept = np.ones(observed, bool)
-    if not isinstance(products, Products) or about.residual.size > settings.gross_start_numbers:
+    if not isinstance(products, Products):
         return ~kept
     rows = products.rows
     deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
@@ -193,20 +201,36 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
         mine = slice(worst * own, (worst + 1) * own)
         precision = precision - precision[:, mine] @ np.linalg.solve(precision[mine, mine], precision[mine])
         precision[mine] = precision[:, mine] = 0.0
+    if not kept.all():
+        covariance = covariance + _pose_error(problem, covariance, residual, np.repeat(kept, own))
     while not kept.all():
-        mine = np.repeat(kept, own)
-        precision = np.linalg.inv(covariance[np.ix_(mine, mine)])
+        known = np.repeat(kept, own)
+        precision = np.linalg.inv(covariance[np.ix_(known, known)])
         distance = np.zeros(observed)
-        distance[kept] = _deleted(precision, precision @ residual[mine], np.ones(kept.sum(), bool), own)
-        gain = covariance[np.ix_(~mine, mine)] @ precision
-        rest = (residual[~mine] - gain @ residual[mine]).reshape(-1, own, 1)
-        left = covariance[np.ix_(~mine, ~mine)] - gain @ covariance[np.ix_(mine, ~mine)]
+        distance[kept] = _deleted(precision, precision @ residual[known], np.ones(kept.sum(), bool), own)
+        gain = covariance[np.ix_(~known, known)] @ precision
+        rest = (residual[~known] - gain @ residual[known]).reshape(-1, own, 1)
+        left = covariance[np.ix_(~known, ~known)] - gain @ covariance[np.ix_(known, ~known)]
         distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(left, own), rest)).sum(axis=(1, 2)))
         back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
         if not back.any():
             break
         kept |= back
     return ~kept
+
+
+def _pose_error(problem: Linearized, covariance: np.ndarray, residual: np.ndarray, mine: np.ndarray) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes what is kept most probable."""
+    assert isinstance(problem.products, Products)
+    rows = problem.products.rows
+    jacobian, pose = rows.jacobian.reshape(len(mine), -1), np.repeat(rows.pose, len(mine) // len(rows.pose))
+    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    best = (-np.inf, 0.0)
+    for tau in problem.problem.statistics.pose_error_rad:
+        factor = np.linalg.cholesky((covariance + tau**2 * common)[np.ix_(mine, mine)])
+        white = np.linalg.solve(factor, residual[mine])
+        best = max(best, (-0.5 * float(white @ white) - float(np.log(np.diag(factor)).sum()), float(tau)))
+    return best[1] ** 2 * common
 
 
 def _deleted(precision: np.ndarray, along: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:

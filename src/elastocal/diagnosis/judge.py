@@ -100,7 +100,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
 
 
 def _gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
-    """Held-out rows that the final model does not explain, by the rule that training rows were judged by; and the case without."""
+    """Held-out rows that the final model does not explain, by the rule of the training rows; and the case without."""
     final, count = diagnosis.final, len(held_out.campaign.measurements)
     if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
         return Deviations.none(count, held_out.model.rows), held_out
@@ -164,9 +164,10 @@ def heldout_errors(
     there = [placed(step.fitted, case, held_out) for step in steps]
     errors = [position_errors(model, estimate, held_out.observations) for model, estimate in there]
     before = next(number for number, step in enumerate(steps) if step.kind == "declared")
-    after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
+    after = len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
+    of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
     floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
@@ -179,12 +180,13 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
-    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (0, before, after)]
     outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "before": ends[0],
-        "after": ends[1],
+        "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": ends[1],
+        "after": ends[2],
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
@@ -219,7 +221,7 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
 
 
 def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: every measurement before and after, fitted and held out, gross errors behind the others."""
+    """Blocks of the residuals table: every measurement before and after, gross errors behind the others."""
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
     for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
         there = [placed(fitted, case, part) for fitted in (before, after)]

@@ -21,7 +21,7 @@ from elastocal.diagnosis.summed import (
     summed,
     triangle_of,
 )
-from elastocal.effects.conditions import at_states, offered
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import linearize
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Model as FittedModel
     from elastocal.fitting.observations import Observations, States
     from elastocal.fitting.whitening import Scaling, Whitening
-    from elastocal.mechanics.sites import Sites
 
 # Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
@@ -115,7 +114,7 @@ def linearized(
     Linearized
     """
     around, sites = _conditions_of(fitted, observations), fitted.model.sites
-    untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
+    untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
     against = other.competitors(around)
@@ -402,9 +401,9 @@ def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, l
     return found
 
 
-def lacking(candidate: Candidate, sites: Sites, states: States) -> str:
+def lacking(candidate: Candidate, model: FittedModel, states: States) -> str:
     """Why the measurements cannot test a candidate at all; empty where they might."""
-    missing = sorted(candidate.needs - offered(sites, states))
+    missing = sorted(candidate.needs - model.offered(states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
     for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():

@@ -175,4 +175,3 @@ def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) 
     left = mean_square_left(problem, model)
     factor = float(np.sqrt(max(left * (taken.position_m / least.position_m) ** 2, 1.0)))
     return replace(least.scaled(factor), pose_rad=float(np.sqrt(max(left, 1.0))) * model.pose_error_rad)
-

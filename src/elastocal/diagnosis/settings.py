@@ -70,8 +70,8 @@ class Settings:
     )
     gross_start_numbers: int = _setting(
         1200,
-        "numbers up to which rows are judged by all candidates at once before the search; of more, rows that do not stand out"
-        " beside the declared model hardly move what a search finds",
+        "numbers that are judged by all candidates at once before the search; of more, those that stand out beside the declared"
+        " model and a sample of the others: one that does not stand out there hardly moves what a search finds",
     )
     gross_error_rounds: int = _setting(
         4, "times that a model is searched for at most, each without the rows that the one before does not explain"

@@ -176,9 +176,7 @@ def single_observations(measurements: Measurements) -> Observations:
     )
     rotation = None if measurements.rotation_vector is None else Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
     spread = None if measurements.u95_m is None else standard_uncertainty(measurements.u95_m)
-    return Observations(
-        states, np.arange(len(measurements)), measurements.target, measurements.position, rotation, spread
-    )
+    return Observations(states, np.arange(len(measurements)), measurements.target, measurements.position, rotation, spread)
 
 
 def without_outlying_repeats(measurements: Measurements) -> Measurements:
@@ -219,21 +217,21 @@ def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
 
 
-def _approached_alike(measurements: Measurements) -> np.ndarray:
+def _approached_alike(measurements: Measurements | States) -> np.ndarray:
     key = np.column_stack([measurements.session, measurements.pose, measurements.load])
     return key if measurements.approach is None else np.column_stack([key, measurements.approach])
 
 
-def measured_in(measurements: Measurements, observations: Observations, chosen: np.ndarray) -> np.ndarray:
-    """Which measurements some observations are averages of, (N,); ``chosen`` of the observations, (M,)."""
-    states = observations.states
-    of_states = np.column_stack([states.session, states.pose, states.load])
-    if states.approach is not None:
-        of_states = np.column_stack([of_states, states.approach])
-    theirs = np.column_stack([of_states[observations.state], observations.target])
-    mine = np.column_stack([_approached_alike(measurements), measurements.target])
+def measured_in(some: Measurements | Observations, others: Measurements | Observations, chosen: np.ndarray) -> np.ndarray:
+    """Which of some measurements, or averages of them, are of the same state and target as those chosen of others, (N,)."""
+    mine, theirs = _states_and_targets(some), _states_and_targets(others)
     group = groups_of(np.concatenate([mine, theirs]))[1]
     return np.isin(group[: len(mine)], group[len(mine) :][chosen])
+
+
+def _states_and_targets(some: Measurements | Observations) -> np.ndarray:
+    states, each = (some.states, some.state) if isinstance(some, Observations) else (some, slice(None))
+    return np.column_stack([_approached_alike(states)[each], some.target])
 
 
 def _observations(measurements: Measurements, key: np.ndarray) -> Observations:

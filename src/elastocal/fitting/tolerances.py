@@ -62,7 +62,9 @@ def with_size(model: Model, size: float) -> Model:
     """A declared model with priors of a size, in plausible sizes, on its geometry."""
     sized = declared_geometry(model)
     effects = tuple(
-        with_prior(effect, [size * parameter.plausible for parameter in effect.parameters]) if effect.effect in sized else effect
+        with_prior(effect, [size * parameter.plausible for parameter in effect.parameters])
+        if effect.effect in sized
+        else effect
         for effect in model.effects
     )
     return replace(model, effects=effects)

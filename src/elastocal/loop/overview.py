@@ -7,18 +7,20 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
+from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
+from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized, searched_part
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.tolerances import fit_declared
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
 
 if TYPE_CHECKING:
@@ -47,9 +49,9 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     -------
     dict
         ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
-        measurements, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
-        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters`` and ``held`` (those that are not
-        identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
+        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
+        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (less
+        what priors decide) and ``held`` (those that are not identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
         ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``.
 
     Raises
@@ -57,13 +59,15 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     InputError
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
-    case = case_from(descriptions, columns_of(training))
+    whole, settings = case_from(descriptions, columns_of(training)), Settings()
+    part = first_kept(whole, settings)
+    errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
+    left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
+    case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
-    noise, warnings = estimated_noise(case)
-    declared = fit_declared(case.model, case.observations, noise)
     decisive = any(fault.decisive for fault in found)
-    facts: dict[str, Any] = {
+    facts: dict[str, Any] = _identified(declared) | {
         "campaign": campaign.name,
         "robot": campaign.robot.name,
         "joints": campaign.robot.joints,
@@ -74,6 +78,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "held_out": {"poses": _poses(held_out.session, held_out.pose)},
         "states": len(states),
         "measurements": len(training),
+        "numbers": declared.residual.size,
         "loads": sorted({int(load) for load in states.load}),
         "repeats": int(states.repeats.max()),
         "sessions": len(np.unique(states.session)),
@@ -85,9 +90,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     }
     return (
         facts
-        | _identified(declared)
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case)]}
+        | {"suspicious": [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]}
     )
 
 
@@ -99,6 +103,7 @@ def _identified(declared: Fit) -> dict[str, Any]:
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
     found: dict[str, Any] = {
         "parameters": int((~declared.held).sum()),
+        "effective_parameters": effective_parameters(declared),
         "held": [name for name, held in zip(named, declared.held, strict=True) if held],
     }
     if declared.model.identifies_compliance:
@@ -119,8 +124,16 @@ def _testable(case: Case, declared: Fit) -> dict[str, Any]:
     return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
 
 
-def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case) -> list[str]:
+def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case, settings: Settings) -> list[str]:
     found, states = [], case.observations.states
+    effective, poses = facts["effective_parameters"], facts["training"]["poses"]
+    least = int(np.ceil(poses * settings.numbers_a_parameter * effective / facts["numbers"]))
+    if least > poses:
+        found.append(
+            f"{poses} poses are few for {facts['parameters']} parameters, of which they determine about {effective:.0f}, by"
+            f" {facts['numbers']} numbers: other poses will be off by more than these. Measure about {least} poses to fit, or"
+            " orientations too, or declare fewer errors"
+        )
     if facts["repeats"] == 1:
         found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
     if facts["held_out"]["poses"] < FEWEST_HELD_OUT:
