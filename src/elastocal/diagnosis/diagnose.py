@@ -175,9 +175,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
 
 
 def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
-    """What cross-validation says against the declared model and, if it is given, that with effects; nothing where the last holds.
+    """A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
 
-    A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
+    Of the declared model and, if it is given, that with effects; nothing where the last holds.
     """
     found: list[str] = []
     for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
@@ -187,9 +187,9 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
             if certain_loss(mine, others):
                 rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
                 words = (
-                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and targets"
-                    f" alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the {name} is not"
-                    " kept"
+                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
+                    f" targets alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the"
+                    f" {name} is not kept"
                 )
         found.append(words)
     return found if found[-1] else []

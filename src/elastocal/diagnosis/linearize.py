@@ -31,7 +31,7 @@ from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings

@@ -1,8 +1,8 @@
 """Tolerances of what a campaign declares: every fit of its geometry has one prior, whose size the measurements say.
 
 A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
-likelihood [1]_, together with how many times the noise taken the measurements scatter. Both come of the declared model alone, so
-that all models of a campaign, with effects and without, have the same geometry beforehand.
+likelihood [1]_, together with how many times the noise taken the measurements scatter. Both come of the declared model alone,
+so that all models of a campaign, with effects and without, have the same geometry beforehand.
 
 References
 ----------
@@ -106,7 +106,7 @@ def most_probable(wide: Fit, least: float = 1.0) -> tuple[float, float]:
 def effective_parameters(fitted: Fit) -> float:
     """Numbers that measurements have to determine: free parameters, those with a prior by the share that the prior leaves open.
 
-    Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 3.4.1).
+    Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, Elements of Statistical Learning, 3.4.1).
     """
     free = ~fitted.held
     priors = np.array([np.inf if p.prior_std is None else p.prior_std for _, p in fitted.parameters])

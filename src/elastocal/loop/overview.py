@@ -49,10 +49,11 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     -------
     dict
         ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
-        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
-        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``, ``effective_parameters`` (less
-        what priors decide) and ``held`` (those that are not identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
-        ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``.
+        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad);
+        ``faults`` (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``,
+        ``effective_parameters`` (without what priors decide) and ``held`` (those that are not identifiable); ``compliance``
+        (value, relative standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate
+        effects, by reason); ``suspicious``, sentences; ``diagnosable``.
 
     Raises
     ------

@@ -196,10 +196,9 @@ def held_out_sentence(verdict: Mapping[str, Any], steps: Sequence[Mapping[str, A
         error = _with_interval(after, ends[-1])
         worth = worth_sentence(held_out)
         return f"On {poses} that were not fitted the declared model leaves an RMS error of {error}. {worth}{noise}"
-    change = _change(
-        before, after, held_out["reduction_ci95"], [_with_interval(before, ends[0]), _with_interval(after, ends[-1])]
-    )
-    return f"On {poses} that were not fitted the RMS error of the declared model {change}. {worth_sentence(held_out)}{noise}"
+    named = [_with_interval(before, ends[0]), _with_interval(after, ends[-1])]
+    change = _change(before, after, held_out["reduction_ci95"], named)
+    return f"On {poses} that were not fitted the RMS error {change}. {worth_sentence(held_out)}{noise}"
 
 
 def worth_sentence(held_out: Mapping[str, Any]) -> str:

@@ -39,6 +39,6 @@ def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
 
 
 def certain_loss(squares: np.ndarray, others: np.ndarray) -> bool:
-    """Whether mean squares exceed those of another model on the same poses by more than the standard error of the difference."""
+    """Whether mean squares exceed those of another model on the same poses by more than the difference's standard error."""
     off = squares - others
     return bool(off.mean() > off.std(ddof=1) / np.sqrt(len(off)))
