@@ -11,6 +11,7 @@ from scipy.stats import f
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
+from elastocal.diagnosis import kept_rows
 from elastocal.diagnosis.diagnose import _effect_steps, _noise_warnings, _pose_error_warnings, diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.linearize import linearized
@@ -183,8 +184,8 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
 
 def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
     monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = module.fit
-    monkeypatch.setattr(module, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
+    fitted = kept_rows.fit
+    monkeypatch.setattr(kept_rows, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
     document = diagnose(case, Settings(), 1).document
     assert document["converged"] == {"declared": False, "final": False}
     assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [

@@ -119,7 +119,7 @@ def test_too_few_angles_of_a_joint_test_no_harmonic_of_it(kuka):
     states.joint_angles[:, 3] = np.arange(30) % 3 * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
     candidate = campaign.candidates["transmission_harmonic@4[orders 1-2]"]
-    told = lacking(candidate, campaign.declared.model.sites, states)
+    told = lacking(candidate, campaign.declared.model, states)
     assert told == f"3 angles of joint 4 where {candidate.distinct_angles} are needed"
 
 
@@ -129,7 +129,7 @@ def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
     states = made_states(6, 30, seed=4)
     states.joint_angles[:, 5] = np.arange(30) % angles * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model.sites, states)
+    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model, states)
     assert told == ("" if angles == 8 else f"{angles} angles of joint 6 where 8 are needed")
 
 

@@ -188,30 +188,26 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
     rows = products.rows
     deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
     sizes = np.sqrt(np.exp(scale_weights(settings.scales, settings)) @ np.square(settings.scales))
-    columns = np.concatenate([rows.declared * deviation, sizes * rows.candidates.dense()], axis=2)
-    columns = columns.reshape(-1, columns.shape[2])
+    declared = (rows.declared * deviation).reshape(about.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
     covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
-    precision, limit = np.linalg.inv(covariance), _limit(observed, own, settings)
+    precision, limit = _precision(covariance, declared)[0], _limit(observed, own, settings)
     while kept.mean() > 1.0 - settings.gross_error_share:
-        distance = _deleted(precision, precision @ residual, kept, own)
+        distance = _deletion_distances(precision, residual, kept, own)
         worst = int(np.argmax(distance))
         if distance[worst] <= limit:
             break
         kept[worst] = False
-        mine = slice(worst * own, (worst + 1) * own)
-        precision = precision - precision[:, mine] @ np.linalg.solve(precision[mine, mine], precision[mine])
-        precision[mine] = precision[:, mine] = 0.0
+        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
-        covariance = covariance + _pose_error(problem, covariance, residual, np.repeat(kept, own))
+        covariance = covariance + _pose_error(problem, covariance, declared, np.repeat(kept, own))
+    whole = _precision(covariance, declared)[0]
     while not kept.all():
-        known = np.repeat(kept, own)
-        precision = np.linalg.inv(covariance[np.ix_(known, known)])
-        distance = np.zeros(observed)
-        distance[kept] = _deleted(precision, precision @ residual[known], np.ones(kept.sum(), bool), own)
-        gain = covariance[np.ix_(~known, known)] @ precision
-        rest = (residual[~known] - gain @ residual[known]).reshape(-1, own, 1)
-        left = covariance[np.ix_(~known, ~known)] - gain @ covariance[np.ix_(known, ~known)]
-        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(left, own), rest)).sum(axis=(1, 2)))
+        out = np.flatnonzero(np.repeat(~kept, own))
+        distance = _deletion_distances(_without(whole, out), residual, kept, own)
+        variance = np.linalg.inv(whole[np.ix_(out, out)])
+        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
         back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
         if not back.any():
             break
@@ -219,25 +215,42 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
     return ~kept
 
 
-def _pose_error(problem: Linearized, covariance: np.ndarray, residual: np.ndarray, mine: np.ndarray) -> np.ndarray:
-    """Covariance of the error common to a pose, at the size that makes what is kept most probable."""
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Inverse of a covariance to which that of declared columns of unit size is added, and the logarithm of its determinant."""
+    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+    basis, triangle = np.linalg.qr(np.concatenate([inverse @ declared, np.eye(declared.shape[1])]))
+    beside = basis[: len(declared)].T @ inverse
+    log_det = 2.0 * (np.log(np.abs(np.diag(triangle))).sum() - np.log(np.diag(inverse)).sum())
+    return inverse.T @ inverse - beside.T @ beside, float(log_det)
+
+
+def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """The inverse covariance of the rows without some, in whose place it is zero."""
+    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
+    left[out], left[:, out] = 0.0, 0.0
+    return left
+
+
+def _pose_error(problem: Linearized, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
     assert isinstance(problem.products, Products)
     rows = problem.products.rows
-    jacobian, pose = rows.jacobian.reshape(len(mine), -1), np.repeat(rows.pose, len(mine) // len(rows.pose))
+    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
+    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
     common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
     best = (-np.inf, 0.0)
     for tau in problem.problem.statistics.pose_error_rad:
-        factor = np.linalg.cholesky((covariance + tau**2 * common)[np.ix_(mine, mine)])
-        white = np.linalg.solve(factor, residual[mine])
-        best = max(best, (-0.5 * float(white @ white) - float(np.log(np.diag(factor)).sum()), float(tau)))
+        precision, log_det = _precision((covariance + tau**2 * common)[np.ix_(known, known)], declared[known])
+        best = max(best, (-0.5 * (float(residual @ precision @ residual) + log_det), float(tau)))
     return best[1] ** 2 * common
 
 
-def _deleted(precision: np.ndarray, along: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
-    """Length of each deletion residual, (M,), from the inverse covariance and its product with the residual; 0 of others."""
+def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
+    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
     blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
-    along = along.reshape(-1, own, 1)
-    return np.where(kept, np.sqrt(np.maximum((along * np.linalg.solve(blocks, along)).sum(axis=(1, 2)), 0.0)), 0.0)
+    along = (precision @ residual).reshape(-1, own, 1)
+    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
 
 
 def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
@@ -277,10 +290,11 @@ def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
     size = f"{away:.3g} mm" if away < 1e3 else f"{1e-3 * away:.3g} m"
     if found.residual.shape[1] > 3:
         size += f" and {1e3 * np.linalg.norm(found.residual[place, 3:]):.3g} mrad"
-    position = measurements.position
+    alike = (measurements.position == measurements.position[place]).all(axis=1)
+    alike[place] = False
     reason = ""
-    if not position[place].any():
+    if not measurements.position[place].any():
         reason = ", reads 0, 0, 0"
-    elif place and (position[place] == position[place - 1]).all():
-        reason = f", the same point as {campaign.place_of(int(measurements.row[place - 1]))}"
+    elif alike.any():
+        reason = f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}"
     return f"{campaign.place_of(int(measurements.row[place]))}: {size} off{reason}, left out"

@@ -86,7 +86,14 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     errors, part = _gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, seed)
-    heldout["with_gross_errors"] = heldout_errors(steps, case, held_out, seed)[1] if left_out else None
+    every = rows
+    if left_out:
+        every, whole, _ = heldout_errors(steps, case, held_out, seed)
+        heldout["with_gross_errors"] = {"before": whole["before"], "after": whole["after"]}
+        warnings.append(_with_gross_errors(heldout, len(left_out)))
+    else:
+        heldout["with_gross_errors"] = None
+    rows = [row | {"heldout_rms_all_rows_m": other["heldout_rms_m"]} for row, other in zip(rows, every, strict=True)]
     gains = _gains(rows)
     effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
     document = diagnosis.document | {
@@ -234,6 +241,11 @@ def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str
             off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
             position = measured_in_base(there[-1][1], observations)[0]
             yield residual_columns(some, unseen, some is left_out, beyond, position, *off)
+
+
+def _with_gross_errors(heldout: Mapping[str, Any], count: int) -> str:
+    without, whole = (1e3 * part["after"]["rms_m"] for part in (heldout, heldout["with_gross_errors"]))
+    return f"held-out errors are without {count} gross errors: with them the RMS is {whole:.3g} mm instead of {without:.3g} mm"
 
 
 def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:
