@@ -12,7 +12,6 @@ from synthetic import NOISE, conditions_on, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
 from elastocal.diagnosis.linearize import (
-    declared_geometry,
     lacking,
     linearized,
     shapes_looked_at_closely,
@@ -92,35 +91,6 @@ def test_an_effect_is_found_at_its_true_size(campaign):
     gram, along = statistics.gram[0][np.ix_(unit.columns, unit.columns)], statistics.along[0][unit.columns]
     value = (along / gram[0]).item() * unit.sizes[0]
     assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
-
-
-@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
-def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
-    campaign = planted(kuka, {key: [sign * offset] for key, sign in zip(keys, signs, strict=True)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise, start)
-    # Springs of the joints have no size: they keep their wide priors.
-    assert declared_geometry(model) == {"joint_offset"}
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == size
-    assert size in SETTINGS.declared_sizes
-    alone = linearized(campaign.declared, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert alone.declared_size == 1.0 and declared_geometry(campaign.declared.model) == set()
-
-
-@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
-def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
-    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    campaign = planted(kuka, {key: [1e-3 * (-1) ** n] for n, key in enumerate(keys)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise.scaled(share), start)
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == 1.0
 
 
 def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):

@@ -24,9 +24,9 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
-from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
@@ -182,7 +182,7 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     bare = declared_model(rigid)
     model = bare.with_effects(declared_candidates(campaign.declared, bare.sites, "closed loop"))
     unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
-    return fit(model, select_states(case.observations, unloaded), found.declared.noise)
+    return fit_declared(model, select_states(case.observations, unloaded), found.declared.noise)
 
 
 def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:

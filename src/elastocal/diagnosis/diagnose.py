@@ -20,7 +20,9 @@ from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
+from elastocal.validation.left_out import certain_loss, left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -46,7 +49,8 @@ class Step:
     Attributes
     ----------
     name : str
-    kind : {"frames", "declared", "effect"}
+    kind : {"frames", "declared", "effect", "kept"}
+        Of the last, "kept" where frames alone predict training poses better than what was fitted.
     fitted : Fit
         To the training poses.
     """
@@ -153,15 +157,42 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
+    lost: list[str] = []
     if found:
         if not found.conclusion.best.named:
             steps[-1] = replace(steps[-1], fitted=final)
+        lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
+        found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
             steps += _effect_steps(case, declared, final, found)
-    document = _document(case, noise, steps, final, found, known, settings, part.warnings)
+        elif lost and lost[0]:
+            kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
+            steps.append(Step("frames and targets, kept", "kept", kept))
+    document = _document(case, noise, steps, final, found, known, settings, [*part.warnings, *filter(None, lost)])
     left_out = entries_of(errors, whole, held_out=False)
     document |= {"gross_errors": left_out, "warnings": [*document["warnings"], *warnings_of(left_out)]}
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+
+
+def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
+    """A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
+
+    Of the declared model and, if it is given, that with effects; nothing where the last holds.
+    """
+    found: list[str] = []
+    for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
+        numbers, words = fitted.residual.size, ""
+        if numbers < settings.numbers_a_parameter * effective_parameters(fitted):
+            mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
+            if certain_loss(mine, others):
+                rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
+                words = (
+                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
+                    f" targets alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the"
+                    f" {name} is not kept"
+                )
+        found.append(words)
+    return found if found[-1] else []
 
 
 def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:
@@ -195,7 +226,7 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
     if named:
         final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
     else:
-        final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
+        final = fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
     return Evidence(problem, found, alarm, conclusion, adopted), final
 
@@ -266,6 +297,7 @@ def _document(
         "noise": _noise_facts(noise, final.noise),
         "misfit": misfit,
         "heldout": None,
+        "kept": steps[-1].kind.replace("kept", "frames"),
         "compliance_urad_per_Nm": _compliances(declared, final, springs),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),

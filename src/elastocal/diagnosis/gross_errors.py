@@ -186,8 +186,7 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
     if not isinstance(products, Products):
         return ~kept
     rows = products.rows
-    owned = [(owner, parameter) for owner, parameter in about.parameters if owner not in problem.candidates]
-    deviation = prior_deviations(about, [p for _, p in owned], [owner for owner, _ in owned], problem.declared_size)
+    deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
     sizes = np.sqrt(np.exp(scale_weights(settings.scales, settings)) @ np.square(settings.scales))
     declared = (rows.declared * deviation).reshape(about.residual.size, -1)
     columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)

@@ -171,9 +171,10 @@ def heldout_errors(
     there = [placed(step.fitted, case, held_out) for step in steps]
     errors = [position_errors(model, estimate, held_out.observations) for model, estimate in there]
     before = next(number for number, step in enumerate(steps) if step.kind == "declared")
-    after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
+    after = len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
+    of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
     floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
@@ -186,12 +187,13 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
-    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (0, before, after)]
     outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "before": ends[0],
-        "after": ends[1],
+        "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": ends[1],
+        "after": ends[2],
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,

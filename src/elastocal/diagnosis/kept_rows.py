@@ -9,9 +9,10 @@ import numpy as np
 
 from elastocal.diagnosis.gross_errors import gross_errors, improbable
 from elastocal.diagnosis.linearize import linearized
-from elastocal.fitting.least_squares import evaluated, fit
+from elastocal.fitting.least_squares import evaluated
 from elastocal.fitting.noise_estimation import estimated_noise
 from elastocal.fitting.observations import measured_in, select_states, spread_poses
+from elastocal.fitting.tolerances import fit_declared
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.settings import Settings
@@ -37,7 +38,7 @@ def fitted_to(case: Case, kept: np.ndarray, last: Kept | None = None) -> Kept:
         return last
     part = case.select(kept)
     noise, warnings = estimated_noise(part)
-    return Kept(part, kept, noise, warnings, fit(part.model, part.observations, noise))
+    return Kept(part, kept, noise, warnings, fit_declared(part.model, part.observations, noise))
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:
@@ -56,6 +57,6 @@ def first_kept(case: Case, settings: Settings) -> Kept:
         return whole
     few[observations.state[apart]] = True
     some = select_states(observations, few)
-    about = evaluated(case.model, some, part.noise, part.declared.estimate)
+    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
     taken = improbable(linearized(about, some, candidates, settings), settings)
     return fitted_to(case, ~measured_in(measurements, some, taken), whole)

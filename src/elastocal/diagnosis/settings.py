@@ -49,9 +49,6 @@ class Settings:
     scale_spread: tuple[float, float] = _setting(
         (3.0, 0.7), "spread of the logarithm of the size below and above the center: small effects are common"
     )
-    declared_sizes: tuple[float, ...] = _setting(
-        (0.1, 0.3, 1.0, 3.0, 10.0), "sizes of declared geometry: measured robots exceed data-sheet tolerances tenfold"
-    )
     pose_steps: tuple[float, ...] = _setting(
         (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 16.0),
         "grid of the error common to the measurements of a pose, in standard errors of a joint angle from one pose",
@@ -100,6 +97,11 @@ class Settings:
         0.02,
         "relative difference between the mean square that an exact fit leaves and that which the linear problem promised, below"
         " which the problem was linear enough: it changes the log likelihood of a hundred measurements by one",
+    )
+    numbers_a_parameter: float = _setting(
+        10.0,
+        "numbers measured for each effective parameter below which the model is cross-validated against frames alone: above,"
+        " errors of poses left out exceed those of the fit by less than a tenth",
     )
     beam: int = _setting(4, "models that a round of the search extends; more change probabilities by less than 1 %")
     patience: int = _setting(3, "rounds without a better model after which the search ends")

@@ -20,6 +20,7 @@ from elastocal.diagnosis.linearize import linearized, searched_part
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
 from elastocal.validation.fitted_range import repeat_warnings
 
@@ -49,10 +50,11 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     -------
     dict
         ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
-        measurements, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
-        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters`` and ``held`` (those that are not
-        identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
-        ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``.
+        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad);
+        ``faults`` (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``,
+        ``effective_parameters`` (without what priors decide) and ``held`` (those that are not identifiable); ``compliance``
+        (value, relative standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate
+        effects, by reason); ``suspicious``, sentences; ``diagnosable``.
 
     Raises
     ------
@@ -67,7 +69,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
     decisive = any(fault.decisive for fault in found)
-    facts: dict[str, Any] = {
+    facts: dict[str, Any] = _identified(declared) | {
         "campaign": campaign.name,
         "robot": campaign.robot.name,
         "joints": campaign.robot.joints,
@@ -78,6 +80,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "held_out": {"poses": _poses(held_out.session, held_out.pose)},
         "states": len(states),
         "measurements": len(training),
+        "numbers": declared.residual.size,
         "loads": sorted({int(load) for load in states.load}),
         "repeats": int(states.repeats.max()),
         "sessions": len(np.unique(states.session)),
@@ -89,13 +92,12 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     }
     return (
         facts
-        | _identified(declared)
         | _testable(case, declared)
         | {
             "suspicious": [
                 *warnings,
                 *warnings_of(left_out),
-                *_suspicious(campaign, facts, case),
+                *_suspicious(campaign, facts, case, settings),
                 *repeat_warnings(training, held_out),
             ]
         }
@@ -110,6 +112,7 @@ def _identified(declared: Fit) -> dict[str, Any]:
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
     found: dict[str, Any] = {
         "parameters": int((~declared.held).sum()),
+        "effective_parameters": effective_parameters(declared),
         "held": [name for name, held in zip(named, declared.held, strict=True) if held],
     }
     if declared.model.identifies_compliance:
@@ -130,8 +133,16 @@ def _testable(case: Case, declared: Fit) -> dict[str, Any]:
     return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
 
 
-def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case) -> list[str]:
+def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case, settings: Settings) -> list[str]:
     found, states = [], case.observations.states
+    effective, poses = facts["effective_parameters"], facts["training"]["poses"]
+    least = int(np.ceil(poses * settings.numbers_a_parameter * effective / facts["numbers"]))
+    if least > poses:
+        found.append(
+            f"{poses} poses are few for {facts['parameters']} parameters, of which they determine about {effective:.0f}, by"
+            f" {facts['numbers']} numbers: other poses will be off by more than these. Measure about {least} poses to fit, or"
+            " orientations too, or declare fewer errors"
+        )
     if facts["repeats"] == 1:
         found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
     if facts["held_out"]["poses"] < FEWEST_HELD_OUT:
