@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import calibrated_of
+from elastocal.application.scope import calibrated_on
 from elastocal.campaigns.columns import columns_of
 from elastocal.errors import InputError
 from elastocal.fitting.case import case_from, noise_from
@@ -97,8 +97,16 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str |
     model, estimate = step_model(case, facts, steps, last)
     covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
     noise = noise_from({"noise": facts["steps"][last]["noise"]})
-    calibrated = calibrated_of(case.campaign.robot, model, estimate, covariance, noise)
+    calibrated = calibrated_on(case, model, estimate, covariance, noise)
     return Diagnosed(name, case, calibrated, facts["document"])
+
+
+def raised_by_held_out(found: Diagnosed, verdict: Mapping[str, Any]) -> Diagnosed:
+    """A diagnosed campaign whose predicted errors are as large as verdict.json says after a look at held-out poses."""
+    stated, scope = verdict.get("accuracy"), found.calibrated.scope
+    if not stated or scope is None:
+        return found
+    return replace(found, calibrated=replace(found.calibrated, scope=replace(scope, factor=stated["held_out_factor"])))
 
 
 def _described(descriptions: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -1,0 +1,159 @@
+"""From a fit to what its errors mean: frame and freedoms, effects that no command contains, and what held-out poses say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.application.accuracy import BASE, ROBOT, Scope, absorbed, placement, predicted
+from elastocal.application.calibrated import (
+    OperatingConditions,
+    at_end_effector,
+    calibrated_of,
+    forward,
+    moves_robot,
+    nominal_forward,
+    observations_of,
+    pose_sensitivities,
+    square_root,
+)
+from elastocal.fitting.displacement import conditions, displaced_coordinates
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.noise import hidden_repeatability
+from elastocal.fitting.parameters import parameters
+from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.validation.bootstrap_t import drawn_poses, risk_above
+from elastocal.validation.held_out import position_residuals
+from elastocal.validation.placing import placed
+
+if TYPE_CHECKING:
+    from elastocal.application.accuracy import Accuracy
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import States
+
+REGION = "the poses and loads that were fitted"
+# Of a campaign, over which its accuracy is stated: more change no digit.
+_MOST_STATES = 1000
+# How sure held-out poses must be that the prediction is too small before they raise it: of honest campaigns one in twenty is.
+_SURE = 0.95
+_REPLICATES, _SEED = 1000, 1
+
+
+def calibrated_on(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
+    """A calibrated robot from a model that was fitted to a case, as `calibrated_of`, that knows what its errors mean.
+
+    Where the sensor hides how well each joint repeats, all are taken to repeat alike, by what the repeats leave possible.
+    """
+    robot = case.campaign.robot
+    if noise.source == "repeats" and not noise.joint_rad.any():
+        alike = hidden_repeatability(model, estimate, case.campaign.measurements)
+        noise = replace(noise, joint_rad=np.full(robot.joints, alike))
+    found = calibrated_of(robot, model, estimate, covariance, noise)
+    return replace(found, scope=scope_of(found, model, estimate, covariance, case.observations.states))
+
+
+def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> Scope:
+    """The scope of a fit with all of its effects to some states: in the base's frame where that was declared."""
+    robot, end = calibrated.robot, model.sites.chain.end_effector.name
+    there = [target for target in model.targets if target.point == end]
+    offset = bool(there) and all(target.offset_m is None for target in there)
+    free = np.repeat([model.fitted_frames, model.fitted_frames, offset, offset and model.rows == 6], 3)
+    reported, operating = robot.reported_angles(states.joint_angles), conditions_in(calibrated, states)
+    position, rotation = forward(calibrated, reported, operating)
+    none = np.zeros((12, len(calibrated.covariance)))
+    scope = Scope(ROBOT if model.fitted_frames else BASE, position.mean(axis=0), none, np.zeros(12), offset)
+    columns = placement(scope, position, rotation)
+    before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
+    scope = replace(
+        scope,
+        absorbed=absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
+        absorbed_before=absorbed(columns, before, free)[:, 0],
+    )
+    dropped = tuple(effect.key for effect in model.effects if not moves_robot(effect))
+    if not dropped:
+        return scope
+    rms, worst = 0.0, 0.0
+    for some in _epochs(states, model.fitted_frames):
+        fields = _left_out(model, estimate, covariance, some)
+        squares = ((fields - columns @ absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
+        rms, worst = max(rms, float(np.sqrt(squares.mean()))), max(worst, float(np.sqrt(squares.max())))
+    return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
+
+
+def conditions_in(calibrated: CalibratedRobot, states: States) -> OperatingConditions:
+    """Those of states; senses of approach as the controller counts them."""
+    back = np.linalg.inv(calibrated.robot.reported_matrix)
+    approach = None if states.approach is None else np.sign(states.approach @ back.T)
+    return OperatingConditions(states.wrench, approach, states.time_s, states.temperature_c)
+
+
+def campaign_poses(calibrated: CalibratedRobot, states: States) -> tuple[np.ndarray, OperatingConditions]:
+    """Commands (N, n) and conditions of a campaign over which its accuracy is stated: all, or evenly some of very many."""
+    chosen = np.unique(np.linspace(0, len(states) - 1, min(len(states), _MOST_STATES)).astype(int))
+    return calibrated.robot.reported_angles(states.joint_angles[chosen]), conditions_in(calibrated, states).part(chosen)
+
+
+def campaign_accuracy(calibrated: CalibratedRobot, states: States) -> Accuracy:
+    """Predicted accuracy over the poses of a campaign: what it says of its robot as a whole."""
+    return predicted(calibrated, *campaign_poses(calibrated, states)).accuracy(REGION)
+
+
+def judged_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
+    """A calibrated robot whose predicted errors are as large as its held-out poses say, where these contradict them.
+
+    Mean squares over targets at the end effector, the sensor's noise taken off as squares; that the mean square of all poses is
+    larger than predicted must be sure by the bootstrap-t over poses.
+    """
+    end = case.campaign.robot.chain.end_effector.name
+    seen = held_out.observations
+    mine = np.array([target.point == end for target in held_out.campaign.targets])[seen.target]
+    if final.noise.source == "residual" or not mine.any() or calibrated.scope is None:
+        return calibrated
+    states = seen.states
+    found = predicted(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
+    expected = (found.parameters_m**2 + found.repeated_m**2)[seen.state[mine]].mean()
+    sensor = 3.0 * final.noise.position_m**2 * (1.0 / states.repeats[seen.state[mine]]).mean()
+    off = (position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1)
+    pose = np.unique(seen.cluster[mine], return_inverse=True)[1]
+    squares, counts = np.bincount(pose, off), np.bincount(pose).astype(float)
+    weights = drawn_poses(len(counts), _REPLICATES, np.random.default_rng(_SEED))
+    if not risk_above(squares, counts, weights, float(np.log(expected + sensor))) > _SURE:
+        return calibrated
+    return replace(calibrated, scope=replace(calibrated.scope, factor=float(np.sqrt((off.mean() - sensor) / expected))))
+
+
+def _epochs(states: States, placed_anew: bool) -> list[States]:
+    """The campaign as it went and, where nobody places the base anew, as if all of it had been at its end."""
+    if placed_anew:
+        return [states]
+    last = {
+        name: None if values is None else np.full_like(values, values.max())
+        for name, values in (("row", states.row), ("time_s", states.time_s))
+    }
+    return [states, replace(states, **last)]
+
+
+def _left_out(model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> np.ndarray:
+    """What effects that are not commanded do to the end effector, (S, 6, 1 + D): all of it, and a factor of its covariance."""
+    whole = at_end_effector(model, estimate)
+    states = replace(states, session=np.zeros_like(states.session))
+    kept = [moves_robot(effect) for effect in model.effects]
+    values = tuple(value if moves else 0.0 * value for moves, value in zip(kept, estimate.coefficients, strict=True))
+    ends = [_end_effector(*each, states) for each in (whole, (whole[0], replace(whole[1], coefficients=values)))]
+    keys = {effect.key for effect, moves in zip(model.effects, kept, strict=True) if not moves}
+    ours, theirs = (np.array([owner in keys for owner, _ in parameters(*each)]) for each in (whole, (model, estimate)))
+    line = linearize(*whole, observations_of(states), conditions(*whole, states))
+    spread = line.sensitivities[..., ours] @ square_root(covariance[np.ix_(theirs, theirs)])
+    return np.concatenate([pose_differences(*ends[0], *ends[1])[..., None], spread], axis=2)
+
+
+def _end_effector(model: Model, estimate: Estimate, states: States) -> tuple[np.ndarray, np.ndarray]:
+    chain = model.sites.chain
+    return poses(chain, displaced_coordinates(model, estimate, conditions(model, estimate, states)), chain.end_effector)
