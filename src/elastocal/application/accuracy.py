@@ -1,9 +1,10 @@
 """What is meant by the accuracy of a robot that is commanded by its calibrated model: one definition for all commands.
 
-The error at a pose is the real robot less the commanded model. Predicted, it has three parts: what the uncertainty of the
-parameters leaves; the repeatability of the joints and the error that each new pose has of its own; and all of what the fit
+The error at a pose is the real robot less the commanded model. Predicted, it has four parts: what the uncertainty of the
+parameters leaves; the repeatability of the joints and the error that each new pose has of its own; what the form of the model
+leaves open, by what other models of the diagnosis predict, or held-out poses where these show more; and all of what the fit
 ascribes to effects that no command contains, such as a step of the set-up, for nothing shows that they leave the robot alone.
-Where held-out poses contradict the first two, these grow until they do not. Nothing of the tracker's noise is in it.
+Nothing of the tracker's noise is in it.
 
 It is stated in a frame. `BASE`, that of the declared base, where measurements were taken in it. `ROBOT`, the robot's own, is
 after the best rigid placement of the base over the campaign's poses [1]_. In both, where the offset of the target on the end
@@ -37,6 +38,10 @@ PREDICTED, MEASURED = "predicted", "measured"
 CONFIDENCE = 0.95
 # Robots drawn from what the fit leaves possible: so many tell a risk of 5 % to half a percent.
 _DRAWS, _SEED = 2000, 1
+# Over how many independent laws an error of form spreads: one joint's harmonic, or two of a joint and its neighbour.
+_LAWS = 3
+# Mean square at the worst pose over that of all, of a smooth error in three directions over some hundred poses.
+_WORST_OF_FORM = 4.0
 # Poses at a time, of so many draws.
 _AT_ONCE = 200
 FRAMES = {ROBOT: "in the robot's own frame (after the best placement of its base)", BASE: "in the frame of the declared base"}
@@ -63,10 +68,10 @@ class Accuracy:
         Whether a constant offset at the end effector counts as no error.
     left_out : tuple of str
         Effects of the fit that no command contains: what they were fitted to counts as error.
-    left_out_m : float
-        Of `rms_m`, by those.
-    held_out_factor : float
-        By which held-out poses raised it.
+    left_out_m, form_m : float
+        Of `rms_m`, by those, and by what the form of the model leaves open.
+    contradicted : bool
+        Whether held-out poses showed that the form leaves more open than the fitted poses say.
     confidence : float
     """
 
@@ -82,7 +87,8 @@ class Accuracy:
     offset_removed: bool = False
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
-    held_out_factor: float = 1.0
+    form_m: float = 0.0
+    contradicted: bool = False
     confidence: float = CONFIDENCE
 
     def document(self) -> dict[str, Any]:
@@ -112,8 +118,10 @@ class Scope:
     left_out : tuple of str
     left_out_m, left_out_worst_m : float
         What effects that are not commanded contribute at the campaign's poses: RMS, and at the worst.
-    factor : float
-        By which held-out poses raise predicted errors.
+    form_m : float
+        What the form of the model leaves open there, RMS: other models predict otherwise, and so may the robot.
+    contradicted : bool
+        Whether held-out poses showed that to be more than other models say.
     """
 
     frame: str
@@ -124,7 +132,8 @@ class Scope:
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
     left_out_worst_m: float = 0.0
-    factor: float = 1.0
+    form_m: float = 0.0
+    contradicted: bool = False
 
     def document(self) -> dict[str, Any]:
         """As JSON."""
@@ -150,7 +159,7 @@ class Prediction:
     std_rad : ndarray (N,)
         Of orientation, by both.
     error_m : ndarray (N,)
-        By both and by what is not commanded.
+        By both, by the form of the model and by what is not commanded.
     bound_m : ndarray (N,)
         Below which each error is with `CONFIDENCE`.
     rms_m, worst_m : ndarray (draws,)
@@ -183,7 +192,8 @@ class Prediction:
             scope.offset_removed,
             scope.left_out,
             scope.left_out_m,
-            scope.factor,
+            scope.form_m,
+            scope.contradicted,
         )
 
 
@@ -199,9 +209,9 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         part = slice(start, start + _AT_ONCE)
         angles, under = reported_angles[part], operating.part(part)
         columns = placement(scope, *forward(calibrated, angles, under))
-        moved = scope.factor * (pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed) @ root
+        moved = (pose_sensitivities(calibrated, angles, under) - columns @ scope.absorbed) @ root
         jacobian = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
-        apart = scope.factor * jacobian * repeated
+        apart = jacobian * repeated
         parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
         off = moved[:, :3] @ drawn + apart[:, :3] @ stream.standard_normal((len(angles), apart.shape[2], _DRAWS))
         squares = (off**2).sum(axis=1)
@@ -209,15 +219,17 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         worst = np.maximum(worst, squares.max(axis=0))
     covariances = [np.concatenate(each) for each in zip(*parts, strict=True)]
     ours, own = (np.diagonal(covariance, axis1=1, axis2=2) for covariance in covariances)
-    left_out = scope.left_out_m**2
+    left_out, form = scope.left_out_m**2, scope.form_m**2
+    # Errors of form go with few laws over all poses: what is open is how large they are, more than where.
+    unknown = form * stream.chisquare(_LAWS, _DRAWS) / _LAWS
     return Prediction(
         np.sqrt(ours[:, :3].sum(axis=1)),
         np.sqrt(own[:, :3].sum(axis=1)),
         np.sqrt((ours + own)[:, 3:].sum(axis=1)),
-        np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out),
-        np.sqrt(quantile_of_length(sum(covariances)[:, :3, :3]) ** 2 + left_out),
-        np.sqrt(total / len(reported_angles) + left_out),
-        np.sqrt(worst + scope.left_out_worst_m**2),
+        np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out + form),
+        np.sqrt(quantile_of_length(sum(covariances)[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out),
+        np.sqrt(total / len(reported_angles) + left_out + unknown),
+        np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
         scope,
     )
 
@@ -264,7 +276,7 @@ def absorbed(columns: np.ndarray, field: np.ndarray, free: np.ndarray) -> np.nda
     for rows, first, last in ((slice(0, 3), 0, 9), (slice(3, 6), 9, 12)):
         mine = np.flatnonzero(free[first:last]) + first
         if len(mine):
-            left = (field - columns @ found)[:, rows].reshape(-1, field.shape[2])
+            left = (field - columns @ found)[:, rows].reshape(3 * len(field), field.shape[2])
             found[mine] = np.linalg.lstsq(columns[:, rows, mine].reshape(len(left), -1), left, rcond=None)[0]
     return found
 
@@ -320,8 +332,9 @@ def accuracy_sentence(accuracy: Accuracy) -> str:
     if accuracy.left_out:
         names = ", ".join(accuracy.left_out)
         text += f" {millimetres(accuracy.left_out_m)} of it stand for {names}, which no command contains."
-    if accuracy.held_out_factor > 1.0:
-        text += f" Held-out poses were missed by more than the fit says: all is {accuracy.held_out_factor:.2f} times as large."
+    if accuracy.form_m:
+        why = "held-out poses were missed by more than the fit says" if accuracy.contradicted else "other models fit as well"
+        text += f" {millimetres(accuracy.form_m)} of it stand for the form of the model: {why}."
     return text
 
 

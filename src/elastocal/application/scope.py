@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.accuracy import BASE, ROBOT, Scope, absorbed, placement, predicted
+from elastocal.application.accuracy import BASE, ROBOT, Scope, absorbed, placement, predicted, scope_in
 from elastocal.application.calibrated import (
     OperatingConditions,
     at_end_effector,
@@ -25,7 +25,6 @@ from elastocal.fitting.noise import hidden_repeatability
 from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
 from elastocal.mechanics.pose_differences import pose_differences
-from elastocal.validation.bootstrap_t import drawn_poses, risk_above
 from elastocal.validation.held_out import position_residuals
 from elastocal.validation.placing import placed
 
@@ -43,7 +42,7 @@ REGION = "the poses and loads that were fitted"
 _MOST_STATES = 1000
 # How sure held-out poses must be that the prediction is too small before they raise it: of honest campaigns one in twenty is.
 _SURE = 0.95
-_REPLICATES, _SEED = 1000, 1
+_SEED = 1
 
 
 def calibrated_on(case: Case, model: Model, estimate: Estimate, covariance: np.ndarray, noise: Noise) -> CalibratedRobot:
@@ -105,28 +104,32 @@ def campaign_accuracy(calibrated: CalibratedRobot, states: States) -> Accuracy:
     return predicted(calibrated, *campaign_poses(calibrated, states)).accuracy(REGION)
 
 
+def with_form(calibrated: CalibratedRobot, form_m: float, contradicted: bool = False) -> CalibratedRobot:
+    """A calibrated robot of which it is known how much the form of its model leaves open."""
+    return replace(calibrated, scope=replace(scope_in(calibrated), form_m=form_m, contradicted=contradicted))
+
+
 def judged_by_held_out(calibrated: CalibratedRobot, final: Fit, case: Case, held_out: Case) -> CalibratedRobot:
     """A calibrated robot whose predicted errors are as large as its held-out poses say, where these contradict them.
 
-    Mean squares over targets at the end effector, the sensor's noise taken off as squares; that the mean square of all poses is
-    larger than predicted must be sure by the bootstrap-t over poses.
+    By the mean square over targets at the end effector: it must be larger than those of robots and of noise that are drawn as
+    predicted. What it is more counts as error of the model's form. Nothing changes where the noise is not known.
     """
     end = case.campaign.robot.chain.end_effector.name
-    seen = held_out.observations
+    seen, states = held_out.observations, held_out.observations.states
     mine = np.array([target.point == end for target in held_out.campaign.targets])[seen.target]
-    if final.noise.source == "residual" or not mine.any() or calibrated.scope is None:
+    if final.noise.source == "residual" or not mine.any():
         return calibrated
-    states = seen.states
+    state = seen.state[mine]
     found = predicted(calibrated, calibrated.robot.reported_angles(states.joint_angles), conditions_in(calibrated, states))
-    expected = (found.parameters_m**2 + found.repeated_m**2)[seen.state[mine]].mean()
-    sensor = 3.0 * final.noise.position_m**2 * (1.0 / states.repeats[seen.state[mine]]).mean()
-    off = (position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1)
-    pose = np.unique(seen.cluster[mine], return_inverse=True)[1]
-    squares, counts = np.bincount(pose, off), np.bincount(pose).astype(float)
-    weights = drawn_poses(len(counts), _REPLICATES, np.random.default_rng(_SEED))
-    if not risk_above(squares, counts, weights, float(np.log(expected + sensor))) > _SURE:
+    sensor = final.noise.position_m**2 / states.repeats[state]
+    noise = sensor @ np.random.default_rng(_SEED).chisquare(3, (len(state), len(found.rms_m))) / len(state)
+    square = float((position_residuals(*placed(final, case, held_out), seen)[mine] ** 2).sum(axis=1).mean())
+    if (found.rms_m**2 + noise < square).mean() <= _SURE:
         return calibrated
-    return replace(calibrated, scope=replace(calibrated.scope, factor=float(np.sqrt((off.mean() - sensor) / expected))))
+    scope = scope_in(calibrated)
+    known = (found.error_m[state] ** 2).mean() - scope.form_m**2
+    return with_form(calibrated, float(np.sqrt(square - 3.0 * sensor.mean() - known)), contradicted=True)
 
 
 def _epochs(states: States, placed_anew: bool) -> list[States]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.accuracy import predicted
 from elastocal.application.calibrated import OperatingConditions, calibrated_from, nominal_forward
 from elastocal.application.compensation import OK, corrected
 from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, refined
@@ -27,7 +28,7 @@ from elastocal.effects.catalogue import effects as catalogue
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 from elastocal.plant.campaigns import Design, schedule_of, usual_force_N
@@ -65,7 +66,7 @@ _TRIES = 200
 _STEPS = 5
 # Effects by the approach, which no command of a path states.
 _BY_APPROACH = ("hysteresis",)
-_DESIGN = Design(declared=ERRORS_OF_GEOMETRY)
+CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
 
 
 @dataclass(frozen=True)
@@ -119,38 +120,40 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
         One row for each wanted pose and model, columns as `schema` has them.
     """
     plant, _ = hidden_robot(robot_file, seed, [effect])
-    training = _measured(plant, robot_file, robots_folder, seed)
+    training, held_out = measured_cases(plant, robot_file, robots_folder, CAMPAIGN, seed)
     found = diagnose(training, Settings(), seed)
     robot = training.campaign.robot
-    wanted = _wanted(robot, plant, seed)
+    wanted = wanted_poses(robot, plant, seed)
     operating = OperatingConditions(wanted.wrench)
     rows = []
     models = {
         GEOMETRY: calibrated_from(_geometry(training, found), replace(robot, masses=())),
         DECLARED: calibrated_from(found.declared, robot),
-        FOUND: calibrated_from(found.final, robot),
+        FOUND: calibrated_by(found, held_out),
     }
     for name in MODELS:
         if name == UNCORRECTED:
-            commands, predicted, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
+            commands, stated, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
         elif name == TRUE:
             commands, good = _by_plant(plant, robot, wanted, seed)
-            predicted = np.zeros(len(wanted.part))
+            stated = np.zeros(len(wanted.part))
         else:
-            commands, predicted, good = _by_model(models[name], wanted, operating)
-        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": predicted, "corrected": good})
+            commands, stated, good = _by_model(models[name], wanted, operating)
+        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good})
     named = effect in {entry["name"] for entry in found.document["effects"] if entry["adopted"]}
     head = {"effect": effect, "seed": seed, "verdict": found.document["verdict"], "named": named}
     count = len(wanted.part)
     return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
 
 
-def _measured(plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, seed: int) -> Case:
-    """The training part of a campaign of the plant, by way of its folder."""
-    schedule = schedule_of(plant.arm, _DESIGN, seed)
+def measured_cases(
+    plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, design: Design, seed: int
+) -> tuple[Case, Case]:
+    """Training and held-out part of a campaign of the plant, by way of its folder."""
+    schedule = schedule_of(plant.arm, design, seed)
     with tempfile.TemporaryDirectory() as folder:
-        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, _DESIGN, schedule, declared_masses(plant.arm))
-        return cases_in(folder, robots_folder)[0]
+        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, design, schedule, declared_masses(plant.arm))
+        return cases_in(folder, robots_folder)
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -165,7 +168,8 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     return fit(model, select_states(case.observations, unloaded), found.declared.noise)
 
 
-def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+    """Poses of all parts that a robot shall reach: random ones without and under load, and a path of milling."""
     draws = stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
     force = usual_force_N(plant.arm)
@@ -228,7 +232,7 @@ def _by_model(
     calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    return found.joint_angles, np.hypot(found.std_m, found.repeatability_m), found.status == OK
+    return found.joint_angles, predicted(calibrated, found.joint_angles, operating).error_m, found.status == OK
 
 
 def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:

@@ -30,11 +30,11 @@ def diagnosed_campaign(folder: Path) -> Diagnosed:
         As `load_diagnosed`.
     """
     from elastocal.io.json_files import read_json
-    from elastocal.loop.calibrated_files import load_diagnosed, raised_by_held_out
+    from elastocal.loop.calibrated_files import judged_as, load_diagnosed
 
     found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
     verdict = report_file(found.name, "verdict.json")
-    return found if verdict is None else raised_by_held_out(found, read_json(verdict))
+    return found if verdict is None else judged_as(found, read_json(verdict))
 
 
 def report_file(name: str, file: str) -> Path | None:

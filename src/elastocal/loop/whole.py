@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out
+from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
+    from elastocal.application.calibrated import CalibratedRobot
     from elastocal.diagnosis.diagnose import Diagnosis
     from elastocal.diagnosis.judge import Verdict
 
@@ -60,15 +61,21 @@ def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings
     return judged(diagnose(training, settings or Settings(), seed), held_out, seed).document
 
 
+def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
+    """The robot that a diagnosis found, with all that is known of its errors."""
+    case, final = diagnosis.case, diagnosis.final
+    found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
+    found = with_form(found, diagnosis.document["other_models_m"] or 0.0)
+    return judged_by_held_out(found, final, case, held_out)
+
+
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     """The verdict of a diagnosis on held-out poses, with the accuracy that a corrected robot is predicted to have.
 
     None where the data are at fault: nothing is known of the robot then.
     """
-    verdict, case, final = judge(diagnosis, held_out, seed), diagnosis.case, diagnosis.final
+    verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
     accuracy = None
     if not any(effect["family"] == "data" for effect in verdict.document["effects"]):
-        found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
-        found = judged_by_held_out(found, final, case, held_out)
-        accuracy = campaign_accuracy(found, case.observations.states).document()
+        accuracy = campaign_accuracy(calibrated_by(diagnosis, held_out), case.observations.states).document()
     return replace(verdict, document=verdict.document | {"accuracy": accuracy})

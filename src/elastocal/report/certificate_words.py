@@ -20,6 +20,7 @@ _SHARES = {
     "joint_offset": "joint offsets",
     "link_geometry": "link geometry",
     "uncorrected": "no correction at all",
+    "form of the model": "form of the model",
     "not commanded": "effects that no command contains",
 }
 _STEPS = {

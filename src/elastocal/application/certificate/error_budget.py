@@ -27,8 +27,8 @@ class Share:
     Attributes
     ----------
     name : str
-        An effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY` or
-        `NOT_COMMANDED`.
+        An effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY`,
+        `FORM` or `NOT_COMMANDED`.
     rms_m : float
     low_m, high_m : float or None
         95 % interval by the covariance of the parameters; None where the line has none.
@@ -41,7 +41,7 @@ class Share:
 
 
 TOTAL, UNCERTAINTY, REPEATABILITY = "uncorrected", "uncertainty of the parameters", "repeatability"
-NOT_COMMANDED = "not commanded"
+FORM, NOT_COMMANDED = "form of the model", "not commanded"
 
 
 def error_budget(
@@ -94,10 +94,11 @@ def error_budget(
             (TOTAL, before_m(calibrated, whole, turned, off)),
             (UNCERTAINTY, rest.parameters_m),
             (REPEATABILITY, rest.repeated_m),
+            (FORM, np.full(1, rest.scope.form_m)),
             (NOT_COMMANDED, np.full(1, rest.scope.left_out_m)),
         )
     )
-    return [total, *shares, *(end for end in ends if end.name != NOT_COMMANDED or rest.scope.left_out)]
+    return [total, *shares, *(end for end in ends if end.rms_m or end.name not in (FORM, NOT_COMMANDED))]
 
 
 def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:
