@@ -38,10 +38,8 @@ PREDICTED, MEASURED = "predicted", "measured"
 CONFIDENCE = 0.95
 # Robots drawn from what the fit leaves possible: so many tell a risk of 5 % to half a percent.
 _DRAWS, _SEED = 2000, 1
-# Over how many independent laws an error of form spreads: one joint's harmonic, or two of a joint and its neighbour.
-_LAWS = 3
-# Mean square at the worst pose over that of all, of a smooth error in three directions over some hundred poses.
-_WORST_OF_FORM = 4.0
+# Square at the worst pose over the mean square of all, of an error of form: 7 to 9 on the plant.
+_WORST_OF_FORM = 9.0
 # Poses at a time, of so many draws.
 _AT_ONCE = 200
 FRAMES = {ROBOT: "in the robot's own frame (after the best placement of its base)", BASE: "in the frame of the declared base"}
@@ -122,6 +120,8 @@ class Scope:
         What the form of the model leaves open there, RMS: other models predict otherwise, and so may the robot.
     contradicted : bool
         Whether held-out poses showed that to be more than other models say.
+    repeated_freedom : float
+        Degrees of freedom of the square of the joints' repeatability; 0 where it is taken as known.
     """
 
     frame: str
@@ -134,6 +134,7 @@ class Scope:
     left_out_worst_m: float = 0.0
     form_m: float = 0.0
     contradicted: bool = False
+    repeated_freedom: float = 0.0
 
     def document(self) -> dict[str, Any]:
         """As JSON."""
@@ -203,6 +204,8 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
     root, repeated = square_root(calibrated.covariance), np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
     stream = np.random.default_rng(_SEED)
     drawn = stream.standard_normal((root.shape[1], _DRAWS))
+    freedom = scope.repeated_freedom
+    size = np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, _DRAWS)) if freedom else np.ones(_DRAWS)
     total, worst = np.zeros(_DRAWS), np.zeros(_DRAWS)
     parts = []
     for start in range(0, len(reported_angles), _AT_ONCE):
@@ -213,21 +216,21 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         jacobian = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
         apart = jacobian * repeated
         parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
-        off = moved[:, :3] @ drawn + apart[:, :3] @ stream.standard_normal((len(angles), apart.shape[2], _DRAWS))
+        off = moved[:, :3] @ drawn + apart[:, :3] @ (size * stream.standard_normal((len(angles), apart.shape[2], _DRAWS)))
         squares = (off**2).sum(axis=1)
         total += squares.sum(axis=0)
         worst = np.maximum(worst, squares.max(axis=0))
     covariances = [np.concatenate(each) for each in zip(*parts, strict=True)]
     ours, own = (np.diagonal(covariance, axis1=1, axis2=2) for covariance in covariances)
     left_out, form = scope.left_out_m**2, scope.form_m**2
-    # Errors of form go with few laws over all poses: what is open is how large they are, more than where.
-    unknown = form * stream.chisquare(_LAWS, _DRAWS) / _LAWS
+    # An error of form is one law over all poses: what is open is how large it is.
+    unknown = form * stream.standard_normal(_DRAWS) ** 2
     return Prediction(
         np.sqrt(ours[:, :3].sum(axis=1)),
         np.sqrt(own[:, :3].sum(axis=1)),
         np.sqrt((ours + own)[:, 3:].sum(axis=1)),
         np.sqrt((ours + own)[:, :3].sum(axis=1) + left_out + form),
-        np.sqrt(quantile_of_length(sum(covariances)[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out),
+        np.sqrt(quantile_of_length((covariances[0] + covariances[1])[:, :3, :3] + form / 3.0 * np.eye(3)) ** 2 + left_out),
         np.sqrt(total / len(reported_angles) + left_out + unknown),
         np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
         scope,

@@ -171,5 +171,5 @@ def calibrated_in(document: Mapping[str, Any], source: str) -> CalibratedRobot:
     )
     repeated = np.array(document["joint_repeatability"], float)
     noise = Noise("declared", 0.0, 0.0, repeated, pose_rad=float(document["pose_error_rad"]))
-    found = calibrated_of(robot, model, estimate, np.array(document["covariance"], float), noise)
-    return replace(found, scope=None if document["scope"] is None else scope_from(document["scope"]))
+    calibrated = calibrated_of(robot, model, estimate, np.array(document["covariance"], float), noise)
+    return replace(calibrated, scope=None if document["scope"] is None else scope_from(document["scope"]))

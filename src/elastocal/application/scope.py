@@ -50,12 +50,13 @@ def calibrated_on(case: Case, model: Model, estimate: Estimate, covariance: np.n
 
     Where the sensor hides how well each joint repeats, all are taken to repeat alike, by what the repeats leave possible.
     """
-    robot = case.campaign.robot
+    robot, freedom = case.campaign.robot, 0.0
     if noise.source == "repeats" and not noise.joint_rad.any():
-        alike = hidden_repeatability(model, estimate, case.campaign.measurements)
+        alike, freedom = hidden_repeatability(model, estimate, case.campaign.measurements)
         noise = replace(noise, joint_rad=np.full(robot.joints, alike))
     found = calibrated_of(robot, model, estimate, covariance, noise)
-    return replace(found, scope=scope_of(found, model, estimate, covariance, case.observations.states))
+    scope = scope_of(found, model, estimate, covariance, case.observations.states)
+    return replace(found, scope=replace(scope, repeated_freedom=freedom))
 
 
 def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> Scope:
@@ -78,6 +79,9 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     dropped = tuple(effect.key for effect in model.effects if not moves_robot(effect))
     if not dropped:
         return scope
+    if model.row_span is None and states.row is not None:
+        # Progress counts from the campaign's first row to its last, whichever of its states are asked.
+        model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
     rms, worst = 0.0, 0.0
     for some in _epochs(states, model.fitted_frames):
         fields = _left_out(model, estimate, covariance, some)
@@ -136,11 +140,8 @@ def _epochs(states: States, placed_anew: bool) -> list[States]:
     """The campaign as it went and, where nobody places the base anew, as if all of it had been at its end."""
     if placed_anew:
         return [states]
-    last = {
-        name: None if values is None else np.full_like(values, values.max())
-        for name, values in (("row", states.row), ("time_s", states.time_s))
-    }
-    return [states, replace(states, **last)]
+    row, time = (None if each is None else np.full_like(each, each.max()) for each in (states.row, states.time_s))
+    return [states, replace(states, row=row, time_s=time)]
 
 
 def _left_out(model: Model, estimate: Estimate, covariance: np.ndarray, states: States) -> np.ndarray:

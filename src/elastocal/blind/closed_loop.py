@@ -17,7 +17,7 @@ import numpy as np
 
 from elastocal.application.accuracy import predicted
 from elastocal.application.calibrated import OperatingConditions, calibrated_from, nominal_forward
-from elastocal.application.compensation import OK, corrected
+from elastocal.application.compensation import corrected
 from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, refined
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.rehearsal import ERRORS_OF_GEOMETRY, hidden_robot, reached
@@ -25,6 +25,7 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
+from elastocal.exchange.target_path import OK
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states

@@ -16,11 +16,12 @@ from statsmodels.stats.proportion import proportion_confint
 
 from elastocal.application.accuracy import absorbed, placement, predicted, scope_about
 from elastocal.application.calibrated import OperatingConditions
-from elastocal.application.compensation import OK, corrected
+from elastocal.application.compensation import corrected
 from elastocal.blind.closed_loop import CAMPAIGN, LOADED, MILLING, UNLOADED, measured_cases, wanted_poses
 from elastocal.blind.rehearsal import hidden_robot, reached
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
+from elastocal.exchange.target_path import OK
 from elastocal.loop.whole import calibrated_by
 from elastocal.plant.random_numbers import stream
 from elastocal.validation.conformity import PASS, predicted_conformity

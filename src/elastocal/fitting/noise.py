@@ -167,15 +167,16 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     return Noise("repeats", *sensors, values[rows // 3 :] * inflation, total, usual_m=usual)
 
 
-def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measurements) -> float:
-    """How well joints repeat, all alike, where the sensor hides each of them: root mean square of what repeats leave possible.
+def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[float, float]:
+    """How well joints repeat, all alike, where the sensor hides each of them: root mean square of what repeats leave possible,
+    and the degrees of freedom that its square has.
 
     rad; by the restricted likelihood of `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation of
-    a joint. 0 where there are too few repeats to say anything: then it is not known.
+    a joint. Zeros where there are too few repeats to say anything: then it is not known.
     """
     contrasts, jacobians = _contrasts(model, estimate, measurements)
     if sum(part.size for part in contrasts) < FEWEST:
-        return 0.0
+        return 0.0, 0.0
     data = [_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)]
     sensors, joints = model.rows // 3, model.sites.joints
     counts, squares = sum(part.count for part in data), np.sum([part.squares for part in data], axis=0)
@@ -190,7 +191,9 @@ def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measure
     likelihood = -np.array([minimize(value, start, (joint,), "L-BFGS-B", jac=True, bounds=bounds).fun for joint in deviations])
     # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
     weights = np.exp(likelihood - likelihood.max()) * deviations
-    return float(np.sqrt((weights * deviations**2).sum() / weights.sum()))
+    weights /= weights.sum()
+    mean = float(weights @ deviations**2)
+    return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
 
 
 def chosen_noise(
