@@ -9,9 +9,9 @@ from made_folders import made_folder, made_table
 from scipy.linalg import block_diag
 from synthetic import made_states
 
-from elastocal.application.accuracy import BASE, ROBOT
+from elastocal.application.accuracy import BASE, ROBOT, predicted
 from elastocal.application.calibrated import moves_robot
-from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, scope_of
+from elastocal.application.scope import calibrated_on, campaign_accuracy, conditions_in, judged_by_held_out, scope_of
 from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -60,6 +60,18 @@ def test_a_step_counts_as_all_of_it_in_the_base_frame_and_as_what_no_placement_t
     assert [each.left_out_m for each in whole] == pytest.approx([1e-3, 0.0], abs=1e-9)
     assert half[0].left_out_m == pytest.approx(1e-3, rel=1e-6)
     assert 2e-4 < half[1].left_out_m <= 5.1e-4
+
+
+def test_what_goes_with_a_condition_counts_as_error_where_a_command_does_not_state_it(fanuc):
+    calibrated = made_calibrated(fanuc, "joint_offset@2", "temperature_gradient@2[temperature]")
+    scope = scope_of(calibrated, calibrated.model, calibrated.estimate, calibrated.covariance, STATES)
+    known, angles = replace(calibrated, scope=scope), calibrated.robot.reported_angles(STATES.joint_angles)
+    names, there = [name for name, _, _ in scope.unstated], conditions_in(known, STATES)
+    assert names and set(names) <= {"time", "temperature"} and scope.left_out_m == 0.0
+    stated, unstated = (predicted(known, angles, each) for each in (there, replace(there, temperature_c=None)))
+    assert not stated.accuracy("").left_out and "not given" in unstated.accuracy("").left_out[0]
+    assert unstated.accuracy("").left_out_m == pytest.approx(np.linalg.norm([rms for _, rms, _ in scope.unstated]))
+    assert unstated.accuracy("").rms_m > stated.accuracy("").rms_m
 
 
 def test_an_unknown_offset_of_the_target_at_the_end_effector_is_no_error(fanuc):

@@ -18,7 +18,7 @@ References
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,6 +116,8 @@ class Scope:
     left_out : tuple of str
     left_out_m, left_out_worst_m : float
         What effects that are not commanded contribute at the campaign's poses: RMS, and at the worst.
+    unstated : tuple of (str, float, float)
+        The same of effects that go with something that a command may not state: "time", "temperature" or "approach".
     form_m : float
         What the form of the model leaves open there, RMS: other models predict otherwise, and so may the robot.
     contradicted : bool
@@ -132,6 +134,7 @@ class Scope:
     left_out: tuple[str, ...] = ()
     left_out_m: float = 0.0
     left_out_worst_m: float = 0.0
+    unstated: tuple[tuple[str, float, float], ...] = ()
     form_m: float = 0.0
     contradicted: bool = False
     repeated_freedom: float = 0.0
@@ -146,7 +149,8 @@ def scope_from(document: Mapping[str, Any]) -> Scope:
     """The inverse of `Scope.document`."""
     shapes = {"origin": (3,), "absorbed": (12, -1), "absorbed_before": (12,)}
     arrays = {name: np.array(document[name], float).reshape(shape) for name, shape in shapes.items()}
-    return Scope(**{**document, **arrays, "left_out": tuple(document["left_out"])})
+    unstated = tuple((name, rms, worst) for name, rms, worst in document["unstated"])
+    return Scope(**{**document, **arrays, "left_out": tuple(document["left_out"]), "unstated": unstated})
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ class Prediction:
 
 def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> Prediction:
     """Predicted errors of the corrected robot where it is commanded to joint angles (N, n)."""
-    scope, robot = scope_in(calibrated), calibrated.robot
+    scope, robot = _under(scope_in(calibrated), operating), calibrated.robot
     root, repeated = square_root(calibrated.covariance), np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
     stream = np.random.default_rng(_SEED)
     drawn = stream.standard_normal((root.shape[1], _DRAWS))
@@ -234,6 +238,18 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         np.sqrt(total / len(reported_angles) + left_out + unknown),
         np.sqrt(worst + scope.left_out_worst_m**2 + _WORST_OF_FORM * unknown),
         scope,
+    )
+
+
+def _under(scope: Scope, operating: OperatingConditions) -> Scope:
+    """A scope with what goes with conditions that are not given among what is left out."""
+    given = {"time": operating.time_s, "temperature": operating.temperature_c, "approach": operating.approach}
+    missing = [entry for entry in scope.unstated if given[entry[0]] is None]
+    return replace(
+        scope,
+        left_out=(*scope.left_out, *(f"what goes with the {name} (not given)" for name, _, _ in missing)),
+        left_out_m=float(np.linalg.norm([scope.left_out_m, *(rms for _, rms, _ in missing)])),
+        left_out_worst_m=float(np.linalg.norm([scope.left_out_worst_m, *(worst for _, _, worst in missing)])),
     )
 
 

@@ -71,8 +71,19 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
     scope = Scope(ROBOT if model.fitted_frames else BASE, position.mean(axis=0), none, np.zeros(12), offset)
     columns = placement(scope, position, rotation)
     before = pose_differences(*nominal_forward(robot, reported), position, rotation)[..., None]
+
+    def size(fields: np.ndarray) -> tuple[float, float]:
+        squares = ((fields - columns @ absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
+        return float(np.sqrt(squares.mean())), float(np.sqrt(squares.max()))
+
+    unstated = []
+    for name, without in (("time", "time_s"), ("temperature", "temperature_c"), ("approach", "approach")):
+        if any(name in effect.needs for effect in calibrated.model.effects):
+            other = forward(calibrated, reported, replace(operating, **{without: None}))
+            unstated.append((name, *size(pose_differences(position, rotation, *other)[..., None])))
     scope = replace(
         scope,
+        unstated=tuple(unstated),
         absorbed=absorbed(columns, pose_sensitivities(calibrated, reported, operating), free),
         absorbed_before=absorbed(columns, before, free)[:, 0],
     )
@@ -84,9 +95,8 @@ def scope_of(calibrated: CalibratedRobot, model: Model, estimate: Estimate, cova
         model = replace(model, row_span=(int(states.row.min()), int(states.row.max())))
     rms, worst = 0.0, 0.0
     for some in _epochs(states, model.fitted_frames):
-        fields = _left_out(model, estimate, covariance, some)
-        squares = ((fields - columns @ absorbed(columns, fields, free))[:, :3] ** 2).sum(axis=(1, 2))
-        rms, worst = max(rms, float(np.sqrt(squares.mean()))), max(worst, float(np.sqrt(squares.max())))
+        found = size(_left_out(model, estimate, covariance, some))
+        rms, worst = max(rms, found[0]), max(worst, found[1])
     return replace(scope, left_out=dropped, left_out_m=rms, left_out_worst_m=worst)
 
 
