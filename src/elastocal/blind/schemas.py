@@ -57,7 +57,7 @@ def closed_loop(joints: int) -> TableSchema:
             *(Column(f"q{j}", "float64", "rad", f"commanded angle of joint {j}") for j in range(1, joints + 1)),
             Column("reached_error_m", "float64", "m", "distance of where the robot came to rest from the wanted position"),
             Column("measured_error_m", "float64", "m", "the same as the tracker measures it"),
-            Column("predicted_std_m", "float64", "m", "by the model's covariance and the repeatability; 0 without a model"),
+            Column("predicted_std_m", "float64", "m", "root mean square error that the model states; 0 without a model"),
             Column("corrected", "bool", "", "whether the target could be corrected within limits and off singular postures"),
         ),
     )

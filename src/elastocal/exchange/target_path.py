@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
+# Of a corrected target, and where it is.
+OK, STATUS = "ok", "status"
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -112,6 +114,34 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     time, temperature = (None if column is None else column[:, 0] for column in single)
     rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
     return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
+
+
+@dataclass(frozen=True)
+class CorrectedTargets:
+    """What `correct` wrote: wanted poses in base axes, m, the joint angles (N, n) to command, rad, and each one's status."""
+
+    position: np.ndarray
+    rotation: np.ndarray
+    joint_angles: np.ndarray
+    status: np.ndarray
+
+
+def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
+    """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter.
+
+    Raises
+    ------
+    InputError
+        A column that is missing, or a cell that is no finite number.
+    """
+    read = read_text_table(path, lambda _: True, "comma", "point")
+    angles = tuple(f"q{j}" for j in range(1, joints + 1))
+    for name in (*_POSE, *angles, STATUS):
+        if name not in read.columns:
+            raise InputError(path, f"line {read.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
+    pose, commands = (np.column_stack([_numbers(read, name) for name in names]) for names in (_POSE, angles))
+    status = np.array([cell.strip() for cell in read.columns[STATUS]])
+    return CorrectedTargets(pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix(), commands, status)
 
 
 def _numbers(read: TextTable, name: str) -> np.ndarray:
