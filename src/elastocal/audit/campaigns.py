@@ -240,12 +240,12 @@ def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd
     # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
     scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
     columns = np.concatenate([stand.doubt_m for stand in stands])
-    stored = stored.loc[rows.index].to_numpy(float)
-    settling = np.linalg.lstsq(columns, (expected - stored).ravel(), rcond=None)[0]
+    picked = stored.loc[rows.index].to_numpy(float)
+    settling = np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0]
     expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)
     checked = f"residuals of the declared model, {len(rows)} rows"
     allowed = STEP_BACK + max(stand.left_m for stand in stands)
-    return [compared(file, checked, "pinocchio", stored, expected, 0.0, allowed)]
+    return [compared(file, checked, "pinocchio", picked, expected, 0.0, allowed)]
 
 
 def _document(run: Audited, campaign: str) -> dict[str, Any]:

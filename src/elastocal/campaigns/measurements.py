@@ -353,8 +353,8 @@ class MeasurementFile:
         if not sound.all():
             index = int(np.argmin(sound))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (index := beyond(name, values)) is not None:
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), BOUNDS[name].allowed)
+        if (place := beyond(name, values)) is not None:
+            raise self.cell_fault(place, name, shown(self.columns[name][place]), BOUNDS[name].allowed)
         return values
 
 
