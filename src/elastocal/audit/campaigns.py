@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from elastocal.audit.elastic import STATE, far_off
+from elastocal.audit.elastic import STATE, far_off, good_rows
 from elastocal.audit.equilibrium import Sagging, sagging
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.fits import SETTLED, STEP_BACK
@@ -169,7 +169,7 @@ def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
     -------
     list of Finding
     """
-    frame, model, found = run.table(file), sagging(run, campaign), []
+    frame, model, found = run.table(file).query("not gross_error"), sagging(run, campaign), []
     if not _session(run, campaign):
         table = f"reports/loop/{campaign}/before_after.csv"
         before_after, means = run.table(table), _means(run, campaign, frame)
@@ -204,7 +204,7 @@ class _Means:
 
 def _means(run: Audited, campaign: str, frame: pd.DataFrame) -> _Means:
     """Repeats are of one state, target and sense of approach; those that are far off count nowhere, as in a fit."""
-    parts = [run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")]
+    parts = [good_rows(run, campaign, part) for part in ("training", "held_out")]
     approach = [name for name in map(str, parts[0]) if name.startswith("approach")]
     rows = frame.merge(pd.concat([part.loc[~far_off(part), ["row", *approach]] for part in parts]), on="row")
     state = ["held_out", *STATE, *approach]
