@@ -236,11 +236,10 @@ def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd
     rows = frame.iloc[run.picked(file, len(frame))]
     stands = list(model.standing(rows))
     expected = rows[list("xyz")].to_numpy(float) - [stand.position for stand in stands]
-    stored = frame[["before_dx", "before_dy", "before_dz"]]
+    before = frame[["before_dx", "before_dy", "before_dz"]]
     # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
-    scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
-    columns = np.concatenate([stand.doubt_m for stand in stands])
-    stored = stored.loc[rows.index].to_numpy(float)
+    scatter = max(float(np.sqrt((before[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
+    columns, stored = np.concatenate([stand.doubt_m for stand in stands]), before.loc[rows.index].to_numpy(float)
     settling = np.linalg.lstsq(columns, (expected - stored).ravel(), rcond=None)[0]
     expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)
     checked = f"residuals of the declared model, {len(rows)} rows"

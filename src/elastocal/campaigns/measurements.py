@@ -346,8 +346,8 @@ class MeasurementFile:
         if not sound.all():
             index = int(np.argmin(sound))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (index := beyond(name, values)) is not None:
-            raise self.cell_fault(index, name, shown(self.columns[name][index]), BOUNDS[name].allowed)
+        if (first := beyond(name, values)) is not None:
+            raise self.cell_fault(first, name, shown(self.columns[name][first]), BOUNDS[name].allowed)
         return values
 
 

@@ -124,7 +124,7 @@ def _numbers(read: TextTable, name: str) -> np.ndarray:
                 read.path, f"line {read.lines[index]}, column {name}", repr(cell), "a number such as -0.25 or 2.5e-3"
             )
         values[index] = value
-    if (index := beyond(name, values)) is not None:
-        found = repr(read.columns[name][index])
-        raise InputError(read.path, f"line {read.lines[index]}, column {name}", found, BOUNDS[name].allowed)
+    if (first := beyond(name, values)) is not None:
+        found = repr(read.columns[name][first])
+        raise InputError(read.path, f"line {read.lines[first]}, column {name}", found, BOUNDS[name].allowed)
     return values
