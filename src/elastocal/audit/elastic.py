@@ -19,6 +19,8 @@ from elastocal.audit.audited import WRENCH
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from elastocal.audit.audited import Audited
+
 STATE = ("session", "pose", "load")
 # Each pass leaves some 1/500 of the pass before of the load's change by the deflection: metres by deflections of 4 mm.
 _PASSES = 6
@@ -89,6 +91,16 @@ def averages(frame: pd.DataFrame, poses: bool) -> Averages:
         vectors = kept[["rx", "ry", "rz"]].to_numpy()
         rotation = tuple(_mean_rotation(vectors[places]) for places in grouped.indices.values())
     return Averages(states, of_states.ngroup().to_numpy(), each["target"].to_numpy(), means.to_numpy(), rotation)
+
+
+def good_rows(run: Audited, campaign: str, part: str) -> pd.DataFrame:
+    """Measurements of a campaign, ``training`` or ``held_out``, without those that were left out as gross errors."""
+    frame = run.table(f"results/loop/{campaign}/{part}.parquet")
+    stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"]
+    if part == "held_out":
+        stated = run.document(f"reports/loop/{campaign}/verdict.json")
+    out = [row for entry in stated["gross_errors"] if entry["held_out"] == (part == "held_out") for row in entry["rows"]]
+    return frame[~frame["row"].isin(out)].reset_index(drop=True)
 
 
 def far_off(frame: pd.DataFrame) -> np.ndarray:

@@ -18,7 +18,7 @@ from scipy import stats
 from statsmodels.robust.norms import HuberT
 
 from elastocal.audit.audited import COMPONENTS
-from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off
+from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
 from elastocal.audit.findings import Finding, compared, held
 
 if TYPE_CHECKING:
@@ -139,7 +139,7 @@ def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
     known = campaign_of(run, campaign)
     if known is None:
         return []
-    training = run.table(file.replace("steps", "training"))
+    training = good_rows(run, campaign, "training")
     seen, found = averages(training, known.poses), []
     stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"].get("noise") or {}
     factor = stated.get("factor", 1.0)
@@ -214,7 +214,7 @@ def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
     if known is None or step is None or step.parameters["held"].all():
         return []
     table, free = run.table(file), ~step.parameters["held"].to_numpy(bool)
-    seen = averages(run.table(file.replace("correlations", "training")), known.poses)
+    seen = averages(good_rows(run, campaign, "training"), known.poses)
     names = (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[free]
     columns, residual, _ = _whitened(step, seen, known.robot)
     covariance = np.asarray(_least_squares(columns[:, free], residual).cov_params())
@@ -352,7 +352,7 @@ def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
             expected.append(each_residual(known, step, measured.sort_values("row")))
         checked = f"residuals {state}, fitted and held out, all rows"
         pair = np.concatenate(stored), np.concatenate(expected)
-        allowed = unsettled(step, averages(parts[0], known.poses), known.robot)
+        allowed = unsettled(step, averages(good_rows(run, campaign, "training"), known.poses), known.robot)
         found.append(compared(file, checked, "pinocchio", *pair, 0.0, absolute=allowed))
     return found
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.audit.elastic import STATE, Averages, averages, far_off
+from elastocal.audit.elastic import STATE, Averages, averages, far_off, good_rows
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.fits import Campaign, Step, campaign_of, unsettled
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
@@ -47,8 +47,7 @@ def before_after(run: Audited, file: str, campaign: str) -> list[Finding]:
     steps = [step for step in known.steps if step is not None]
     table = run.table(file)
     found = [_counts(file, table, steps)]
-    parts = {part: run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")}
-    fitted, unseen = (averages(parts[part], known.poses) for part in ("training", "held_out"))
+    fitted, unseen = (averages(good_rows(run, campaign, part), known.poses) for part in ("training", "held_out"))
     of_fitted, errors = (Errors(_distances(known, steps, seen), seen.pose) for seen in (fitted, unseen))
     counts = drawn(_stream(run, campaign, "held-out poses"), errors.poses)
     by = "pinocchio"
@@ -203,12 +202,12 @@ def splits(run: Audited, file: str, campaign: str) -> list[Finding]:
 def _of_residuals(run: Audited, campaign: str) -> Errors | None:
     """Held-out errors before and after from the residuals of a campaign whose test is part of it."""
     described = run.document(f"results/loop/{campaign}/campaign.json")
-    unseen = run.table(f"results/loop/{campaign}/held_out.parquet")
+    unseen = good_rows(run, campaign, "held_out")
     # Of approaches the residuals do not say which they were.
     if described.get("held_out") is not None or unseen["approach1"].notna().any():
         return None
     frame = run.table(f"reports/loop/{campaign}/residuals.parquet")
-    rows = frame[frame["held_out"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
+    rows = frame[frame["held_out"] & ~frame["gross_error"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
     errors = _errors(rows)
     outside = rows.groupby(["session", "pose"])["outside_range"].any().to_numpy()[errors.pose]
     return replace(errors, outside=outside)
@@ -253,7 +252,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
         words = [row["verdict"], row["effects"]] == [stated["verdict"], " + ".join(named) or "none"]
         found.append(held(file, f"verdict of {name}", "verdict.json", words, str(row["effects"])))
         frame = run.table(f"reports/loop/{name}/residuals.parquet")
-        errors = _errors(frame[frame["held_out"] & (frame["session"] == row["session"])])
+        errors = _errors(frame[frame["held_out"] & ~frame["gross_error"] & (frame["session"] == row["session"])])
         counts = drawn(numbers(run.seed, name, "summary", row["session"]), errors.poses)
         expected, stored = [float(errors.poses)], [row["poses"]]
         for model, state in enumerate(("before", "after")):

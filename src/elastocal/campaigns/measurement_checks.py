@@ -26,6 +26,8 @@ _FARTHEST_RAD = 3.0 * np.pi
 _BACKWARDS, _FEWEST_IN_ORDER = 0.875, 5
 # A joint this far beyond its limits is no joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
+# A unit is wrong in a whole file. What is off in fewer rows than this is a gross error of theirs, which the diagnosis names.
+_SINGLE_ROWS = 0.2
 # Positions spread over more reaches than this are not in metres. Millimetres spread so unless all lie within centimetres.
 _FARTHEST_REACHES = 10.0
 # A target sits at most about this far from its measuring point.
@@ -57,7 +59,7 @@ def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
     wrong = (np.abs(reported) > farthest) | (beyond & inside(np.radians(reported)))
-    if wrong.any():
+    if wrong.any(axis=1).mean() > _SINGLE_ROWS:
         index, joint = np.argwhere(wrong)[0]
         allowed = (
             f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
@@ -174,7 +176,7 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
         members = np.flatnonzero(measurements.session == session)
         position = measurements.position[members]
         away = np.abs(position - np.median(position, axis=0))
-        if away.max() > _FARTHEST_REACHES * reach:
+        if np.quantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
             index, axis = np.unravel_index(np.argmax(away), away.shape)
             found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
             raise table.cell_fault(

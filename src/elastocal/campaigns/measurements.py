@@ -304,6 +304,13 @@ class MeasurementFile:
                 unit = f" in {known[name].unit}" if known[name].unit else ""
                 raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
 
+    @property
+    def header_line(self) -> int | None:
+        """Line of the header, where every row of data is a line of a text."""
+        if self.lines is None or np.ptp(self.lines - self.rows):
+            return None
+        return int(self.lines[0] - self.rows[0])
+
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """InputError of this file."""
         return InputError(self.path, key, found, allowed)
@@ -346,8 +353,8 @@ class MeasurementFile:
         if not sound.all():
             index = int(np.argmin(sound))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
-        if (first := beyond(name, values)) is not None:
-            raise self.cell_fault(first, name, shown(self.columns[name][first]), BOUNDS[name].allowed)
+        if (place := beyond(name, values)) is not None:
+            raise self.cell_fault(place, name, shown(self.columns[name][place]), BOUNDS[name].allowed)
         return values
 
 

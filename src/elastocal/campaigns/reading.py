@@ -68,7 +68,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     _check_compliance(document, robot, robot_path, measurements, source)
     _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, source)
-    return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
+    place = {"table": Path(table.path).name, "header_line": table.header_line}
+    return described_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:

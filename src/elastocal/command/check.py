@@ -54,7 +54,10 @@ def show(facts: Mapping[str, Any], console: Console) -> None:
 
 def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What is shown, as pairs of a heading and words."""
-    noise, held = facts["noise"], facts["held"]
+    from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+
+    noise = facts["noise"]
+    left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
     robot = f"{facts['campaign']}: {facts['robot']}, {facts['joints']} joints"
     poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} held out"
@@ -65,7 +68,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("", f"{loads}; up to {facts['repeats']} repeats"),
         ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, by {_SOURCES[noise['source']]}"),
         ("declared model", f"leaves {1e3 * facts['residual_rms_m']:.3f} mm RMS on the poses that it was fitted to"),
-        ("identified", f"{facts['parameters']} parameters" + (f"; not identifiable: {_listed(held)}" if held else "")),
+        ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]
@@ -73,6 +76,9 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(
             ("compliance" if joint == 1 else "", f"joint {joint}: {spring['value_urad_per_Nm']:.3g} µrad/(N m) {words}")
         )
+    if facts["accuracy"]:
+        sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
+        found.append(("accuracy", f"if nothing is missing in the declared model: {sentence}"))
     found.append(("testable", f"{facts['testable']} candidate effects"))
     found += [("", f"{count} not: {reason}") for reason, count in facts["untestable"].items()]
     found += [("data fault", fault["sentence"]) for fault in facts["faults"]]

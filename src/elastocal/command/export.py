@@ -41,8 +41,10 @@ def export(
     import numpy as np
     import yaml
 
+    from elastocal.application.accuracy import accuracy_sentence
     from elastocal.application.calibrated import OperatingConditions
     from elastocal.application.calibrated_geometry import folded
+    from elastocal.application.scope import campaign_accuracy
     from elastocal.application.sidecar import left_out_m, sidecar
     from elastocal.exchange.urdf_writing import urdf_of
     from elastocal.io.atomic_writes import write_text
@@ -58,9 +60,10 @@ def export(
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     write_text(output / ROBOT, f"# {stated}\n{text}")
     write_text(output / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
-    document = sidecar(calibrated, found.name, date or calendar.today().isoformat())
+    accuracy = campaign_accuracy(calibrated, found.case.observations.states)
+    document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
     write_json(output / SIDECAR, document)
-    lines = [f"    {output / name}" for name in (ROBOT, URDF, SIDECAR)]
+    lines = [accuracy_sentence(accuracy), *(f"    {output / name}" for name in (ROBOT, URDF, SIDECAR))]
     lines += _denavit_hartenberg(calibrated.robot, robot, output)
     if table:
         lines += _table(calibrated, table, force, output)

@@ -48,6 +48,7 @@ def plan(
     """Choose configurations and loads that say most about a robot, among those that arm, cell and tracker allow."""
     import numpy as np
 
+    from elastocal.application.accuracy import BASE, FRAMES, ROBOT, millimetres
     from elastocal.application.inverse_kinematics import reach_m
     from elastocal.application.planning.cell import RADIUS_SHARE, Cell
     from elastocal.application.planning.criteria import CRITERIA
@@ -97,11 +98,13 @@ def plan(
     write_csv(output, table.assign(expected_accuracy_m=float(found.accuracy_m[-1])))
     save(plan_picture(arm, cell, found), str(output.with_suffix(".pdf")), str(output.with_suffix(".png")))
     random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
+    frame = FRAMES[ROBOT if survey.unknown_base else BASE]
     lines = [
         f"{len(found.fitted.joint_angles)} poses to fit and {held_out} held out of {len(some.joint_angles):,} allowed ones: "
         f"{len(table)} measurements",
-        f"position error that the fit leaves, RMS: {1e3 * found.accuracy_m[-1]:.3f} mm; with random poses "
-        f"{random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f})",
+        f"predicted position error of a robot that is corrected by the fit, {frame}: {millimetres(found.accuracy_m[-1])} RMS "
+        f"over configurations that the cell allows (standard error, by the uncertainty of the parameters alone; the tracker's "
+        f"noise is not in it); with random poses {random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f})",
         f"{criterion}-efficiency: at least {found.efficiency:.2f} of the best design with as many poses",
         f"    {output}, {output.with_suffix('.pdf')}" + (f", {folder}" if folder else ""),
     ]

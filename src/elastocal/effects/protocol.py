@@ -145,7 +145,7 @@ class Candidate:
         displacement per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it
         displaces, of no others.
     needs : frozenset of str
-        What must be there, see `conditions.offered`: "load", "external load", "approach", "time", "temperature".
+        What must be there, see `Model.offered`: "load", "external load", "approach", "time", "temperature", "declared base".
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be distinguishable from a smooth one.

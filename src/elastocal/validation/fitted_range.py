@@ -79,7 +79,7 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """
     unseen = held_out.observations
     if not same_campaign(case, held_out):
-        fitted = carried_over(fitted, unseen.states)
+        fitted = carried_over(fitted, held_out.model, unseen.states)
     variances = predictive_variances(fitted, case.observations, *placed(fitted, case, held_out), unseen)
     outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
     return np.bincount(state_clusters(unseen.states), outside) > 0
