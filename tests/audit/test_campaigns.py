@@ -75,7 +75,7 @@ def test_errors_before_and_after_are_those_of_the_means_of_repeats(run, wrong, n
     approach = np.repeat([[1.0], [-1.0]], 2, axis=1).ravel()
     key = {"session": 0, "pose": np.arange(16) // 4, "load": 0, "target": 0, "row": np.arange(1, 17)}
     frame = frame.assign(**key, repeat=np.arange(16) % 4, held_out=np.arange(16) > 7, q1=0.1, x=1.0, y=0.0, z=0.0)
-    frame = frame.assign(**dict.fromkeys(WRENCH, 0.0))
+    frame = frame.assign(**dict.fromkeys(WRENCH, 0.0), gross_error=False)
     frame.to_parquet(run.folder / REPORTS / "residuals.parquet")
     sheet = frame[["session", "pose", "load", "target", "row", "x", "y", "z"]].assign(approach1=np.tile(approach, 4))
     sheet[:8].to_parquet(run.folder / FOLDER / "training.parquet")
@@ -97,5 +97,6 @@ def test_errors_before_and_after_are_those_of_the_means_of_repeats(run, wrong, n
     table.to_csv(run.folder / REPORTS / "before_after.csv", index=False)
     described = {"held_out": None, "robot": ROBOT, "campaign": {"frame": "tracker", "declared": [], "targets": {}}}
     (run.folder / FOLDER / "campaign.json").write_text(json.dumps(described))
-    (run.folder / REPORTS / "verdict.json").write_text(json.dumps({"effects": [{"name": named}]}))
+    (run.folder / REPORTS / "verdict.json").write_text(json.dumps({"effects": [{"name": named}], "gross_errors": []}))
+    (run.folder / FOLDER / "diagnosis.json").write_text(json.dumps({"document": {"gross_errors": []}}))
     assert failed(campaigns.residuals(run, f"{REPORTS}/residuals.parquet", "cell")) == expected

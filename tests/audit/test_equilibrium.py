@@ -70,7 +70,7 @@ def test_where_an_arm_stands_loads_and_weights_do_as_much_work_as_its_springs(ru
     np.testing.assert_allclose(stand.position, expected, rtol=0, atol=1e-6 * moved)
     # Three evaluations of the loads come within a few cubes of deflection over reach.
     assert 0 < stand.left_m < 1e-4 * moved
-    assert not stand.doubt_m[:, 0].any() and stand.doubt_m[:, 1:].any()
+    assert not stand.slack_m[:, 0].any() and stand.slack_m[:, 1:].any()
 
 
 def test_springs_that_nobody_knows_are_not_put_under_loads(run):

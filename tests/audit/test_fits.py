@@ -84,7 +84,7 @@ def run(made, tmp_path):
         {"name": "frames", "kind": "frames", "noise": noise, "effects": []},
         {"name": "declared", "kind": "declared", "noise": noise, "effects": ["joint_compliance"]},
     ]
-    (tmp_path / FOLDER / "diagnosis.json").write_text(json.dumps({"steps": steps, "document": {}}))
+    (tmp_path / FOLDER / "diagnosis.json").write_text(json.dumps({"steps": steps, "document": {"gross_errors": []}}))
     table = pd.DataFrame({"step": 1, "owner": "joint_compliance", "parameter": ["c1", "c2"], "value": value})
     table.assign(std_error=error, held=False, prior_std=np.nan).to_parquet(tmp_path / FOLDER / "steps.parquet")
     known = fits.Campaign(robot, True, [])
@@ -94,7 +94,7 @@ def run(made, tmp_path):
         for state in ("before", "after"):
             part = part.assign(**{f"{state}_{name}": off[:, place] for place, name in enumerate(COMPONENTS)})
         parts["held_out" if unseen else "training"] = part.assign(held_out=unseen)
-    pd.concat(parts.values()).to_parquet(tmp_path / REPORTS / "residuals.parquet")
+    pd.concat(parts.values()).assign(gross_error=False).to_parquet(tmp_path / REPORTS / "residuals.parquet")
     return Audited(tmp_path, CONFIGURATION, {}, {}, 4)
 
 
@@ -144,7 +144,7 @@ def test_noise_may_be_that_of_the_repeats_times_the_factor_that_is_stated(run, s
     document = json.loads(path.read_text())
     noise = document["steps"][1]["noise"]
     document["steps"][1]["noise"] = noise | {name: 1.3 * noise[name] for name in ("position_m", "orientation_rad")}
-    document["document"] = {"noise": {"factor": stated}}
+    document["document"] = {"noise": {"factor": stated}, "gross_errors": []}
     path.write_text(json.dumps(document))
     found = [name for name in checked(run) if name.startswith("noise")]
     assert found == expected

@@ -32,7 +32,7 @@ def run(tmp_path):
     columns = [f"{state}_d{axis}" for state in ("before", "after") for axis in "xyz"]
     off = draws.normal(size=(len(pose), 6)) * np.repeat([2e-4, 1e-4], 3)
     frame = pd.DataFrame(off, columns=columns).assign(session=0, pose=pose, load=np.tile([0, 1, 2], POSES), target=0)
-    frame = frame.assign(repeat=0, row=np.arange(1, len(pose) + 1), held_out=True, outside_range=pose == 2)
+    frame = frame.assign(repeat=0, row=np.arange(1, len(pose) + 1), held_out=True, outside_range=pose == 2, gross_error=False)
     frame.to_parquet(tmp_path / REPORTS / "residuals.parquet")
     seen = frame[["session", "pose", "load", "target", "row"]].assign(x=draws.normal(size=len(pose)), y=0.0, z=0.0)
     seen.assign(approach1=np.nan).to_parquet(tmp_path / FOLDER / "held_out.parquet")
@@ -60,7 +60,13 @@ def run(tmp_path):
             for side, kept in sides.items()
         },
     }
-    document = {"verdict": "named", "effects": [EFFECT], "warnings": ["few"], "compliance_urad_per_Nm": {"before": [0.5]}}
+    document = {
+        "gross_errors": [],
+        "verdict": "named",
+        "effects": [EFFECT],
+        "warnings": ["few"],
+        "compliance_urad_per_Nm": {"before": [0.5]},
+    }
     diagnosed = document | {"effects": [EFFECT | {"heldout_gain": None}]}
     (tmp_path / FOLDER / "diagnosis.json").write_text(json.dumps({"document": diagnosed}))
     gain = 1 - after["rms"] / before["rms"]

@@ -11,7 +11,7 @@ from elastocal.audit.audited import Audited
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.diagnosis.judge import residual_blocks, split_table
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.io.data_frames import write_csv
@@ -20,6 +20,7 @@ from elastocal.io.storage import read_table, write_table
 from elastocal.loop import diagnosis_tables as tables
 from elastocal.loop import schemas
 from elastocal.loop.loading import load_campaign
+from elastocal.loop.whole import judged
 from elastocal.plant.arm import arm_from_file
 from elastocal.plant.campaigns import Design, schedule_of
 from elastocal.plant.defects import drawn_defect, with_defects
@@ -53,11 +54,11 @@ def diagnosed_campaign(top, robot, effects=(), weighs=False, **design):
     # As the next job does: from the files.
     steps = read_table(results / "steps.parquet", schemas.STEPS)
     again = tables.diagnosis_from(case, tables.diagnosis_facts(found), steps)
-    verdict = judge(again, unseen, 1)
+    verdict = judged(again, unseen, 1)
     write_json(reports / "verdict.json", verdict.document, allow_nan=False)
     write_csv(reports / "before_after.csv", pd.DataFrame(verdict.rows))
-    write_csv(reports / "splits.csv", pd.DataFrame(split_table(again, unseen, 1)))
-    write_table(reports / "residuals.parquet", schemas.residuals(arm.joints), residual_blocks(again, unseen), {})
+    write_csv(reports / "splits.csv", pd.DataFrame(split_table(again, verdict.held_out, 1)))
+    write_table(reports / "residuals.parquet", schemas.residuals(arm.joints), residual_blocks(again, verdict), {})
     return top
 
 

@@ -239,7 +239,7 @@ def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd
     stored = frame[["before_dx", "before_dy", "before_dz"]]
     # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
     scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
-    columns = np.concatenate([stand.doubt_m for stand in stands])
+    columns = np.concatenate([stand.slack_m for stand in stands])
     picked = stored.loc[rows.index].to_numpy(float)
     settling = np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0]
     expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)

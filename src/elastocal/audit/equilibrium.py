@@ -38,12 +38,12 @@ class Body:
 @dataclass(frozen=True)
 class Stand:
     """A loaded robot: `position` (3,) of the target at the equilibrium, m; by how much the passes of a fit leave it off that,
-    `left_m`; and by how much a standard error of each spring moves it, `doubt_m` (3, n).
+    `left_m`; and by how much a standard error of each spring moves it, `slack_m` (3, n).
     """
 
     position: np.ndarray
     left_m: float
-    doubt_m: np.ndarray
+    slack_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Sagging:
     arms : list of Arm
         One for each target; of an unknown offset at its measuring point.
     points : list of str
-    springs, doubt : ndarray (n,)
+    springs, slack : ndarray (n,)
         Compliances and their standard errors, which are zero of springs that were not fitted, rad/(N m).
     bodies : tuple of Body
     gravity : ndarray (3,)
@@ -69,7 +69,7 @@ class Sagging:
     arms: list[Arm]
     points: list[str]
     springs: np.ndarray
-    doubt: np.ndarray
+    slack: np.ndarray
     bodies: tuple[Body, ...]
     gravity: np.ndarray
     noise_m: float
@@ -90,7 +90,7 @@ class Sagging:
                     break
             position = arm.pose(coordinates, point)[0]
             left = float(np.abs(position - arm.pose(of_fits, point)[0]).max())
-            yield Stand(position, left, arm.jacobian(coordinates, f"{point} target")[:3] * (torques * self.doubt))
+            yield Stand(position, left, arm.jacobian(coordinates, f"{point} target")[:3] * (torques * self.slack))
 
     def _torques(self, arm: Arm, coordinates: np.ndarray, wrench: np.ndarray) -> np.ndarray:
         # In this loop the wrench acts at the last measuring point, whatever is measured.
@@ -127,14 +127,14 @@ def sagging(run: Audited, campaign: str) -> Sagging | None:
     fitted, noise = _declared_step(run, campaign)
     springs = 1e-6 * np.array(compliance["before"], float)
     identified = fitted[fitted["owner"] == _SPRINGS]
-    doubt = np.zeros(len(springs))
+    slack = np.zeros(len(springs))
     if len(identified):
         springs = identified["value"].to_numpy(float)
-        doubt = np.where(identified["held"], 0.0, identified["std_error"]).astype(float)
+        slack = np.where(identified["held"], 0.0, identified["std_error"]).astype(float)
     off = fitted[fitted["owner"] == _WEIGHT].set_index("parameter")["value"]
     bodies = tuple(_body(mass, off) for mass in bare.get("masses", ()) if mass["link"] and complete)
     points, gravity = [str(each["point"]) for each in targets], np.array(bare.get("gravity_m_s2", _STANDING))
-    return Sagging(arms, points, springs, doubt, bodies, gravity, noise, complete)
+    return Sagging(arms, points, springs, slack, bodies, gravity, noise, complete)
 
 
 def _declared_step(run: Audited, campaign: str) -> tuple[pd.DataFrame, float]:

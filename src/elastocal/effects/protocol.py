@@ -184,12 +184,12 @@ class Candidate:
 
 
 def at_shapes(key: str, shapes: Iterable[float]) -> str:
-    """Unique name of a candidate at values of its shapes: as many digits as tell any two numbers apart."""
+    """Unique name of a candidate at values of its shapes: with all the digits of each."""
     return key + "".join(f" {float(shape)!r}" for shape in shapes)
 
 
 def require_unique(names: Sequence[str]) -> None:
-    """Refuse two candidates of one name, a ValueError: what is said of one could not be told from what is said of the other."""
+    """Refuse two candidates of one name, a ValueError: in tables nothing would distinguish them."""
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise ValueError(f"candidates of one name: {', '.join(twice)}")
