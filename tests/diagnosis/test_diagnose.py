@@ -184,8 +184,8 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
 
 def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
     monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = kept_rows.fit
-    monkeypatch.setattr(kept_rows, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
+    fitted = kept_rows.fit_declared
+    monkeypatch.setattr(kept_rows, "fit_declared", lambda *args, **options: replace(fitted(*args, **options), converged=False))
     document = diagnose(case, Settings(), 1).document
     assert document["converged"] == {"declared": False, "final": False}
     assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [

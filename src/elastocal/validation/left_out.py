@@ -30,7 +30,7 @@ def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
         cluster = observations.cluster[seen]
         for pose in np.unique(cluster):
             mine = cluster == pose
-            rows = whitened[mine].reshape(-1, len(fitted.held))
+            rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
             gain = fitted.covariance @ rows.T
             inverse = np.linalg.pinv(np.eye(len(rows)) - rows @ gain, rcond=_ROUNDING, hermitian=True)
             moved = plain[mine][:, :3] @ (gain @ (inverse @ white[seen][mine].ravel()))
