@@ -247,7 +247,8 @@ def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_ma
 
 
 def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, config_folder, tmp_path, monkeypatch):
-    folder = made_folder(tmp_path / "made", kuka, declared=["link_geometry"])
+    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
+    folder = made_folder(tmp_path / "made", kuka, table=table, declared=["link_geometry"])
     case, held_out = cases_in(folder, config_folder / "robots")
     settings = replace(Settings(), numbers_a_parameter=np.inf)
     usual = diagnose(case, settings, 1)
