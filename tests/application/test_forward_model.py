@@ -10,6 +10,7 @@ from made_calibrated import made_calibrated
 from scipy.spatial.transform import Rotation
 from support import refused
 
+from elastocal.application.accuracy import Accuracy
 from elastocal.application.calibrated import OperatingConditions, forward, prediction_covariance
 from elastocal.application.forward_model import KEY, SIDECAR, ForwardModel, calibrated_in, model_document
 from elastocal.application.sidecar import sidecar
@@ -22,6 +23,9 @@ def states(robot, count=20):
     rng = np.random.default_rng(1)
     wrench = 100 * rng.standard_normal((count, 6))
     return rng.uniform(-1, 1, (count, robot.joints)), OperatingConditions(wrench, None, np.full(count, 3600.0))
+
+
+ACCURACY = Accuracy("base", "predicted", 1e-5, 2e-5, 3e-5, 4e-5, "none", 1, "one pose")
 
 
 def through_json(calibrated):
@@ -51,7 +55,7 @@ def test_joints_that_were_taken_as_rigid_stay_rigid(kuka):
 
 def test_a_folder_gives_poses_and_targets_that_reach_them(tmp_path):
     calibrated = made_calibrated(analysed("kuka"), "joint_offset@2", "lost_motion@3")
-    (tmp_path / SIDECAR).write_text(json.dumps(sidecar(calibrated, "cell", "2026-11-23")))
+    (tmp_path / SIDECAR).write_text(json.dumps(sidecar(calibrated, "cell", "2026-11-23", ACCURACY)))
     model = ForwardModel.read(tmp_path)
     angles = analysed("kuka").joint_limits.mean(axis=1) + np.array([0.1, 0.2, 0.1, 0.3, 0.7, 0.0])
     position, rotation = model.pose([angles])

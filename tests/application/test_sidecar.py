@@ -6,6 +6,7 @@ import numpy as np
 from analysed_robots import analysed
 from made_calibrated import made_calibrated
 
+from elastocal.application.accuracy import predicted
 from elastocal.application.calibrated import NEUTRAL
 from elastocal.application.sidecar import left_out_m, sidecar
 
@@ -16,7 +17,9 @@ def made(*keys):
 
 def test_effects_and_springs_stand_in_it_with_values_and_standard_errors():
     calibrated = made("lost_motion@2")
-    document = json.loads(json.dumps(sidecar(calibrated, "cell7", "2026-11-23")))
+    accuracy = predicted(calibrated, np.zeros((1, 6)), NEUTRAL).accuracy("one pose")
+    document = json.loads(json.dumps(sidecar(calibrated, "cell7", "2026-11-23", accuracy)))
+    assert document["accuracy"]["rms_m"] == accuracy.rms_m and "Predicted" in document["accuracy"]["words"]
     (effect,) = document["effects"]
     assert effect["key"] == "lost_motion@2" and effect["joints"] == [2]
     values = np.concatenate([calibrated.estimate.coefficients[-1], calibrated.estimate.shapes[-1]])

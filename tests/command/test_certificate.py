@@ -28,7 +28,7 @@ def run(top, monkeypatch):
 
 def test_pages_and_document_are_written_beside_the_report(run, top):
     result = run(top / "made", "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20")
-    assert result.exit_code == 0, result.exception
+    assert result.exit_code == 0, result.output
     reports = top / "reports" / "loop" / "made"
     assert (reports / "certificate.pdf").read_bytes().startswith(b"%PDF")
     document = json.loads((reports / "certificate.json").read_text())
@@ -39,7 +39,7 @@ def test_pages_and_document_are_written_beside_the_report(run, top):
 
 def test_a_joint_that_slipped_between_two_campaigns_is_seen(run, top, tmp_path):
     result = run(top / "later", "--tolerance", "0.5mm", "--compare", top / "made", "--output", tmp_path / "out")
-    assert result.exit_code == 0, result.exception
+    assert result.exit_code == 0, result.output
     comparison = json.loads((tmp_path / "out" / "certificate.json").read_text())["comparison"]
     assert comparison["p_value"] < 1e-3 and "moves differently than in made" in result.output
 
@@ -73,7 +73,7 @@ def test_data_at_fault_get_no_certificate(run, top, tmp_path):
 
 
 def test_a_campaign_without_a_report_is_refused(run, top, tmp_path):
-    path = top / "reports" / "loop" / "made" / "residuals.parquet"
+    path = top / "reports" / "loop" / "made" / "before_after.csv"
     path.rename(tmp_path / "kept")
     try:
         result = run(top / "made", "--tolerance", "0.5mm", "--output", tmp_path / "out")

@@ -155,7 +155,7 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     # A pose that was not there at all is far off; the others bear the effect out.
     assert beyond["outside"]["after"]["rms_m"] > 0.1 > beyond["inside"]["after"]["rms_m"]
     assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
-    training, unseen = residual_blocks(diagnosis_of(case, steps), away)
+    training, unseen = blocks_of(diagnosis_of(case, steps), away)
     assert not training["outside_range"].any()
     assert unseen["outside_range"][unseen["pose"] == first].all()
     assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
@@ -275,3 +275,14 @@ def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_
     assert facts["physics"] + facts["regression_share"] + facts["left"] == pytest.approx(1.0)
     faulty = asked.document | {"effects": [asked.document["effects"][0] | {"family": "data"}]}
     assert judge(replace(asked, document=faulty), held_out, 1).document["remainder"] is None
+
+
+def test_held_out_poses_that_repeat_fitted_configurations_are_warned_of(made):
+    """At the angles of training poses: whatever the errors are, they say nothing of other poses."""
+    case, held_out, steps = made
+    states, fitted = held_out.observations.states, case.observations.states
+    assert not any("repeat configurations" in warning for warning in judged(steps, case, held_out).document["warnings"])
+    again = fitted.joint_angles[np.searchsorted(np.unique(states.pose), states.pose)] + 1e-3
+    repeating = replace(held_out, observations=replace(held_out.observations, states=replace(states, joint_angles=again)))
+    said = [warning for warning in judged(steps, case, repeating).document["warnings"] if "repeat configurations" in warning]
+    assert len(said) == 1 and said[0].startswith(f"all {len(np.unique(states.pose))} validation poses")

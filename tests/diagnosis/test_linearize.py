@@ -1,14 +1,16 @@
 """From a fit to a linear problem: columns are changes of exact predictions, and coefficients count from zero."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from planted import HAND, planted, two_loads_a_pose
 from scipy.stats import chi2, ncx2
-from synthetic import NOISE, made_states
+from support import UR10, chain_of
+from synthetic import NOISE, conditions_on, made_states
 
-from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
 from elastocal.diagnosis.linearize import (
     lacking,
     linearized,
@@ -19,6 +21,7 @@ from elastocal.diagnosis.linearize import (
 from elastocal.diagnosis.other import competitors
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
+from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import residuals
 
@@ -195,6 +198,32 @@ def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(
     assert min(tried) >= shape.lowest and max(tried) <= shape.highest
     assert np.ptp(tried) < 0.5 / 12
     assert (shape.shares(tried) > 0).all()
+
+
+@pytest.mark.parametrize("rows", [40, 3000])
+@pytest.mark.parametrize("dated", [True, False])
+@pytest.mark.parametrize("when", [None, 1 / 12 + 1e-5, float(np.nextafter(1 / 12, 1)), 11 / 12 - 1e-12])
+def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campaign, rows, dated, when):
+    """As tried, and after a closer look about each value that was tried, however close these lie to the end of the range."""
+    states = made_states(6, rows)
+    around = conditions_on(chain_of(UR10), states if dated else replace(states, time_s=None, temperature_c=None))
+    fitted = campaign.declared
+    if when is not None:
+        model, start = with_effect(campaign, "setup_step", 0.0)
+        start.shapes[-1][:] = when
+        fitted = replace(fitted, model=model, estimate=start)
+    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, around.sites, states)]
+    laws = [(each, 1) for each in competitors(around)]
+    tested = [(c, shapes) for c in candidates for shapes in shapes_tried(c, fitted)]
+    units = units_of(tested, laws, SETTINGS)
+    problem = SimpleNamespace(units=units, prior=prior_of(units, SETTINGS))
+    for number in [n for n, unit in enumerate(units) if unit.mechanism == "setup_step"]:
+        alone = np.zeros(len(units))
+        alone[number] = 50.0
+        closer = shapes_looked_at_closely(problem, alone)
+        tested = [(c, shapes) for c in candidates for shapes in closer.get(c.key, shapes_tried(c, fitted))]
+        names = [unit.key for unit in units_of(tested, laws, SETTINGS)]
+        assert len(set(names)) == len(names)
 
 
 def looked_at(problem, alone):

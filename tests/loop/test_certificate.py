@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -9,7 +10,8 @@ import pytest
 from analysed_robots import ROBOTS
 from certified import certified_checkout
 
-from elastocal.loop.calibrated_files import load_diagnosed
+from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.loop.calibrated_files import judged_as, load_diagnosed
 from elastocal.loop.certificate import Wanted, certificate
 
 WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
@@ -26,8 +28,9 @@ def top(tmp_path_factory):
 def parts(top):
     reports = top / "reports" / "loop" / "made"
     verdict = json.loads((reports / "verdict.json").read_text())
-    tables = pd.read_csv(reports / "before_after.csv"), pd.read_parquet(reports / "residuals.parquet")
-    return load_diagnosed(top / "made", ROBOTS, top / "results" / "loop"), verdict, *tables
+    steps = pd.read_csv(reports / "before_after.csv")
+    found = load_diagnosed(top / "made", ROBOTS, top / "results" / "loop")
+    return judged_as(found, verdict), verdict, steps
 
 
 @pytest.fixture(scope="module")
@@ -35,14 +38,25 @@ def found(top, parts):
     return certificate(top / "made", ROBOTS, *parts, WANTED, parts[0])
 
 
-def test_errors_are_those_of_the_verdict(found, parts):
+def test_one_accuracy_stands_in_headline_budget_and_report(found, parts):
     document, verdict = found[0], parts[1]
-    assert document["conformity"]["rms_m"] == pytest.approx(verdict["heldout"]["after"]["rms_m"], rel=1e-9)
-    assert document["iso_9283"]["pose_accuracy_mean_m"] == pytest.approx(verdict["heldout"]["after"]["mean_m"], rel=1e-9)
-    assert document["iso_9283"]["pose_accuracy_largest_m"] == pytest.approx(verdict["heldout"]["after"]["max_m"], rel=1e-9)
+    assert document["accuracy"] == document["predicted"]
+    assert accuracy_sentence(accuracy_from(verdict["accuracy"])) == accuracy_sentence(accuracy_from(document["accuracy"]))
+    assert document["accuracy"]["kind"] == "predicted" and document["measured"] is None
+    left = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded")
+    squares = sum(line["rms_m"] ** 2 for line in document["budget"] if line["name"] in left)
+    assert squares == pytest.approx(document["accuracy"]["rms_m"] ** 2, rel=1e-9)
     assert [row["model"] for row in document["held_out"]] == ["uncorrected", "declared", "corrected"]
     assert document["held_out"][-1]["rms_m"] == pytest.approx(verdict["heldout"]["after"]["rms_m"], rel=1e-6)
     assert document["held_out"][-1]["max_m_low"] is None
+
+
+def test_a_certificate_passes_below_and_fails_above_what_is_predicted(top, parts):
+    limits = (0.5, 2.0)
+    rms = certificate(top / "made", ROBOTS, *parts, WANTED)[0]["accuracy"]["rms_m"]
+    wanted = [replace(WANTED, tolerance_m=share * rms) for share in limits]
+    found = [certificate(top / "made", ROBOTS, *parts, each)[0]["conformity"]["decision"] for each in wanted]
+    assert found == ["fail", "pass"]
 
 
 def test_it_states_what_it_is_of(found, top):
@@ -55,10 +69,10 @@ def test_it_states_what_it_is_of(found, top):
 
 def test_the_map_is_drawn_without_load_and_under_the_largest(found, parts):
     document, maps = found
-    largest = np.linalg.norm(parts[3][["fx", "fy", "fz"]], axis=1).max()
+    largest = np.linalg.norm(parts[0].case.observations.states.wrench[:, :3], axis=1).max()
     assert [each["force_N"] for each in document["workspace"]] == [0.0, pytest.approx(largest)]
     np.testing.assert_array_equal(maps[0].joint_angles, maps[1].joint_angles)
-    assert document["bound_factor"] >= 1.0
+    assert (maps[0].bound_m > 0).all()
 
 
 def test_a_campaign_compared_with_itself_has_not_changed(found):

@@ -6,7 +6,7 @@ import pytest
 from made_certificates import made_comparison, made_document
 
 from elastocal.report.certificate_words import (
-    accuracy_sentence,
+    before_and_after,
     certificate_facts,
     comparison_facts,
     decision_sentences,
@@ -19,24 +19,32 @@ from elastocal.report.certificate_words import (
 @pytest.mark.parametrize(
     ("decision", "risk", "words"),
     [
-        ("pass", 0.01, ["is larger is 1 %", "5 % are accepted"]),
+        ("pass", 0.01, ["larger than the tolerance is 1 %", "5 % are accepted"]),
         ("pass", 0.0001, ["below 0.1 %"]),
-        ("fail", 0.98, ["is smaller after all is 2 %"]),
-        ("undecided", 0.4, ["is larger is 40 %", "About 40 validation poses would decide"]),
+        ("fail", 0.98, ["larger than the tolerance is 98 %"]),
+        ("undecided", 0.4, ["larger than the tolerance is 40 %", "About 40 measured poses would decide"]),
     ],
 )
-def test_decisions_come_with_their_risk(decision, risk, words):
+def test_decisions_come_with_their_criterion_and_risk(decision, risk, words):
     text = decision_sentences(made_document(decision, risk_above=risk))
-    assert "120\u00a0µm RMS; the tolerance is 200\u00a0µm" in text
-    for word in (*words, "In 8 of 9 poses", "57\u00a0%"):
+    criterion = (
+        "the predicted RMS position error of the corrected robot, 95 % sure to be below 0.160 mm, against the tolerance of"
+    )
+    for word in (*words, f"{criterion} 0.200 mm", "Nobody has measured the corrected robot", "0.120 mm"):
         assert word in text
 
 
-def test_errors_before_and_after_have_their_intervals():
-    text = accuracy_sentence(made_document())
-    assert (
-        "1.50\u00a0mm (1.20\u00a0mm to 1.95\u00a0mm) uncorrected, 120\u00a0µm (96.0\u00a0µm to 156\u00a0µm) corrected" in text
-    )
+def test_only_what_was_measured_is_called_so():
+    predicted, measured = (decision_sentences(made_document(measured=each)) for each in (False, True))
+    assert "Measured position error" in measured and "Nobody has measured" not in measured
+    assert "In 8 of 9 poses" in measured and "Measured" not in predicted and "poses every measurement" not in predicted
+    assert certificate_facts(made_document())["kind"] == " (predicted)"
+    assert "is predicted to keep" in what_to_do(made_document()) and "it keeps" in what_to_do(made_document(measured=True))
+
+
+def test_errors_before_and_after_are_of_one_kind():
+    text = before_and_after(made_document())
+    assert "off by 1.500 mm RMS" in text and "by 0.120 mm, both as predicted" in text
     rows = certificate_facts(made_document())["steps"]
     assert rows[-1][0] == "with lost motion (backlash)"
     assert rows[-1][3].endswith("(from 154\u00a0µm)") and "(" not in rows[-1][4]
@@ -44,7 +52,7 @@ def test_errors_before_and_after_have_their_intervals():
 
 @pytest.mark.parametrize(
     ("decision", "words"),
-    [("pass", "keeps the tolerance"), ("fail", "not good enough"), ("undecided", "more validation poses")],
+    [("pass", "keep the tolerance"), ("fail", "not good enough"), ("undecided", "measure the robot at them")],
 )
 def test_each_decision_has_its_advice(decision, words):
     assert words in what_to_do(made_document(decision))
@@ -59,9 +67,12 @@ def test_advice_follows_a_change_and_a_correction_that_does_not_help():
 
 
 def test_the_tracker_is_named_where_it_hides_the_repeatability():
-    rows = iso_rows(made_document()["iso_9283"])
+    document = made_document(measured=True)
+    rows = iso_rows(document["iso_9283"], document["measured"])
     assert rows[-1][-1] == "hides the robot's own" and rows[2][1].startswith("100\u00a0µm (80.0")
-    assert iso_rows(made_document(repeats=False)["iso_9283"])[-1][1] == "unknown"
+    assert iso_rows(made_document(repeats=False)["iso_9283"], None) == [
+        ["pose repeatability RP", "unknown", "no pose was approached again"]
+    ]
 
 
 def test_changes_are_named_by_their_joint_and_counted():

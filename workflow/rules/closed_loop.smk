@@ -1,6 +1,7 @@
 """The loop closed on the plant: measured, diagnosed, commanded by the result and measured again.
 
-`snakemake -j2 closed_loop`. Writes results/closed_loop/{robot}.parquet, every commanded pose, and reports/closed_loop/.
+`snakemake -j2 closed_loop`. Writes results/closed_loop/{robot}.parquet, every commanded pose, and reports/closed_loop/, with
+coverage.csv: how often the accuracy that is stated of a corrected robot is that of the plant, for a known and an unknown base.
 """
 
 CLOSED_LOOP = config["closed_loop"]
@@ -18,6 +19,7 @@ rule close_loop:
         "results/timings/close_loop/{robot}.tsv"
     params:
         each=CLOSED_LOOP["each"],
+        slips=CLOSED_LOOP["slips"],
         seed=config["seed"],
     script:
         "../scripts/close_loop.py"
@@ -57,6 +59,41 @@ rule summarize_closed_loop:
         "../scripts/summarize_closed_loop.py"
 
 
+rule state_accuracy:
+    input:
+        robot=f"{CONFIG}/robots/{{robot}}.yaml",
+        sources=sources("state_accuracy.py"),
+    output:
+        stated="results/closed_loop/stated/{robot}_{frame}.csv",
+    log:
+        "results/logs/state_accuracy/{robot}_{frame}.log",
+    benchmark:
+        "results/timings/state_accuracy/{robot}_{frame}.tsv"
+    wildcard_constraints:
+        frame="base|tracker",
+    params:
+        each=CLOSED_LOOP["stated"],
+        seed=config["seed"],
+    script:
+        "../scripts/state_accuracy.py"
+
+
+rule tabulate_coverage:
+    input:
+        stated=expand(rules.state_accuracy.output.stated, robot=CLOSED_LOOP["robots"], frame=["base", "tracker"]),
+        sources=sources("tabulate_coverage.py"),
+    output:
+        cases="reports/closed_loop/stated.csv",
+        coverage="reports/closed_loop/coverage.csv",
+    log:
+        "results/logs/tabulate_coverage.log",
+    benchmark:
+        "results/timings/tabulate_coverage.tsv"
+    script:
+        "../scripts/tabulate_coverage.py"
+
+
 rule closed_loop:
     input:
         rules.summarize_closed_loop.output,
+        rules.tabulate_coverage.output,

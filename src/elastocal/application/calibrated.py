@@ -20,6 +20,7 @@ from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.kinematics import poses
 
 if TYPE_CHECKING:
+    from elastocal.application.accuracy import Scope
     from elastocal.effects.protocol import Candidate
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
@@ -49,6 +50,8 @@ class CalibratedRobot:
         that are left out; zero where held.
     noise : Noise
         Of the campaign, with the repeatability of the joints.
+    scope : Scope or None
+        What its errors mean: see `accuracy`; the base's frame, with every effect commanded, without.
     """
 
     robot: Robot
@@ -56,6 +59,7 @@ class CalibratedRobot:
     estimate: Estimate
     covariance: np.ndarray
     noise: Noise
+    scope: Scope | None = None
 
 
 @dataclass(frozen=True)
@@ -126,11 +130,20 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
     kept = [number for number, effect in enumerate(model.effects) if moves_robot(effect)]
     keys = {model.effects[number].key for number in kept}
     rows = np.flatnonzero([owner in keys for owner, _ in parameters(model, estimate)])
+    bare, values = at_end_effector(model, estimate)
+    bare = replace(bare, effects=tuple(model.effects[number] for number in kept))
+    values = replace(
+        values,
+        coefficients=tuple(estimate.coefficients[number] for number in kept),
+        shapes=tuple(estimate.shapes[number] for number in kept),
+    )
+    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
+
+
+def at_end_effector(model: Model, estimate: Estimate) -> tuple[Model, Estimate]:
+    """A model with all its effects whose one target is the end effector's measuring point, in the robot's base frame."""
     end = model.sites.chain.end_effector
     target = Target("end effector", end.name, end.offset_m)
-    bare = replace(
-        model, targets=(target,), fitted_frames=False, rows=6, effects=tuple(model.effects[number] for number in kept)
-    )
     values = replace(
         estimate,
         sessions=(0,),
@@ -138,10 +151,8 @@ def calibrated_of(robot: Robot, model: Model, estimate: Estimate, covariance: np
         frame_position=np.zeros((1, 3)),
         target_offset=np.array([end.offset_m]),
         target_rotation=np.eye(3)[None],
-        coefficients=tuple(estimate.coefficients[number] for number in kept),
-        shapes=tuple(estimate.shapes[number] for number in kept),
     )
-    return CalibratedRobot(robot, bare, values, covariance[np.ix_(rows, rows)], noise)
+    return replace(model, targets=(target,), fitted_frames=False, rows=6), values
 
 
 def moves_robot(effect: Candidate) -> bool:
@@ -246,14 +257,24 @@ def prediction_covariance(
     ndarray (N, 6, 6)
         m and rad, base axes: displacement and rotation vector.
     """
-    model, estimate, spread = calibrated.model, calibrated.estimate, square_root(calibrated.covariance)
-    covariance = np.zeros((len(reported_angles), 6, 6))
+    moved = pose_sensitivities(calibrated, reported_angles, operating, at_rest) @ square_root(calibrated.covariance)
+    return moved @ moved.transpose(0, 2, 1)
+
+
+def pose_sensitivities(
+    calibrated: CalibratedRobot,
+    reported_angles: np.ndarray,
+    operating: OperatingConditions = NEUTRAL,
+    at_rest: np.ndarray | None = None,
+) -> np.ndarray:
+    """Displacement and rotation of the poses of `forward` by the parameters, ndarray (N, 6, P); as `prediction_covariance`."""
+    model, estimate = calibrated.model, calibrated.estimate
+    found = np.zeros((len(reported_angles), 6, len(calibrated.covariance)))
     for part in _parts(len(reported_angles)):
         seen = observations_of(states_of(calibrated, reported_angles[part], operating.part(part)))
         around = conditions(model, estimate, seen.states, None if at_rest is None else at_rest[part])
-        moved = linearize(model, estimate, seen, around).sensitivities @ spread
-        covariance[part] = moved @ moved.transpose(0, 2, 1)
-    return covariance
+        found[part] = linearize(model, estimate, seen, around).sensitivities
+    return found
 
 
 def states_of(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> States:

@@ -23,9 +23,9 @@ from elastocal.application.calibrated import (
     OperatingConditions,
     coordinates_at_rest,
     end_effector,
-    prediction_covariance,
 )
 from elastocal.application.inverse_kinematics import SOLVED_M, along_path, beyond_limits, reach_m, refined, within_turns
+from elastocal.exchange.target_path import OK
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
 
@@ -33,9 +33,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from elastocal.application.calibrated import CalibratedRobot
-    from elastocal.mechanics.robot import Robot
 
-OK, OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "ok", "outside limits", "unreachable", "singular"
+OUTSIDE_LIMITS, UNREACHABLE, SINGULAR = "outside limits", "unreachable", "singular"
 # Newton's steps: each leaves a five-hundredth, and more near singular postures.
 _STEPS = 8
 # What may be left of a corrected target: far below any robot's repeatability.
@@ -56,11 +55,8 @@ class Correction:
     uncorrected : ndarray (N, n)
         What the rigid robot of the file would be commanded.
     error_before, error_after : ndarray (N, 6)
-        Wanted less predicted pose, displacement and rotation vector in base axes: uncorrected, and with the correction.
-    std_m, std_rad : ndarray (N,)
-        Root mean square length of what the uncertainty of the parameters leaves of position and orientation.
-    repeatability_m : ndarray (N,)
-        Root mean square distance of repeated approaches by the joints' repeatability, as far as the campaign shows it.
+        Wanted less predicted pose, displacement and rotation vector in base axes: uncorrected, and with the correction. How far
+        both are from the truth `accuracy` says.
     status : ndarray of str (N,)
         "ok", "outside limits", "unreachable" or "singular".
     """
@@ -69,9 +65,6 @@ class Correction:
     uncorrected: np.ndarray
     error_before: np.ndarray
     error_after: np.ndarray
-    std_m: np.ndarray
-    std_rad: np.ndarray
-    repeatability_m: np.ndarray
     status: np.ndarray
 
 
@@ -162,21 +155,4 @@ def _corrected(
     status[singular] = SINGULAR
     status[beyond_limits(robot, angles).any(axis=1)] = OUTSIDE_LIMITS
     status[~reached] = UNREACHABLE
-    commands = robot.reported_angles(angles)
-    variances = np.diagonal(prediction_covariance(calibrated, commands, operating, coordinates), axis1=1, axis2=2)
-    return Correction(
-        commands,
-        uncorrected,
-        before,
-        off,
-        np.sqrt(variances[:, :3].sum(axis=1)),
-        np.sqrt(variances[:, 3:].sum(axis=1)),
-        repeatability_m(robot, angles, calibrated.noise.joint_rad),
-        status,
-    )
-
-
-def repeatability_m(robot: Robot, angles: np.ndarray, joint_rad: np.ndarray) -> np.ndarray:
-    """Root mean square distance of repeated approaches, m, ndarray (N,), by the repeatability of the joints, rad, (n,)."""
-    spread = jacobians(robot.chain, angles, robot.chain.end_effector)[:, :3] * joint_rad
-    return np.sqrt((spread**2).sum(axis=(1, 2)))
+    return Correction(robot.reported_angles(angles), uncorrected, before, off, status)

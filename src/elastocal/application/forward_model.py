@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.application.accuracy import scope_from
 from elastocal.application.calibrated import NEUTRAL, CalibratedRobot, calibrated_of, forward
 from elastocal.application.compensation import corrected
 from elastocal.effects import declared_weight, joint_compliance
@@ -116,6 +118,8 @@ def model_document(calibrated: CalibratedRobot) -> dict[str, Any]:
         "effects": [{"key": e.key, "values": linear.tolist(), "shapes": shapes.tolist()} for e, linear, shapes in values],
         "covariance": calibrated.covariance.tolist(),
         "joint_repeatability": calibrated.noise.joint_rad.tolist(),
+        "pose_error_rad": calibrated.noise.pose_rad,
+        "scope": None if calibrated.scope is None else calibrated.scope.document(),
         "time_zero_s": model.time_zero_s,
     }
 
@@ -165,5 +169,7 @@ def calibrated_in(document: Mapping[str, Any], source: str) -> CalibratedRobot:
         tuple(np.array(entry["values"], float) for entry in document["effects"]),
         tuple(np.array(entry["shapes"], float) for entry in document["effects"]),
     )
-    noise = Noise("declared", 0.0, 0.0, np.array(document["joint_repeatability"], float))
-    return calibrated_of(robot, model, estimate, np.array(document["covariance"], float), noise)
+    repeated = np.array(document["joint_repeatability"], float)
+    noise = Noise("declared", 0.0, 0.0, repeated, pose_rad=float(document["pose_error_rad"]))
+    calibrated = calibrated_of(robot, model, estimate, np.array(document["covariance"], float), noise)
+    return replace(calibrated, scope=None if document["scope"] is None else scope_from(document["scope"]))

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal import __version__
+from elastocal.application.accuracy import accuracy_sentence
 from elastocal.application.calibrated import forward
 from elastocal.application.calibrated_geometry import SPRINGS, folded
 from elastocal.application.forward_model import model_document
 
 if TYPE_CHECKING:
+    from elastocal.application.accuracy import Accuracy
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
 
 CONVENTIONS = {
@@ -28,7 +30,7 @@ CONVENTIONS = {
 }
 
 
-def sidecar(calibrated: CalibratedRobot, name: str, date: str) -> dict[str, Any]:
+def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accuracy) -> dict[str, Any]:
     """Contents of the sidecar.
 
     Parameters
@@ -38,6 +40,8 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str) -> dict[str, Any]
         Of the campaign.
     date : str
         Of the export, ISO 8601.
+    accuracy : Accuracy
+        Of the corrected robot.
 
     Returns
     -------
@@ -65,6 +69,7 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str) -> dict[str, Any]
         "date": date,
         "elastocal_version": __version__,
         "conventions": CONVENTIONS,
+        "accuracy": accuracy.document() | {"words": accuracy_sentence(accuracy)},
         "joint_compliance": springs,
         "effects": entries,
         "forward_model": model_document(calibrated),

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.accuracy import predicted
 from elastocal.application.calibrated import OperatingConditions, calibrated_from, nominal_forward
-from elastocal.application.compensation import OK, corrected
+from elastocal.application.compensation import corrected
 from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, refined
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.rehearsal import ERRORS_OF_GEOMETRY, hidden_robot, reached
@@ -24,16 +25,19 @@ from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
+from elastocal.exchange.target_path import OK
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
 from elastocal.fitting.tolerances import fit_declared
-from elastocal.loop.whole import cases_in
+from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal.plant.campaigns import Design, schedule_of, usual_force_N
 from elastocal.plant.defects import KINDS
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.random_numbers import stream
+from elastocal.plant.tracker import misplaced_base
 from elastocal.plant.weights import declared_masses
 
 if TYPE_CHECKING:
@@ -45,6 +49,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.mechanics.robot import Robot
+    from elastocal.plant.bad_rows import BadReading
     from elastocal.plant.physical_robot import PhysicalRobot
 
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
@@ -65,7 +70,7 @@ _TRIES = 200
 _STEPS = 5
 # Effects by the approach, which no command of a path states.
 _BY_APPROACH = ("hysteresis",)
-_DESIGN = Design(declared=ERRORS_OF_GEOMETRY)
+CAMPAIGN = Design(declared=ERRORS_OF_GEOMETRY)
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,9 @@ def hidden_effects(robot: PhysicalRobot) -> list[str]:
     )
 
 
-def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int) -> dict[str, np.ndarray]:
+def closed_loop(
+    robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int, slips: bool = False
+) -> dict[str, np.ndarray]:
     """One robot with one hidden defect, from campaign to corrected targets that were measured.
 
     Parameters
@@ -112,6 +119,9 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
     effect : str
         Hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights.
     seed : int
+    slips : bool
+        Whether the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and
+        whether the robot reached it, is then of the declared base.
 
     Returns
     -------
@@ -119,38 +129,52 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
         One row for each wanted pose and model, columns as `schema` has them.
     """
     plant, _ = hidden_robot(robot_file, seed, [effect])
-    training = _measured(plant, robot_file, robots_folder, seed)
+    if slips:
+        plant = replace(plant, tracker=replace(plant.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
+    training, held_out = measured_cases(plant, robot_file, robots_folder, CAMPAIGN, seed, slips)
     found = diagnose(training, Settings(), seed)
     robot = training.campaign.robot
-    wanted = _wanted(robot, plant, seed)
+    wanted = wanted_poses(robot, plant, seed)
     operating = OperatingConditions(wanted.wrench)
     rows = []
     models = {
         GEOMETRY: calibrated_from(_geometry(training, found), replace(robot, masses=())),
         DECLARED: calibrated_from(found.declared, robot),
-        FOUND: calibrated_from(found.final, robot),
+        FOUND: calibrated_by(found, held_out),
     }
     for name in MODELS:
         if name == UNCORRECTED:
-            commands, predicted, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
+            commands, stated, good = wanted.start, np.zeros(len(wanted.part)), np.ones(len(wanted.part), bool)
         elif name == TRUE:
             commands, good = _by_plant(plant, robot, wanted, seed)
-            predicted = np.zeros(len(wanted.part))
+            stated = np.zeros(len(wanted.part))
         else:
-            commands, predicted, good = _by_model(models[name], wanted, operating)
-        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": predicted, "corrected": good})
+            commands, stated, good = _by_model(models[name], wanted, operating)
+        rows.append(_moved(plant, wanted, commands, seed) | {"model": name, "predicted_std_m": stated, "corrected": good})
     named = effect in {entry["name"] for entry in found.document["effects"] if entry["adopted"]}
     head = {"effect": effect, "seed": seed, "verdict": found.document["verdict"], "named": named}
     count = len(wanted.part)
     return {name: np.concatenate([np.broadcast_to((head | row)[name], count) for row in rows]) for name in (*head, *rows[0])}
 
 
-def _measured(plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, seed: int) -> Case:
-    """The training part of a campaign of the plant, by way of its folder."""
-    schedule = schedule_of(plant.arm, _DESIGN, seed)
+def measured_cases(
+    plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, design: Design, seed: int, lost_beam: bool = False
+) -> tuple[Case, Case]:
+    """Training and held-out part of a campaign of the plant, by way of its folder; perhaps with a fitted row that was lost."""
+    schedule, declared = schedule_of(plant.arm, design, seed), declared_masses(plant.arm)
+    draws = stream(seed, "lost beam")
+
+    def lost(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[BadReading]]:
+        """One lost row, of a pose that is fitted."""
+        kind, held_out = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
+        tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
+        return next((bad, lost) for bad, lost in tries if table["pose"][lost[0].rows[0]] < held_out)
+
     with tempfile.TemporaryDirectory() as folder:
-        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, _DESIGN, schedule, declared_masses(plant.arm))
-        return cases_in(folder, robots_folder)[0]
+        write_blind_campaign(
+            Path(folder), "closed_loop", robot_file, plant, design, schedule, declared, slipped=lost if lost_beam else None
+        )
+        return cases_in(folder, robots_folder)
 
 
 def _geometry(case: Case, found: Diagnosis) -> Fit:
@@ -165,7 +189,8 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     return fit_declared(model, select_states(case.observations, unloaded), found.declared.noise)
 
 
-def _wanted(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
+    """Poses of all parts that a robot shall reach: random ones without and under load, and a path of milling."""
     draws = stream(seed, "wanted poses")
     low, high = robot.joint_limits.T
     force = usual_force_N(plant.arm)
@@ -228,7 +253,7 @@ def _by_model(
     calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    return found.joint_angles, np.hypot(found.std_m, found.repeatability_m), found.status == OK
+    return found.joint_angles, predicted(calibrated, found.joint_angles, operating).error_m, found.status == OK
 
 
 def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -237,16 +262,23 @@ def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> 
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
     for _ in range(_STEPS):
-        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+        off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
         step = (inverse @ off[..., None])[..., 0]
         commands = robot.reported_angles(robot.model_angles(commands) + step)
-    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+    off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
     return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
+
+
+def _reached(plant: PhysicalRobot, commands: np.ndarray, wrench: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector comes to rest, in the frame that is declared as the base's."""
+    position, rotation = reached(plant, commands, wrench, seed)
+    seen = plant.tracker.seen(position[:, None], rotation[:, None], np.zeros(len(position)))
+    return seen[0][:, 0], seen[1][:, 0]
 
 
 def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
-    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
+    position, rotation = _reached(plant, commands, wanted.wrench, seed + 1)
     read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.errors import InputError
 from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
@@ -352,6 +353,8 @@ class MeasurementFile:
         if not sound.all():
             index = int(np.argmin(sound))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
+        if (place := beyond(name, values)) is not None:
+            raise self.cell_fault(place, name, shown(self.columns[name][place]), BOUNDS[name].allowed)
         return values
 
 

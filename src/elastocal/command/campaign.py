@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def diagnosed_campaign(folder: Path) -> Diagnosed:
-    """A campaign with what its diagnosis found, from the results of the pipeline.
+    """A campaign with what its diagnosis found, from the results of the pipeline, and what held-out poses said of its errors.
 
     Parameters
     ----------
@@ -29,9 +29,12 @@ def diagnosed_campaign(folder: Path) -> Diagnosed:
     InputError
         As `load_diagnosed`.
     """
-    from elastocal.loop.calibrated_files import load_diagnosed
+    from elastocal.io.json_files import read_json
+    from elastocal.loop.calibrated_files import judged_as, load_diagnosed
 
-    return load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
+    found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
+    verdict = report_file(found.name, "verdict.json")
+    return found if verdict is None else judged_as(found, read_json(verdict))
 
 
 def report_file(name: str, file: str) -> Path | None:
@@ -59,21 +62,3 @@ def report_file(name: str, file: str) -> Path | None:
     check_checksums([place], workplace())
     path = workplace() / place
     return path if path.is_file() else None
-
-
-def held_out_rms_m(name: str) -> float | None:
-    """What the model of a campaign missed its held-out poses by (RMS), m; None where no verdict says so.
-
-    Parameters
-    ----------
-    name : str
-        Of the campaign.
-
-    Returns
-    -------
-    float or None
-    """
-    from elastocal.io.json_files import read_json
-
-    path = report_file(name, "verdict.json")
-    return None if path is None else read_json(path)["heldout"]["after"]["rms_m"]

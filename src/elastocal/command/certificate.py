@@ -12,7 +12,7 @@ from rich.console import Console
 from elastocal.command.campaign import diagnosed_campaign, report_file
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, printed
-from elastocal.command.quantities import length_m
+from elastocal.command.quantities import LARGEST_SEED, length_m
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -22,13 +22,24 @@ def certificate(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     tolerance: Annotated[str, typer.Option(help="On the RMS position error, such as 0.2mm.")],
     risk: Annotated[float, typer.Option(min=0.001, max=0.5, help="Accepted risk of a wrong decision.")] = 0.05,
+    measured: Annotated[
+        Path | None,
+        typer.Option(
+            help="Campaign that was measured at corrected targets, with the targets.csv of `elastocal correct` in its folder: "
+            "pose k is row k of it. Without, the certificate states what is predicted."
+        ),
+    ] = None,
     compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
     serial: Annotated[str | None, typer.Option(help="Serial number of the robot; the campaign's without.")] = None,
     date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
     output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
 ) -> None:
-    """Pose accuracy and repeatability, error map and budget, pass or fail with the risk of being wrong, what changed."""
+    """Accuracy against a tolerance, with the risk of being wrong; repeatability, error budget and map; what changed.
+
+    Exit code 0 if the robot passes, 1 if it fails or if that cannot be decided. A robot that nobody measured after correction
+    is predicted to pass or fail; --measured states what was measured.
+    """
     from datetime import date as calendar
 
     import pandas as pd
@@ -39,6 +50,7 @@ def certificate(
     from elastocal.io.json_files import read_json, write_json
     from elastocal.loop.certificate import Wanted
     from elastocal.loop.certificate import certificate as certified
+    from elastocal.loop.measured import measured_errors
     from elastocal.report.certificate_pages import write_certificate
     from elastocal.report.certificate_words import certificate_facts
 
@@ -49,18 +61,20 @@ def certificate(
     day = calendar.today().isoformat() if date is None else iso_date("--date", date)
     found = diagnosed_campaign(folder)
     other = None if compare is None else diagnosed_campaign(compare)
+    robots = pipeline() / "config" / "robots"
+    after = None if measured is None else measured_errors(measured, robots, found)
     reports = workplace() / "reports" / "loop" / found.name
-    needed = [reports / name for name in ("verdict.json", "before_after.csv", "residuals.parquet")]
+    needed = [reports / name for name in ("verdict.json", "before_after.csv")]
     for path in needed:
         if report_file(found.name, path.name) is None:
             raise InputError(path, "", "no report of the diagnosis", f"elastocal diagnose {folder}")
     verdict = read_json(needed[0])
     if any(effect["family"] == "data" for effect in verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    steps, residuals = pd.read_csv(needed[1]), pd.read_parquet(needed[2]).query("not gross_error")
+    steps = pd.read_csv(needed[1])
     wanted = Wanted(limit, risk, number, day, seed)
     with console.status("working"):
-        document, maps = certified(folder, pipeline() / "config" / "robots", found, verdict, steps, residuals, wanted, other)
+        document, maps = certified(folder, robots, found, verdict, steps, wanted, other, after)
         facts = certificate_facts(document)
         place = output or reports
         place.mkdir(parents=True, exist_ok=True)
@@ -80,3 +94,4 @@ def certificate(
         f"    {place / PAGES}, {place / DOCUMENT}",
     ):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
+    raise typer.Exit(0 if facts["decision"] == "pass" else 1)

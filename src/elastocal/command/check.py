@@ -54,6 +54,8 @@ def show(facts: Mapping[str, Any], console: Console) -> None:
 
 def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What is shown, as pairs of a heading and words."""
+    from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+
     noise = facts["noise"]
     left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
@@ -74,6 +76,9 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         found.append(
             ("compliance" if joint == 1 else "", f"joint {joint}: {spring['value_urad_per_Nm']:.3g} µrad/(N m) {words}")
         )
+    if facts["accuracy"]:
+        sentence = accuracy_sentence(accuracy_from(facts["accuracy"]))
+        found.append(("accuracy", f"if nothing is missing in the declared model: {sentence}"))
     found.append(("testable", f"{facts['testable']} candidate effects"))
     found += [("", f"{count} not: {reason}") for reason, count in facts["untestable"].items()]
     found += [("data fault", fault["sentence"]) for fault in facts["faults"]]

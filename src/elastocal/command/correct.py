@@ -9,14 +9,16 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from elastocal.command.campaign import diagnosed_campaign, held_out_rms_m
+from elastocal.command.campaign import diagnosed_campaign
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
+    from elastocal.application.accuracy import Prediction
     from elastocal.application.compensation import Correction
+    from elastocal.exchange.target_path import TargetPath
 
 # Lines that a message names.
 _NAMED = 5
@@ -28,10 +30,18 @@ def correct(
     output: Annotated[Path, typer.Option(help="CSV of joint targets.")],
     partial: Annotated[bool, typer.Option("--partial", help="Write the file though some targets cannot be reached.")] = False,
 ) -> None:
-    """Joint targets that bring the loaded, sagging, imperfect robot to the wanted poses."""
+    """Joint targets that bring the loaded, sagging, imperfect robot to the wanted poses, and by how much it will miss them.
+
+    Predicted errors are stated as `elastocal certificate` states them: in the frame of the declared base, or, where the base is
+    unknown, in the robot's own frame after its best placement over the campaign's poses.
+    """
+    import numpy as np
+
+    from elastocal.application.accuracy import accuracy_sentence, before_m, millimetres, predicted
     from elastocal.application.calibrated import OperatingConditions, assumptions
-    from elastocal.application.compensation import OK, corrected
-    from elastocal.exchange.target_path import read_target_path
+    from elastocal.application.compensation import corrected
+    from elastocal.application.scope import campaign_accuracy
+    from elastocal.exchange.target_path import OK, read_target_path
     from elastocal.io.data_frames import write_csv
     from elastocal.validation.fitted_range import beyond_campaign
 
@@ -60,60 +70,49 @@ def correct(
     beyond = beyond_campaign(
         campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles), wanted.wrench
     )
-    write_csv(output, joint_targets(found, beyond))
+    errors = predicted(calibrated, found.joint_angles, operating)
+    before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
+    write_csv(output, joint_targets(wanted, found, before, errors, beyond))
     if beyond.any():
         share = f"{beyond.sum():,} of {len(beyond):,} targets"
         line = f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"
         console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(summary(found), markup=False, highlight=False, soft_wrap=True)
-    missed = held_out_rms_m(campaign.name)
-    if missed is not None:
-        line = f"the campaign's held-out poses were missed by {1e3 * missed:.3f} mm (RMS, with the tracker's noise)"
+    good = found.status == OK
+    lines = [f"{good.sum():,} of {len(good):,} targets corrected"]
+    if good.any():
+        rms = np.sqrt((before[good] ** 2).mean())
+        reachable = predicted(calibrated, found.joint_angles[good], operating.part(good)) if len(bad) else errors
+        lines[0] += f"; uncorrected they would be missed by {millimetres(rms)} RMS (predicted, in the same frame)"
+        lines.append(accuracy_sentence(reachable.accuracy("the targets")))
+        lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
+    for line in lines:
         console.print(line, markup=False, highlight=False, soft_wrap=True)
     console.print(f"    {output}", markup=False, highlight=False, soft_wrap=True)
 
 
-def joint_targets(found: Correction, beyond: np.ndarray) -> pd.DataFrame:
-    """The file of joint targets.
+def joint_targets(
+    wanted: TargetPath, found: Correction, before: np.ndarray, errors: Prediction, beyond: np.ndarray
+) -> pd.DataFrame:
+    """The file of joint targets: wanted poses, commands q1..qn (rad, as the controller reports them), predicted errors, status.
 
-    Parameters
-    ----------
-    found : Correction
-    beyond : ndarray of bool (N,)
-        Whether each lies beyond what the campaign measured.
-
-    Returns
-    -------
-    pandas.DataFrame
-        q1..qn (rad, as the controller reports them), predicted errors (m, rad) and the status.
+    `before` (N,) is what uncorrected targets would be missed by, m; `beyond` whether each lies beyond what was measured.
     """
     import numpy as np
     import pandas as pd
+    from scipy.spatial.transform import Rotation
 
+    pose = np.column_stack([wanted.position, Rotation.from_matrix(wanted.rotation).as_rotvec()])
+    columns = dict(zip(("x", "y", "z", "rx", "ry", "rz"), pose.T, strict=True))
     angles = {f"q{joint}": column for joint, column in enumerate(found.joint_angles.T, 1)}
     nominal = {f"q{joint}_uncorrected": column for joint, column in enumerate(found.uncorrected.T, 1)}
-    errors = {
-        "predicted_error_before_m": np.linalg.norm(found.error_before[:, :3], axis=1),
-        "predicted_error_after_m": np.linalg.norm(found.error_after[:, :3], axis=1),
-        "predicted_std_m": found.std_m,
+    stated = {
+        "predicted_error_before_m": before,
+        "predicted_error_after_m": errors.error_m,
+        "predicted_bound_m": errors.bound_m,
+        "predicted_std_m": np.hypot(errors.parameters_m, errors.repeated_m),
         "predicted_rotation_before_rad": np.linalg.norm(found.error_before[:, 3:], axis=1),
-        "predicted_rotation_std_rad": found.std_rad,
-        "repeatability_m": found.repeatability_m,
+        "predicted_rotation_std_rad": errors.std_rad,
+        "repeatability_m": errors.repeated_m,
         "outside_range": beyond,
     }
-    return pd.DataFrame(angles | errors | {"status": found.status} | nominal)
-
-
-def summary(found: Correction) -> str:
-    """One line on how many targets were corrected, and what their errors are predicted to be."""
-    import numpy as np
-
-    from elastocal.application.compensation import OK
-
-    good = found.status == OK
-    line = f"{good.sum():,} of {len(good):,} targets corrected"
-    if not good.any():
-        return line
-    before = 1e3 * np.sqrt((found.error_before[good, :3] ** 2).sum(axis=1).mean())
-    after = 1e3 * np.sqrt((found.std_m[good] ** 2).mean())
-    return f"{line}; predicted position error (RMS) {before:.3f} mm uncorrected, {after:.3f} mm corrected"
+    return pd.DataFrame(angles | stated | {"status": found.status} | columns | nominal)

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +27,10 @@ def export(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
     table: Annotated[
-        int, typer.Option(min=0, help="Rows of a table of errors over the joint space, for programs that cannot run the model.")
+        int,
+        typer.Option(
+            min=0, max=MOST_ROWS, help="Rows of a table of errors over the joint space, for programs that cannot run the model."
+        ),
     ] = 0,
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
@@ -37,8 +41,10 @@ def export(
     import numpy as np
     import yaml
 
+    from elastocal.application.accuracy import accuracy_sentence
     from elastocal.application.calibrated import OperatingConditions
     from elastocal.application.calibrated_geometry import folded
+    from elastocal.application.scope import campaign_accuracy
     from elastocal.application.sidecar import left_out_m, sidecar
     from elastocal.exchange.urdf_writing import urdf_of
     from elastocal.io.atomic_writes import write_text
@@ -54,9 +60,10 @@ def export(
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     write_text(output / ROBOT, f"# {stated}\n{text}")
     write_text(output / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
-    document = sidecar(calibrated, found.name, date or calendar.today().isoformat())
+    accuracy = campaign_accuracy(calibrated, found.case.observations.states)
+    document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
     write_json(output / SIDECAR, document)
-    lines = [f"    {output / name}" for name in (ROBOT, URDF, SIDECAR)]
+    lines = [accuracy_sentence(accuracy), *(f"    {output / name}" for name in (ROBOT, URDF, SIDECAR))]
     lines += _denavit_hartenberg(calibrated.robot, robot, output)
     if table:
         lines += _table(calibrated, table, force, output)

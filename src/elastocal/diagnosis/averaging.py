@@ -111,6 +111,20 @@ def expected_to_help(problem: Problem, posterior: Posterior, model: Model) -> bo
     return bool(mine @ gram @ (2.0 * mean - mine) > 0.0)
 
 
+def other_predictions(problem: Problem, posterior: Posterior, model: Model) -> float:
+    """How otherwise the models of a posterior predict than one of them: sum of squares of whitened numbers, over probabilities.
+
+    The smooth error of unknown cause is in no model that is kept: it names nothing and is not used to predict, but the robot
+    has it all the same.
+    """
+    gram, mine = problem.statistics.gram[0], _predicted(problem, model)
+    for number in model.units:
+        if problem.units[number].candidate is None:
+            mine[problem.units[number].columns] = 0.0
+    off = [(probability, _predicted(problem, other) - mine) for other, probability in _likely(posterior, model)]
+    return float(sum(probability * (apart @ gram @ apart) for probability, apart in off))
+
+
 def _likely(posterior: Posterior, best: Model) -> list[tuple[Model, float]]:
     """Models that count, and the best, with their probabilities."""
     pairs = zip(posterior.models, posterior.probabilities, strict=True)

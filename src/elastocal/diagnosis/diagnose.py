@@ -11,7 +11,7 @@ from elastocal.data_checks.catalogue import faults
 from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
-from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, squares_explained
+from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
@@ -266,6 +266,7 @@ def _document(
     probabilities: dict[str, Any] | None = None
     untestable: dict[str, str] = {}
     misfit: dict[str, float] | None = None
+    other_m: float | None = None
     verdict = NAMED if len(decisive) == 1 else SEVERAL
     remarks = [*warnings, *(f"{fault['name']}: {fault['detail']}" for fault in listed if not fault["decisive"])]
     if found:
@@ -283,6 +284,9 @@ def _document(
             remarks.append("what was found is too uncertain to make predictions better: the model stays as declared")
         remarks += findings.implausible(with_effects, entries, case.campaign.robot.payload_kg)
         misfit = _misfit(found)
+        kept = found.posterior.models[conclusion.best.model] if found.adopted else found.posterior.nothing
+        numbers = found.linearized.products.freedom
+        other_m = float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers)) * noise.position_m
         remarks += _pose_error_warnings(final.noise, found.linearized)
     remarks += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
     for name, fitted in (("declared", declared), ("final", final)):
@@ -296,6 +300,8 @@ def _document(
         "probabilities": probabilities,
         "noise": _noise_facts(noise, final.noise),
         "misfit": misfit,
+        # Root mean square by which positions may be elsewhere by other models than the one that is kept.
+        "other_models_m": other_m,
         "heldout": None,
         "kept": steps[-1].kind.replace("kept", "frames"),
         "compliance_urad_per_Nm": _compliances(declared, final, springs),

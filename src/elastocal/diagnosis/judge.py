@@ -17,7 +17,7 @@ from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan
 from elastocal.remainder.shares import remainder_facts
-from elastocal.validation.fitted_range import outside_poses
+from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
     errors_by_range,
@@ -201,7 +201,8 @@ def heldout_errors(
         "share_below_max": share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
-    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
+    again = repeat_warnings(case.observations.states, held_out.observations.states)
+    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)) + again
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:

@@ -397,7 +397,7 @@ def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, l
             # The best may lie at an end of the range.
             sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
             closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
-            found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
+            found[unit.candidate.key] = [(float(value),) for value in sorted({*tried, *closer})]
     return found
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import read_text_table
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
+# Of a corrected target, and where it is.
+OK, STATUS = "ok", "status"
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -113,6 +116,34 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
 
 
+@dataclass(frozen=True)
+class CorrectedTargets:
+    """What `correct` wrote: wanted poses in base axes, m, the joint angles (N, n) to command, rad, and each one's status."""
+
+    position: np.ndarray
+    rotation: np.ndarray
+    joint_angles: np.ndarray
+    status: np.ndarray
+
+
+def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
+    """Read a file that `elastocal correct` wrote; other columns than those of `CorrectedTargets` do not matter.
+
+    Raises
+    ------
+    InputError
+        A column that is missing, or a cell that is no finite number.
+    """
+    read = read_text_table(path, lambda _: True, "comma", "point")
+    angles = tuple(f"q{j}" for j in range(1, joints + 1))
+    for name in (*_POSE, *angles, STATUS):
+        if name not in read.columns:
+            raise InputError(path, f"line {read.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
+    pose, commands = (np.column_stack([_numbers(read, name) for name in names]) for names in (_POSE, angles))
+    status = np.array([cell.strip() for cell in read.columns[STATUS]])
+    return CorrectedTargets(pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix(), commands, status)
+
+
 def _numbers(read: TextTable, name: str) -> np.ndarray:
     """A column, ndarray (N,)."""
     values = np.zeros(len(read.lines))
@@ -123,4 +154,7 @@ def _numbers(read: TextTable, name: str) -> np.ndarray:
                 read.path, f"line {read.lines[index]}, column {name}", repr(cell), "a number such as -0.25 or 2.5e-3"
             )
         values[index] = value
+    if (place := beyond(name, values)) is not None:
+        found = repr(read.columns[name][place])
+        raise InputError(read.path, f"line {read.lines[place]}, column {name}", found, BOUNDS[name].allowed)
     return values

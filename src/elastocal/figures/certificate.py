@@ -23,7 +23,7 @@ _BINS = 24
 _FEWEST = 3
 _MILLI = 1e3
 # What is left however well the robot is corrected.
-_REST = ("uncertainty of the parameters", "repeatability")
+_REST = ("uncertainty of the parameters", "repeatability", "form of the model", "not commanded")
 
 
 @styled

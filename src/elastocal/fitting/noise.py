@@ -38,6 +38,8 @@ FINEST = 1e-8
 # power.
 _UPPER = 0.8
 _SMALLEST_RAD, _LARGEST_RAD = 1e-8, 1e-2
+# Deviations of a joint that are tried between these: steps of two fifths.
+_DEVIATIONS = 40
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,35 @@ def noise_from_repeats(model: Model, estimate: Estimate, measurements: Measureme
     inflation = np.sqrt(per_joint / chi2.ppf(1 - _UPPER, per_joint))
     sensors = float(values[0]), float(values[rows // 3 - 1])
     return Noise("repeats", *sensors, values[rows // 3 :] * inflation, total, usual_m=usual)
+
+
+def hidden_repeatability(model: Model, estimate: Estimate, measurements: Measurements) -> tuple[float, float]:
+    """How well joints repeat, all alike, where the sensor hides each of them: root mean square of what repeats leave possible,
+    and the degrees of freedom that its square has.
+
+    rad; by the restricted likelihood of `noise_from_repeats`, its maximum over the sensor's part, evenly over the deviation of
+    a joint. Zeros where there are too few repeats to say anything: then it is not known.
+    """
+    contrasts, jacobians = _contrasts(model, estimate, measurements)
+    if sum(part.size for part in contrasts) < FEWEST:
+        return 0.0, 0.0
+    data = [_seen(*pair) for pair in zip(contrasts, jacobians, strict=True)]
+    sensors, joints = model.rows // 3, model.sites.joints
+    counts, squares = sum(part.count for part in data), np.sum([part.squares for part in data], axis=0)
+    start = 0.5 * np.log(np.maximum(squares / counts, FINEST**2))
+    deviations = np.geomspace(_SMALLEST_RAD, _LARGEST_RAD, _DEVIATIONS)
+
+    def value(free: np.ndarray, joint: float) -> tuple[float, np.ndarray]:
+        total, slope = _negative_log_likelihood(np.concatenate([free, np.full(joints, np.log(joint))]), data)
+        return total, slope[:sensors]
+
+    bounds = [(at - 7, at + 1) for at in start]
+    likelihood = -np.array([minimize(value, start, (joint,), "L-BFGS-B", jac=True, bounds=bounds).fun for joint in deviations])
+    # Even steps of the logarithm: each stands for a range as wide as the deviation itself.
+    weights = np.exp(likelihood - likelihood.max()) * deviations
+    weights /= weights.sum()
+    mean = float(weights @ deviations**2)
+    return float(np.sqrt(mean)), 2.0 * mean**2 / float(weights @ (deviations**2 - mean) ** 2)
 
 
 def chosen_noise(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import calibrated_of
+from elastocal.application.scope import calibrated_on, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.errors import InputError
 from elastocal.fitting.case import case_from, noise_from
@@ -97,8 +97,17 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str |
     model, estimate = step_model(case, facts, steps, last)
     covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
     noise = noise_from({"noise": facts["steps"][last]["noise"]})
-    calibrated = calibrated_of(case.campaign.robot, model, estimate, covariance, noise)
+    calibrated = calibrated_on(case, model, estimate, covariance, noise)
+    calibrated = with_form(calibrated, facts["document"].get("other_models_m") or 0.0)
     return Diagnosed(name, case, calibrated, facts["document"])
+
+
+def judged_as(found: Diagnosed, verdict: Mapping[str, Any]) -> Diagnosed:
+    """A diagnosed campaign whose predicted errors are as large as verdict.json says after a look at held-out poses."""
+    stated = verdict.get("accuracy")
+    if not stated:
+        return found
+    return replace(found, calibrated=with_form(found.calibrated, stated["form_m"], stated["contradicted"]))
 
 
 def _described(descriptions: Mapping[str, Any] | None) -> dict[str, Any] | None:

@@ -11,21 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.application.calibrated import OperatingConditions
+from elastocal.application.accuracy import predicted
 from elastocal.application.certificate.comparison import compared
 from elastocal.application.certificate.error_budget import error_budget
 from elastocal.application.certificate.repeatability import of_sensor, repeatability
-from elastocal.application.certificate.workspace import (
-    calibration_factor,
-    drawn_angles,
-    position_covariance,
-    workspace_errors,
-)
+from elastocal.application.certificate.workspace import drawn_angles, workspace_errors
+from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
-from elastocal.mechanics.components import WRENCH_NAMES
 from elastocal.random_streams import stream
-from elastocal.validation.conformity import conformity
-from elastocal.validation.held_out import Errors, share_below_largest
+from elastocal.validation.conformity import conformity, predicted_conformity
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -34,6 +28,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.certificate.workspace import WorkspaceErrors
     from elastocal.loop.calibrated_files import Diagnosed
+    from elastocal.loop.measured import MeasuredErrors
 
 # Poses of the map: a bin of 25 by 25 has some ten.
 _POSES = 6000
@@ -68,9 +63,9 @@ def certificate(
     found: Diagnosed,
     verdict: Mapping[str, Any],
     steps: pd.DataFrame,
-    residuals: pd.DataFrame,
     wanted: Wanted,
     other: Diagnosed | None = None,
+    measured: MeasuredErrors | None = None,
 ) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
     """Contents of a certificate.
 
@@ -82,11 +77,13 @@ def certificate(
         The campaign.
     verdict : dict
         Contents of verdict.json.
-    steps, residuals : pandas.DataFrame
-        before_after.csv and residuals.parquet.
+    steps : pandas.DataFrame
+        before_after.csv.
     wanted : Wanted
     other : Diagnosed, optional
         An earlier campaign of the same robot.
+    measured : MeasuredErrors, optional
+        Of the corrected robot; without, what is stated of it is predicted.
 
     Returns
     -------
@@ -96,34 +93,26 @@ def certificate(
         Without load, and under the largest force of the campaign where it has any, hanging.
     """
     calibrated, case = found.calibrated, found.case
-    robot, campaign = calibrated.robot, case.campaign
-    end = robot.chain.end_effector.name
-    held_out = residuals[residuals["held_out"]]
-    errors, rows = _errors(held_out)
+    robot, campaign, states = calibrated.robot, case.campaign, case.observations.states
 
     def draws(purpose: str) -> np.random.Generator:
         return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
 
-    at_end = rows[[campaign.targets[number].point == end for number in rows["target"]]]
-    factor = 1.0
-    if len(at_end):
-        operating = OperatingConditions(at_end[list(WRENCH_NAMES)].to_numpy())
-        covariance = position_covariance(calibrated, robot.reported_angles(_angles(at_end, robot.joints)), operating)
-        factor = calibration_factor(at_end["distance"].to_numpy(), covariance, calibrated.noise.position_m)
-    fitted = case.observations.states
-    every = residuals.drop_duplicates(["session", "pose", "load"])
-    reported = robot.reported_angles(_angles(every, robot.joints))
-    budget = error_budget(
-        calibrated, reported, OperatingConditions(every[list(WRENCH_NAMES)].to_numpy()), _DRAWS, draws("budget")
-    )
+    poses = campaign_poses(calibrated, states)
+    prediction = predicted(calibrated, *poses)
+    accuracy = prediction.accuracy(REGION)
+    decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
+    if measured is not None:
+        terms = wanted.tolerance_m, wanted.accepted_risk, _REPLICATES
+        decision = conformity(measured.errors, *terms, draws("conformity"), measured.noise_m)
     angles = drawn_angles(calibrated, _POSES, draws("workspace"))
-    largest = float(np.linalg.norm(every[list(WRENCH_NAMES[:3])].to_numpy(), axis=1).max())
+    largest = float(np.linalg.norm(states.wrench[:, :3], axis=1).max())
     forces = [0.0, largest] if largest > 0.0 else [0.0]
     maps = [
-        workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]), fitted.joint_angles, factor)
+        workspace_errors(calibrated, angles, np.array([0.0, 0.0, -force, 0.0, 0.0, 0.0]), states.joint_angles)
         for force in forces
     ]
-    repeats = repeatability(campaign.measurements, campaign.targets, end)
+    repeats = repeatability(campaign.measurements, campaign.targets, robot.chain.end_effector.name)
     document: dict[str, Any] = {
         "campaign": found.name,
         "robot": robot.name,
@@ -131,23 +120,22 @@ def certificate(
         "date": wanted.date,
         "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
         "files": {Path(file).name: _digest(file) for file in campaign_files(folder, robots_folder)},
+        "measured_files": {} if measured is None else {name: _digest(file) for name, file in measured.files.items()},
         "verdict": verdict["verdict"],
         "effects": [effect["name"] for effect in verdict["effects"]],
         "held_out": [_step(row) for _, row in steps.iterrows()],
         "noise_floor_rms_m": verdict["heldout"]["noise_floor_rms_m"],
-        "conformity": asdict(conformity(errors, wanted.tolerance_m, wanted.accepted_risk, _REPLICATES, draws("conformity")))
-        | {"share_below_largest": share_below_largest(errors.poses)},
+        "accuracy": (accuracy if measured is None else measured.accuracy).document(),
+        "predicted": accuracy.document(),
+        "conformity": asdict(decision),
+        "measured": None if measured is None else measured.document(),
         "iso_9283": {
-            "pose_accuracy_mean_m": float(rows["distance"].mean()),
-            "pose_accuracy_largest_m": float(rows["distance"].max()),
-            "poses": errors.poses,
             "repeatability": None if repeats is None else asdict(repeats),
             "repeatability_of_sensor_m": of_sensor(calibrated.noise.position_m),
         },
-        "budget": [asdict(share) for share in budget],
-        "budget_states": len(every),
+        "budget": [asdict(share) for share in error_budget(calibrated, *poses, _DRAWS, draws("budget"))],
+        "budget_states": accuracy.poses,
         "workspace": [_summary(force, each) for force, each in zip(forces, maps, strict=True)],
-        "bound_factor": factor,
         "comparison": None,
     }
     if other is not None:
@@ -155,18 +143,6 @@ def certificate(
             compared(other.calibrated, calibrated, angles[:_COMPARED], _DRAWS, draws("comparison"))
         )
     return document, maps
-
-
-def _errors(held_out: pd.DataFrame) -> tuple[Errors, pd.DataFrame]:
-    """Errors of the final model on held-out poses with repeats averaged, and the rows behind them."""
-    keys = ["session", "pose", "load", "target"]
-    rows = held_out.groupby(keys, as_index=False).mean(numeric_only=True)
-    rows["distance"] = np.linalg.norm(rows[["after_dx", "after_dy", "after_dz"]].to_numpy(), axis=1)
-    return Errors(rows["distance"].to_numpy(), rows.groupby(["session", "pose"]).ngroup().to_numpy()), rows
-
-
-def _angles(rows: pd.DataFrame, joints: int) -> np.ndarray:
-    return rows[[f"q{joint}" for joint in range(1, joints + 1)]].to_numpy()
 
 
 def _step(row: pd.Series) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
 
-Held-out poses are counted and no more.
+Held-out poses are counted, and their joint angles compared with those fitted; what was measured at them is not looked at.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.application.scope import calibrated_on, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
 from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
@@ -22,6 +23,7 @@ from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
+from elastocal.validation.fitted_range import repeat_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -53,7 +55,8 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         ``faults`` (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``,
         ``effective_parameters`` (without what priors decide) and ``held`` (those that are not identifiable); ``compliance``
         (value, relative standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate
-        effects, by reason); ``suspicious``, sentences; ``diagnosable``.
+        effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted to have which is
+        corrected by the declared model, if nothing is missing in it (`Accuracy.document`), None where the data are at fault.
 
     Raises
     ------
@@ -88,11 +91,22 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "faults": [{"name": f.name, "sentence": f.detail, "decisive": f.decisive} for f in found],
         "residual_rms_m": float(np.sqrt((declared.residual[:, :3] ** 2).sum(axis=1).mean())),
         "diagnosable": not decisive,
+        "accuracy": None,
     }
+    if not decisive:
+        fitted = calibrated_on(case, declared.model, declared.estimate, declared.covariance, noise)
+        facts["accuracy"] = campaign_accuracy(fitted, states).document()
     return (
         facts
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *warnings_of(left_out), *_suspicious(campaign, facts, case, settings)]}
+        | {
+            "suspicious": [
+                *warnings,
+                *warnings_of(left_out),
+                *_suspicious(campaign, facts, case, settings),
+                *repeat_warnings(training, held_out),
+            ]
+        }
     )
 
 

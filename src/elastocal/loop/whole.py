@@ -3,8 +3,10 @@ same two calls, with tables between them."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.judge import judge
@@ -15,6 +17,10 @@ from elastocal.loop.loading import load_campaign
 if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
+
+    from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.diagnosis.diagnose import Diagnosis
+    from elastocal.diagnosis.judge import Verdict
 
 
 def cases_in(folder: str | Path, robots_folder: str | Path) -> tuple[Case, Case]:
@@ -52,4 +58,24 @@ def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings
         As verdict.json.
     """
     training, held_out = cases_in(folder, robots_folder)
-    return judge(diagnose(training, settings or Settings(), seed), held_out, seed).document
+    return judged(diagnose(training, settings or Settings(), seed), held_out, seed).document
+
+
+def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
+    """The robot that a diagnosis found, with all that is known of its errors."""
+    case, final = diagnosis.case, diagnosis.final
+    found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
+    found = with_form(found, diagnosis.document["other_models_m"] or 0.0)
+    return judged_by_held_out(found, final, case, held_out)
+
+
+def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
+    """The verdict of a diagnosis on held-out poses, with the accuracy that a corrected robot is predicted to have.
+
+    None where the data are at fault: nothing is known of the robot then.
+    """
+    verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
+    accuracy = None
+    if not any(effect["family"] == "data" for effect in verdict.document["effects"]):
+        accuracy = campaign_accuracy(calibrated_by(diagnosis, held_out), case.observations.states).document()
+    return replace(verdict, document=verdict.document | {"accuracy": accuracy})

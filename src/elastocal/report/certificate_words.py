@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, accuracy_sentence, millimetres
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import TITLES
@@ -19,6 +20,8 @@ _SHARES = {
     "joint_offset": "joint offsets",
     "link_geometry": "link geometry",
     "uncorrected": "no correction at all",
+    "form of the model": "form of the model",
+    "not commanded": "effects that no command contains",
 }
 _STEPS = {
     "uncorrected": "uncorrected: the robot file, its base placed as well as possible",
@@ -62,9 +65,10 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             ["software", ", ".join(f"{name} {version}" for name, version in document["versions"].items())],
         ],
         "decision": conformity["decision"],
+        "kind": f" ({document['accuracy']['kind']})",
         "decision_sentences": decision_sentences(document),
         "verdict": verdict_sentence(document),
-        "accuracy": accuracy_sentence(document),
+        "accuracy": before_and_after(document),
         "now": what_to_do(document),
         "steps": [
             [
@@ -76,42 +80,41 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             for step in steps
         ],
         "floor": length(document["noise_floor_rms_m"]),
-        "iso": iso_rows(document["iso_9283"]),
+        "iso": iso_rows(document["iso_9283"], document["measured"]),
         "budget": [[share_name(line["name"]), _share(line), _limits(line)] for line in document["budget"]],
         "budget_states": counted(document["budget_states"], "state"),
         "workspace": workspace_rows(document["workspace"]),
-        "bound_factor": plain(document["bound_factor"], 2),
         "comparison": None if document["comparison"] is None else comparison_facts(document["comparison"]),
-        "files": [[name, digest] for name, digest in document["files"].items()],
+        "files": [[name, digest] for name, digest in (document["files"] | document["measured_files"]).items()],
     }
 
 
 def decision_sentences(document: Mapping[str, Any]) -> str:
-    """Pass or fail, against what, how sure."""
-    found = document["conformity"]
-    tolerance, rms = length(found["tolerance_m"]), length(found["rms_m"])
-    poses = counted(found["poses"], "validation pose")
-    measured = f"On {poses} the corrected robot is off by {rms} RMS; the tolerance is {tolerance}."
-    risk = _percent(found["risk_above"])
-    accepted = _percent(found["accepted_risk"])
-    if found["decision"] == "pass":
-        text = f"The risk that its RMS error over all poses like these is larger is {risk}; {accepted} are accepted."
-    elif found["decision"] == "fail":
-        below = _percent(1.0 - found["risk_above"])
-        text = (
-            f"The risk that its RMS error over all poses like these is smaller after all is {below}; {accepted} are accepted."
-        )
-    else:
-        text = (
-            f"The risk that its RMS error over all poses like these is larger is {risk}: too much to pass and too little to "
-            f"fail, with {accepted} accepted. About {counted(found['poses_needed'], 'validation pose')} would decide."
-        )
-    guard = f"To pass, the RMS must stay {length(found['guard_band_m'])} below the tolerance (guard band)."
-    inside = (
-        f"In {found['poses_inside']} of {found['poses']} poses every error stays within the tolerance, which shows this for "
-        f"{percent(found['share_inside'])} of all poses at 95 % confidence."
+    """What is compared with the tolerance, whose error that is, how sure."""
+    found, accuracy = document["conformity"], accuracy_from(document["accuracy"])
+    tolerance, sure = millimetres(found["tolerance_m"]), _percent(1.0 - found["accepted_risk"])
+    criterion = (
+        f"Criterion: the {accuracy.kind} RMS position error of the corrected robot, {sure} sure to be below "
+        f"{millimetres(found['limit_m'])}, against the tolerance of {tolerance}."
     )
-    return " ".join([measured, text, guard, inside])
+    risk = f"The risk that the RMS error is larger than the tolerance is {_percent(found['risk_above'])}"
+    accepted = _percent(found["accepted_risk"])
+    text = {
+        "pass": f"{risk}; {accepted} are accepted.",
+        "fail": f"{risk}; to fail wrongly {accepted} are accepted.",
+        "undecided": f"{risk}: too much to pass and too little to fail, with {accepted} accepted.",
+    }[found["decision"]]
+    more = []
+    if found["poses_needed"] is not None:
+        more.append(f"About {counted(found['poses_needed'], 'measured pose')} would decide.")
+    if found["poses_inside"] is not None:
+        more.append(
+            f"In {found['poses_inside']} of {found['poses']} poses every measurement stays within the tolerance, noise and "
+            f"all, which shows this for {percent(found['share_inside'])} of all poses at 95 % confidence."
+        )
+    if accuracy.kind == PREDICTED:
+        more.append("Nobody has measured the corrected robot: command corrected targets, measure, and give --measured.")
+    return " ".join([criterion, text, accuracy_sentence(accuracy), *more])
 
 
 def verdict_sentence(document: Mapping[str, Any]) -> str:
@@ -121,14 +124,13 @@ def verdict_sentence(document: Mapping[str, Any]) -> str:
     return f"{title}: {listed(names)}." if names else f"{title}."
 
 
-def accuracy_sentence(document: Mapping[str, Any]) -> str:
-    """Errors before and after on validation poses."""
-    first, last = document["held_out"][0], document["held_out"][-1]
-    floor = document["noise_floor_rms_m"]
-    noise = f" Noise alone leaves {length(floor)}." if floor else ""
+def before_and_after(document: Mapping[str, Any]) -> str:
+    """What correction is worth at the fitted poses: both as they are predicted, in one frame."""
+    after = accuracy_from(document["predicted"])
+    before = next(line["rms_m"] for line in document["budget"] if line["name"] == "uncorrected")
     return (
-        f"Position error on validation poses, RMS: {_with_interval(first, 'rms_m')} uncorrected, "
-        f"{_with_interval(last, 'rms_m')} corrected (95 % intervals).{noise}"
+        f"At {after.region} the uncorrected robot is off by {millimetres(before)} RMS and the corrected one by "
+        f"{millimetres(after.rms_m)}, both as predicted by the model that was found and in the same frame."
     )
 
 
@@ -145,22 +147,25 @@ def what_to_do(document: Mapping[str, Any]) -> str:
     if last["rms_m"] >= first["rms_m"]:
         return "Do not correct the robot by this campaign: on validation poses it would be no better." + moved
     if decision == "pass":
-        return "Use the robot with corrected targets (elastocal correct): it keeps the tolerance." + moved
+        verb = "keeps" if document["accuracy"]["kind"] == MEASURED else "is predicted to keep"
+        return f"Use the robot with corrected targets (elastocal correct): it {verb} the tolerance." + moved
     if decision == "fail":
         return (
-            "Correct the targets all the same, which lowers the error; for this tolerance the robot is not good enough, or the "
-            "tracker is not: compare the noise with the tolerance." + moved
+            "Correct the targets all the same, which lowers the error; for this tolerance the robot is not good enough, or too "
+            "little is known of it: the error budget says which." + moved
         )
-    return "Use corrected targets, and measure more validation poses before the tolerance is relied upon." + moved
+    return "Use corrected targets, and measure the robot at them before the tolerance is relied upon." + moved
 
 
-def iso_rows(found: Mapping[str, Any]) -> list[list[str]]:
-    """Rows of the table after ISO 9283: quantity, value, how it was taken."""
-    poses = counted(found["poses"], "validation pose")
-    rows = [
-        ["pose accuracy AP, corrected, mean", length(found["pose_accuracy_mean_m"]), poses],
-        ["pose accuracy AP, corrected, largest", length(found["pose_accuracy_largest_m"]), poses],
-    ]
+def iso_rows(found: Mapping[str, Any], measured: Mapping[str, Any] | None) -> list[list[str]]:
+    """Rows of the table after ISO 9283: quantity, value, how it was taken; pose accuracy only of a robot that was measured."""
+    rows = []
+    if measured is not None:
+        poses = counted(measured["poses"], "corrected pose")
+        rows += [
+            ["pose accuracy AP, corrected, mean", length(measured["mean_m"]), poses],
+            ["pose accuracy AP, corrected, largest", length(measured["largest_m"]), poses],
+        ]
     repeats = found["repeatability"]
     if repeats is None:
         return [*rows, ["pose repeatability RP", "unknown", "no pose was approached again"]]

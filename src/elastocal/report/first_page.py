@@ -140,17 +140,15 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
             "could not be tested says what each mechanism needs."
         ]
     if kind == "adequate":
-        error = length(heldout["after"]["rms_m"])
         return [
-            f"Use the declared model with the parameters fitted here; new poses like these will be off by {error} RMS.",
+            "Use the declared model with the parameters fitted here.",
             "Effects too small for these measurements may still be there. More poses, larger loads or repeats would show them.",
         ]
     advice, adopted = [], any(effect["adopted"] for effect in found)
     if found and not adopted:
-        error = length(heldout["after"]["rms_m"])
         advice.append(
             "Use the declared model until more is known: what was found is too uncertain to make predictions better and is not "
-            f"part of the final model. New poses like these will be off by {error} RMS."
+            "part of the final model."
         )
     elif found:
         low, high = heldout["reduction_ci95"]

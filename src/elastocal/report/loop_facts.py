@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
+from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.diagnosis.words import in_words
 from elastocal.report.first_page import (
     AT_FAULT,
@@ -73,6 +74,7 @@ def loop_facts(
         "now": what_to_do(verdict, experiment),
         "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
+        "accuracy": "" if faulty else accuracy_sentence(accuracy_from(verdict["accuracy"])),
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
         "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],

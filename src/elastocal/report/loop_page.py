@@ -40,6 +40,7 @@ _FACTS = (
     "made",
     "verdict",
     "sentences",
+    "accuracy",
     "held_out_sentence",
     "probabilities",
     "now",

@@ -24,15 +24,17 @@ class Conformity:
     ----------
     decision : {"pass", "fail", "undecided"}
     tolerance_m, rms_m : float
+    limit_m : float
+        What is compared with the tolerance to pass: the RMS is larger with the accepted risk.
     guard_band_m : float
         By how much the RMS must stay below the tolerance to pass.
     risk_above : float
         Risk that the RMS over all poses like these lies above the tolerance.
     accepted_risk : float
     poses : int
-    poses_inside : int
-        Poses of which no measurement lies beyond the tolerance.
-    share_inside : float
+    poses_inside : int or None
+        Poses of which no measurement lies beyond the tolerance; None where nobody measured.
+    share_inside : float or None
         Of all poses like these at least this share lies inside, at 95 % confidence.
     poses_needed : int or None
         Validation poses with which an undecided one would be decided; None where it is decided.
@@ -41,33 +43,51 @@ class Conformity:
     decision: str
     tolerance_m: float
     rms_m: float
+    limit_m: float
     guard_band_m: float
     risk_above: float
     accepted_risk: float
     poses: int
-    poses_inside: int
-    share_inside: float
-    poses_needed: int | None
+    poses_inside: int | None = None
+    share_inside: float | None = None
+    poses_needed: int | None = None
+
+
+def predicted_conformity(rms_m: np.ndarray, poses: int, tolerance_m: float, accepted_risk: float) -> Conformity:
+    """Decide by the RMS over some poses of robots (draws,) that a fit leaves possible, as `conformity` does by measurements."""
+    value, limit = float(np.sqrt((rms_m**2).mean())), float(np.quantile(rms_m, 1.0 - accepted_risk))
+    # One more than were drawn, so that no finite number of draws gives certainty.
+    risk = float((1.0 + (rms_m > tolerance_m).sum()) / (2.0 + len(rms_m)))
+    guard = tolerance_m * (1.0 - value / limit) if limit > 0.0 else 0.0
+    return Conformity(_decision(risk, accepted_risk), tolerance_m, value, limit, guard, risk, accepted_risk, poses)
 
 
 def conformity(
-    errors: Errors, tolerance_m: float, accepted_risk: float, replicates: int, stream: np.random.Generator
+    errors: Errors,
+    tolerance_m: float,
+    accepted_risk: float,
+    replicates: int,
+    stream: np.random.Generator,
+    noise_m: float = 0.0,
 ) -> Conformity:
     """Decide whether errors keep a tolerance.
 
     The robot passes where the risk that its RMS over all poses lies above the tolerance is at most the accepted one, fails
     where the risk that it lies below is, and is undecided between: acceptance and rejection with guard bands [1]_. The risk is
-    that of the bootstrap-t over poses, see `held_out.intervals`. The tracker's noise is in the errors and can only make a robot
-    look worse. Beside it, free of any distribution, the share of poses inside [2]_.
+    that of the bootstrap-t over poses, see `held_out.intervals`. Noise of the tracker is taken off as squares: the mean
+    square is compared with the sum of both squares. Beside it, free of any distribution and with the noise in it, the share of
+    poses inside [2]_.
 
     Parameters
     ----------
     errors : Errors
-        On held-out poses.
+        As measured.
     tolerance_m : float
     accepted_risk : float
     replicates : int
     stream : numpy.random.Generator
+    noise_m : float
+        Root mean square length of the noise in the errors.
 
     Returns
     -------
@@ -84,19 +104,29 @@ def conformity(
     counts = np.bincount(errors.cluster).astype(float)
     squares = np.bincount(errors.cluster, errors.distance**2)
     weights = drawn_poses(poses, replicates, stream)
-    rms = float(np.sqrt(squares.sum() / counts.sum()))
-    limit = 2.0 * np.log(tolerance_m)
+    square, noise = float(squares.sum() / counts.sum()), noise_m**2
+    limit = float(np.log(tolerance_m**2 + noise))
     risk = risk_above(squares, counts, weights, limit)
     ends = np.array([accepted_risk, 1.0 - accepted_risk])
     interval, std_error = log_ratio_interval(squares, counts, weights, ends)
+    highest = float(np.exp(interval[1]))
     # The largest RMS that would have passed with the same relative uncertainty.
-    guard = tolerance_m * (1.0 - rms / float(np.exp(0.5 * interval[1])))
-    decision = PASS if risk <= accepted_risk else FAIL if risk >= 1.0 - accepted_risk else UNDECIDED
+    guard = tolerance_m - _without(square / highest * (tolerance_m**2 + noise), noise)
+    decision = _decision(risk, accepted_risk)
     inside = np.bincount(errors.cluster, errors.distance > tolerance_m) == 0
     kept = int(inside.sum())
     lowest = float(beta.ppf(0.05, kept, poses - kept + 1)) if kept else 0.0
     needed = None
     if decision == UNDECIDED:
-        apart = max(abs(2.0 * np.log(rms) - limit), 1e-3)
+        apart = max(abs(np.log(square) - limit), 1e-3)
         needed = max(int(np.ceil(poses * (norm.ppf(1.0 - accepted_risk) * std_error / apart) ** 2)), poses + 1)
-    return Conformity(decision, tolerance_m, rms, guard, risk, accepted_risk, poses, kept, lowest, needed)
+    found = tolerance_m, _without(square, noise), _without(highest, noise), guard, risk, accepted_risk
+    return Conformity(decision, *found, poses, kept, lowest, needed)
+
+
+def _decision(risk: float, accepted: float) -> str:
+    return PASS if risk <= accepted else FAIL if risk >= 1.0 - accepted else UNDECIDED
+
+
+def _without(square: float, noise: float) -> float:
+    return float(np.sqrt(max(square - noise, 0.0)))

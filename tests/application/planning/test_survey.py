@@ -53,14 +53,20 @@ def information_names(survey):
     return information(survey, some.joint_angles, some.force).names
 
 
-def test_accuracy_counts_the_frame_in_which_it_is_measured():
-    survey = made_survey()
-    some = made_candidates(survey, 4)
-    rows = accuracy_rows(survey, some.joint_angles, some.force)
-    names = information(survey, some.joint_angles, some.force).names
-    assert rows.shape == (4, 3, len(names))
-    shift = [number for number, (owner, name) in enumerate(names) if owner == "frame 0" and name.startswith("d")]
-    np.testing.assert_allclose(rows[:, :, shift], np.broadcast_to(np.eye(3), (4, 3, 3)), atol=1e-6)
+def test_what_a_placement_of_the_base_takes_up_is_no_error_unless_the_base_is_known():
+    for unknown in (True, False):
+        survey = replace(made_survey(), unknown_base=unknown)
+        some = made_candidates(survey, 40)
+        rows = accuracy_rows(survey, some.joint_angles, some.force)
+        names = information(survey, some.joint_angles, some.force).names
+        assert rows.shape == (40, 3, len(names))
+        size = np.sqrt((rows**2).sum(axis=1).mean(axis=0))
+        first = names.index(("joint_offset@1", "offset"))
+        # The first axis turns the whole arm, as a base does that was placed otherwise.
+        second = size[names.index(("joint_offset@2", "offset"))]
+        # But for the load, which does not turn with it.
+        assert (size[first] < 1e-2 * second) if unknown else (size[first] > 0.3 * second)
+        assert not size[[number for number, (owner, _) in enumerate(names) if owner.startswith(("frame", "target"))]].any()
 
 
 def test_every_target_is_seen_under_every_share_in_the_order_of_the_rows():

@@ -9,10 +9,9 @@ import numpy as np
 from scipy.stats import norm
 from statsmodels.stats.multitest import multipletests
 
-from elastocal.application.calibrated import NEUTRAL, forward, observations_of, square_root, states_of
+from elastocal.application.accuracy import without_rigid_motion
+from elastocal.application.calibrated import forward, pose_sensitivities, square_root
 from elastocal.errors import InputError
-from elastocal.fitting.displacement import conditions
-from elastocal.fitting.linearization import linearize
 from elastocal.fitting.parameters import parameters
 
 if TYPE_CHECKING:
@@ -98,36 +97,16 @@ def compared(
     if before.robot.chain != after.robot.chain:
         raise InputError("--compare", "", f"another robot, {before.robot.name}", f"a campaign of {after.robot.name}")
     ends = [forward(each, reported_angles)[0] for each in (before, after)]
-    apart = _without_rigid_motion(ends[1] - ends[0], ends[0])
+    apart = without_rigid_motion(ends[1] - ends[0], ends[0])
     distance = np.linalg.norm(apart, axis=-1)
     rms = float(np.sqrt((distance**2).mean()))
     off = np.zeros((draws, *ends[0].shape))
     for each in (before, after):
-        moved = _sensitivities(each, reported_angles) @ square_root(each.covariance)
+        moved = pose_sensitivities(each, reported_angles)[:, :3] @ square_root(each.covariance)
         off += np.einsum("nik,dk->dni", moved, stream.standard_normal((draws, moved.shape[-1])))
-    drawn = np.sqrt((_without_rigid_motion(off, ends[0]) ** 2).sum(axis=2).mean(axis=1))
+    drawn = np.sqrt((without_rigid_motion(off, ends[0]) ** 2).sum(axis=2).mean(axis=1))
     p_value = (1.0 + (drawn >= rms).sum()) / (1.0 + draws)
     return Comparison(rms, float(np.median(drawn)), float(p_value), float(distance.max()), _changes(before, after))
-
-
-def _sensitivities(calibrated: CalibratedRobot, reported_angles: np.ndarray) -> np.ndarray:
-    """Of positions to the parameters, ndarray (N, 3, P)."""
-    model, estimate = calibrated.model, calibrated.estimate
-    seen = observations_of(states_of(calibrated, reported_angles, NEUTRAL))
-    return linearize(model, estimate, seen, conditions(model, estimate, seen.states)).sensitivities[:, :3]
-
-
-def _without_rigid_motion(displacement: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """Displacements (..., N, 3) less the small rigid motion that explains most of their squares."""
-    about = position - position.mean(axis=0)
-    turns = np.zeros((len(position), 3, 6))
-    turns[:, :, :3] = np.eye(3)
-    turns[:, 0, 4], turns[:, 0, 5] = about[:, 2], -about[:, 1]
-    turns[:, 1, 3], turns[:, 1, 5] = -about[:, 2], about[:, 0]
-    turns[:, 2, 3], turns[:, 2, 4] = about[:, 1], -about[:, 0]
-    basis, _ = np.linalg.qr(turns.reshape(-1, 6))
-    flat = displacement.reshape(*displacement.shape[:-2], -1)
-    return (flat - (flat @ basis) @ basis.T).reshape(displacement.shape)
 
 
 def _changes(before: CalibratedRobot, after: CalibratedRobot) -> tuple[Change, ...]:

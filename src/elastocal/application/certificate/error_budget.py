@@ -7,17 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.calibrated import (
-    forward,
-    nominal_forward,
-    observations_of,
-    prediction_covariance,
-    square_root,
-    states_of,
-)
-from elastocal.application.compensation import repeatability_m
+from elastocal.application.accuracy import before_m, predicted
+from elastocal.application.calibrated import forward, nominal_forward, observations_of, square_root, states_of
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
+from elastocal.mechanics.pose_differences import pose_differences
 
 if TYPE_CHECKING:
     from elastocal.application.calibrated import CalibratedRobot, OperatingConditions
@@ -33,7 +27,8 @@ class Share:
     Attributes
     ----------
     name : str
-        An effect by its name in the catalogue, ``joint_compliance``, or one of `TOTAL`, `UNCERTAINTY` and `REPEATABILITY`.
+        An effect by its name in the catalogue, ``joint_compliance``, or `TOTAL`, `UNCERTAINTY`, `REPEATABILITY`,
+        `FORM` or `NOT_COMMANDED`.
     rms_m : float
     low_m, high_m : float or None
         95 % interval by the covariance of the parameters; None where the line has none.
@@ -46,6 +41,7 @@ class Share:
 
 
 TOTAL, UNCERTAINTY, REPEATABILITY = "uncorrected", "uncertainty of the parameters", "repeatability"
+FORM, NOT_COMMANDED = "form of the model", "not commanded"
 
 
 def error_budget(
@@ -72,10 +68,10 @@ def error_budget(
     Returns
     -------
     list of Share
-        What is missed without any correction; each effect, largest first; what uncertainty and repeatability leave.
+        What is missed without any correction; each effect, largest first; what a correction leaves, by `accuracy.predicted`.
     """
     model, estimate = calibrated.model, calibrated.estimate
-    whole, _ = forward(calibrated, reported_angles, operating)
+    whole, turned = forward(calibrated, reported_angles, operating)
     gram, owners = _gram(calibrated, reported_angles, operating)
     values = np.concatenate([np.zeros(0), *estimate.coefficients])
     shares = []
@@ -90,12 +86,19 @@ def error_budget(
         if rms > 0.0:
             shares.append(Share(name, rms, *limits))
     shares.sort(key=lambda share: -share.rms_m)
-    total = _rms(whole - nominal_forward(calibrated.robot, reported_angles)[0])
-    variance = np.trace(prediction_covariance(calibrated, reported_angles, operating)[:, :3, :3], axis1=1, axis2=2)
-    angles = calibrated.robot.model_angles(reported_angles)
-    back = repeatability_m(calibrated.robot, angles, calibrated.noise.joint_rad)
-    ends = [Share(UNCERTAINTY, float(np.sqrt(variance.mean()))), Share(REPEATABILITY, float(np.sqrt((back**2).mean())))]
-    return [Share(TOTAL, total), *shares, *ends]
+    off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), whole, turned)
+    rest = predicted(calibrated, reported_angles, operating)
+    total, *ends = (
+        Share(name, float(np.sqrt((length**2).mean())))
+        for name, length in (
+            (TOTAL, before_m(calibrated, whole, turned, off)),
+            (UNCERTAINTY, rest.parameters_m),
+            (REPEATABILITY, rest.repeated_m),
+            (FORM, np.full(1, rest.scope.form_m)),
+            (NOT_COMMANDED, np.full(1, rest.scope.left_out_m)),
+        )
+    )
+    return [total, *shares, *(end for end in ends if end.rms_m or end.name not in (FORM, NOT_COMMANDED))]
 
 
 def _without(calibrated: CalibratedRobot, name: str, mine: list[int]) -> CalibratedRobot:

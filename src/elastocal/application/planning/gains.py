@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from elastocal.application.accuracy import without_rigid_motion
 from elastocal.application.planning.criteria import Criterion, mean_squares
 from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
 from elastocal.application.planning.plan import allowed_candidates
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from elastocal.application.planning.plan import Candidates, Loads
     from elastocal.application.planning.survey import Survey
     from elastocal.fitting.model import Estimate, Model
-    from elastocal.fitting.observations import Observations
 
 # Random orders of candidates, of so many poses, beside which a plan is put.
 _ORDERS, _LONGEST = 60, 120
@@ -129,14 +129,13 @@ def _fitted_error(survey: Survey, design: Candidates, places: Candidates, seed: 
     fitted = fit(model, read, noise)
     alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
     there = observed(alone, places.joint_angles, places.force)
-    off = _in_tracker_frame(model, fitted.estimate, there) - _in_tracker_frame(model, true, there)
+    position, rotation = predict(model, true, there, conditions(model, true, there.states))
+    found = predict(model, fitted.estimate, there, conditions(model, fitted.estimate, there.states))[0]
+    off = found - position
+    if survey.unknown_base:
+        unknown = survey.targets[0].offset_m is None
+        off = without_rigid_motion(off, position, rotation if unknown else None)
     return float(np.sqrt((off**2).sum(axis=1).mean()))
-
-
-def _in_tracker_frame(model: Model, estimate: Estimate, seen: Observations) -> np.ndarray:
-    """Predicted positions (M, 3) as the tracker would see them: where its frame is unknown, nothing else can be compared."""
-    position = predict(model, estimate, seen, conditions(model, estimate, seen.states))[0]
-    return position @ estimate.frame_rotation[0].T + estimate.frame_position[0]
 
 
 def _off(model: Model, nominal: Estimate, draws: np.random.Generator) -> Estimate:

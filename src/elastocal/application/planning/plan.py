@@ -88,8 +88,8 @@ class Plan:
     efficiency : float
         Share of the best possible design's worth that the fitted ones are sure to have, by the criterion.
     accuracy_m : ndarray (poses,)
-        Root mean square error of a target's position over the workspace that the parameters' uncertainty leaves, with the first
-        1, 2, .. of them, best first.
+        Root mean square error of the end effector over the workspace that the parameters' uncertainty leaves, as `accuracy`
+        counts it, with the first 1, 2, .. of them, best first.
     random_m : ndarray (designs, poses)
         The same with random configurations.
     """

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.application.accuracy import absorbed, placement, scope_about
+from elastocal.application.calibrated import nominal_forward
+from elastocal.campaigns.campaign import Target
 from elastocal.effects import declared_weight
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.joint_compliance import candidate as joint_compliance
@@ -23,7 +26,6 @@ from elastocal.fitting.parameters import parameters
 from elastocal.mechanics.sites import sites_of
 
 if TYPE_CHECKING:
-    from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.robot import Robot
 
 GEOMETRY = ("joint_offset", "link_geometry")
@@ -159,9 +161,10 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, 
 
 
 def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Sensitivities of where the first target is seen, in the units of `Information`: what a validation would measure.
+    """Sensitivities of where the end effector is, in the units of `Information`, as `accuracy` counts them.
 
-    Where base or reflector are unknown they count, for then nothing but the target in the tracker's frame can be known.
+    Where the base is unknown, less its best placement over these configurations; where the offset of the reflectors on the end
+    effector is, less the best constant offset there. Base and reflectors themselves do not move the robot.
 
     Parameters
     ----------
@@ -177,8 +180,24 @@ def accuracy_rows(survey: Survey, reported_angles: np.ndarray, force: np.ndarray
         m, per plausible size of each parameter.
     """
     alone = replace(survey, shares=(1.0,) if survey.loaded else (0.0,))
-    rows = information(alone, reported_angles, force).rows
-    return rows[:, :3] * survey.position_m
+    end = survey.robot.chain.end_effector
+    there = [target for target in survey.targets if target.point == end.name]
+    model, estimate = model_of(replace(alone, targets=(Target("end effector", end.name, end.offset_m),)))
+    bare = replace(model, fitted_frames=False)
+    seen = observed(replace(alone, targets=bare.targets), reported_angles, force)
+    moved = linearize(bare, estimate, seen, conditions(bare, estimate, seen.states)).sensitivities
+    named = parameters(bare, estimate)
+    moved = np.concatenate([moved[:, :3], np.zeros_like(moved[:, :3])], axis=1) * [p.plausible for _, p in named]
+    position, rotation = nominal_forward(survey.robot, reported_angles)
+    columns = placement(scope_about(position), position, rotation)
+    offset = bool(there) and all(target.offset_m is None for target in there)
+    free = np.repeat([survey.unknown_base, survey.unknown_base, offset, False], 3)
+    rows = (moved - columns @ absorbed(columns, moved, free))[:, :3]
+    # Behind the parameters of base and reflectors.
+    every = parameters(*model_of(survey))
+    found = np.zeros((len(rows), 3, len(every)))
+    found[..., len(every) - len(named) :] = rows
+    return found
 
 
 def observed(survey: Survey, reported_angles: np.ndarray, force: np.ndarray) -> Observations:
