@@ -184,8 +184,8 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
 
 def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
     monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = kept_rows.fit
-    monkeypatch.setattr(kept_rows, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
+    fitted = kept_rows.fit_declared
+    monkeypatch.setattr(kept_rows, "fit_declared", lambda *args, **options: replace(fitted(*args, **options), converged=False))
     document = diagnose(case, Settings(), 1).document
     assert document["converged"] == {"declared": False, "final": False}
     assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [
@@ -247,7 +247,8 @@ def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_ma
 
 
 def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, config_folder, tmp_path, monkeypatch):
-    folder = made_folder(tmp_path / "made", kuka, declared=["link_geometry"])
+    table = made_table(kuka, "made", offset_of_joint_3=OFFSET)
+    folder = made_folder(tmp_path / "made", kuka, table=table, declared=["link_geometry"])
     case, held_out = cases_in(folder, config_folder / "robots")
     settings = replace(Settings(), numbers_a_parameter=np.inf)
     usual = diagnose(case, settings, 1)

@@ -43,3 +43,13 @@ def test_a_loss_is_certain_beyond_the_standard_error_of_the_difference(shift, lo
     off = np.random.default_rng(2).normal(0.0, 1.0, 25)
     off = (off - off.mean()) / off.std(ddof=1)
     assert certain_loss(others + off + shift, others) is loses
+
+
+def test_without_anything_to_fit_errors_are_the_residuals(kuka):
+    campaign = planted(kuka, {}, seed=5, poses=6)
+    bare = fit(replace(campaign.declared.model, effects=()), campaign.observations, campaign.declared.noise)
+    assert bare.held.size == 0
+    squares, cluster = (bare.residual[:, :3] ** 2).sum(axis=1), campaign.observations.cluster
+    np.testing.assert_allclose(
+        left_out_squares(bare, campaign.observations), np.bincount(cluster, squares) / np.bincount(cluster)
+    )

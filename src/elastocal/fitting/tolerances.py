@@ -85,7 +85,7 @@ def most_probable(wide: Fit, least: float = 1.0) -> tuple[float, float]:
     In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
     its covariance in units of the prior are independent. The noise is no less than `least` times the noise taken.
     """
-    mine = np.flatnonzero([parameter.sized for _, parameter in wide.parameters] & ~wide.held)
+    mine = np.flatnonzero(np.array([parameter.sized for _, parameter in wide.parameters], bool) & ~wide.held)
     prior = np.array([wide.parameters[number][1].prior_std for number in mine], float)
     left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
     left = np.clip(left, _ROUNDING, 1.0)

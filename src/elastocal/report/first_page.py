@@ -202,7 +202,7 @@ def held_out_sentence(verdict: Mapping[str, Any], steps: Sequence[Mapping[str, A
 def worth_sentence(held_out: Mapping[str, Any]) -> str:
     """What calibration is worth against doing nothing, on held-out poses; ``heldout`` of verdict.json."""
     nothing, after = held_out["uncalibrated"]["rms_m"], held_out["after"]["rms_m"]
-    if nothing == after:
+    if np.isclose(nothing, after, rtol=1e-3, atol=0):
         return f"The robot is as good uncalibrated, at {length(after)} RMS with nothing but its placement fitted."
     change = _change(nothing, after, held_out["uncalibrated"]["reduction_ci95"], [length(nothing), length(after)])
     return f"Against the uncalibrated robot, with nothing but its placement fitted, it {change}."
