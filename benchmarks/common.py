@@ -4,7 +4,9 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from elastocal.io.documents import read_document
 from elastocal.mechanics.robot import Robot
@@ -12,6 +14,9 @@ from elastocal.mechanics.robot_file import robot_from_document
 from elastocal.study.strategies import Strategy, strategy_from_document
 
 ROOT = Path(__file__).resolve().parents[1]
+# Seconds of `_yardstick` where limits in seconds are stated: two idle cores of an AMD EPYC; CPU time, the least of 40.
+YARDSTICK_S = 0.14
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,11 @@ class Row:
     holds: bool | None
     how: str
 
+    @classmethod
+    def of_limit(cls, benchmark: str, seconds: float, allowed_s: float, how: str) -> "Row":
+        """Seconds against those that are allowed on this machine."""
+        return cls(benchmark, seconds, allowed_s, seconds / allowed_s, "<= 1", seconds <= allowed_s, how)
+
 
 def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) -> list[list[float]]:
     """Seconds of several functions, called in turn so that a busy spell of the machine hits all of them.
@@ -64,6 +74,26 @@ def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) ->
         last = ", ".join(f"{name} {taken[-1]:.3f} s" for name, taken in zip(functions, seconds, strict=True))
         print(f"  {repetition}/{repetitions}: {last}", flush=True)
     return seconds
+
+
+def beside_yardstick(function: Callable[[], Found]) -> tuple[Found, float]:
+    """What a function returns, and how many times as long this machine takes as the one for which limits in seconds are stated.
+
+    A fixed piece of work just before and just after says so: a machine that is slow, or busy, is allowed more.
+    """
+    before = _yardstick()
+    found = function()
+    return found, (before + _yardstick()) / 2 / YARDSTICK_S
+
+
+def _yardstick() -> float:
+    """Seconds of least-squares problems of the engine's size, the mean of three rounds."""
+    rounds = 3
+    matrix = np.random.default_rng(1).standard_normal((200, 40))
+    start = time.perf_counter()
+    for end in 3 * rounds * [*range(41, 201)]:
+        np.linalg.lstsq(matrix[:end, :-1], matrix[:end, -1])
+    return (time.perf_counter() - start) / rounds
 
 
 def load_robot(name: str) -> Robot:

@@ -73,7 +73,11 @@ def reduce_to_records(folder: Path) -> None:
 
 
 def _scripts(folder: Path) -> list[Path]:
-    return [path for path in (folder / "workflow" / "scripts").glob("*.py") if path.name != "job.py"]
+    """Scripts of jobs: what they import from beside them runs in none by itself."""
+    texts = {path: path.read_text(encoding="utf-8") for path in sorted((folder / "workflow" / "scripts").glob("*.py"))}
+    nodes = (node for text in texts.values() for node in ast.parse(text).body)
+    imported = {node.module for node in nodes if isinstance(node, ast.ImportFrom)}
+    return [path for path in texts if path.stem not in imported]
 
 
 def snakemake(folder: Path, *arguments: str) -> tuple[float, str]:

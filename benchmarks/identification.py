@@ -1,6 +1,7 @@
 """Every prefix of 1000 data sets against a Python loop over numpy.linalg.lstsq."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,24 +10,36 @@ from common import Row, interleaved, load_robot, load_strategy
 from elastocal.mechanics.robot import Robot
 from elastocal.study.identification import Estimates, Measurements, estimate_compliance, identify
 from elastocal.study.simulation import Loading, measurement_noise, random_experiments, true_deflections
-from elastocal.study.steps import SETS_PER_BLOCK
+from elastocal.study.steps.blocks import blocks_of_sets
 from elastocal.study.steps.columns import deflection_columns, experiment_columns
 from elastocal.study.steps.identify import Situation
 from elastocal.study.strategies import Strategy
 
-SETS, CONFIGURATIONS, ROWS = 1000, 100, 6
+ROWS = 6
 LOADING = Loading(force_N=1000.0, offset_m=(0.0, 0.5, 0.0), offset_frame="base", joint_range="full_turn")
 NOISE = 200e-6
-REPETITIONS = 3
 TARGET = 20
 TOLERANCE = 1e-9
 
 
-def rows(work: Path) -> list[Row]:
+@dataclass(frozen=True)
+class Setting:
+    """How many data sets, configurations of each and repetitions."""
+
+    sets: int
+    configurations: int
+    repetitions: int
+
+
+FULL, SMALL = Setting(1000, 100, 3), Setting(4, 10, 1)
+
+
+def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report, for the estimates alone and with what the study stores beside them; `work` is not used."""
+    sets, configurations, repetitions = setting.sets, setting.configurations, setting.repetitions
     robot, strategy = load_robot("kuka"), load_strategy("6DoF")
     joints = robot.joints
-    blocks = [_measurements(robot, strategy, range(i, i + SETS_PER_BLOCK)) for i in range(0, SETS, SETS_PER_BLOCK)]
+    blocks = [_measurements(robot, strategy, block, configurations) for block in blocks_of_sets(sets)]
     systems = [_systems(measurements["6DoF"]) for measurements in blocks]
     order = list(strategy.stages[0].identified)
 
@@ -34,11 +47,11 @@ def rows(work: Path) -> list[Row]:
         return [estimate_compliance(strategy, measurements, joints)[0] for measurements in blocks]
 
     def loop() -> np.ndarray:
-        found = np.empty((SETS, CONFIGURATIONS, joints))
+        found = np.empty((sets, configurations, joints))
         number = 0
         for matrices, deflections in systems:
             for matrix, deflection in zip(matrices, deflections, strict=True):
-                for length in range(1, CONFIGURATIONS + 1):
+                for length in range(1, configurations + 1):
                     end = ROWS * length
                     found[number, length - 1] = np.linalg.lstsq(matrix[:end], deflection[:end])[0]
                 number += 1
@@ -49,11 +62,11 @@ def rows(work: Path) -> list[Row]:
 
     _assert_equal(np.concatenate(ours(), axis=2).transpose(2, 0, 1)[..., order], loop())
     functions = {"elastocal": ours, "with covariance": with_covariance, "numpy.linalg.lstsq": loop}
-    alone, full, theirs = map(min, interleaved(functions, REPETITIONS))
-    against = f"a loop of numpy.linalg.lstsq over {SETS} data sets and {CONFIGURATIONS} prefixes, 6DoF on kuka"
-    how = f"estimate_compliance against {against}, minimum of {REPETITIONS}, equal to {TOLERANCE:g}"
+    alone, full, theirs = map(min, interleaved(functions, repetitions))
+    against = f"a loop of numpy.linalg.lstsq over {sets} data sets and {configurations} prefixes, 6DoF on kuka"
+    how = f"estimate_compliance against {against}, minimum of {repetitions}, equal to {TOLERANCE:g}"
     more = (
-        f"identify, which adds covariances and condition numbers, against {against}, which does not; minimum of {REPETITIONS}"
+        f"identify, which adds covariances and condition numbers, against {against}, which does not; minimum of {repetitions}"
     )
     return [
         Row("identification", alone, theirs, theirs / alone, f">= {TARGET}", theirs / alone >= TARGET, how),
@@ -61,12 +74,12 @@ def rows(work: Path) -> list[Row]:
     ]
 
 
-def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int]) -> dict[str, Measurements]:
+def _measurements(robot: Robot, strategy: Strategy, sets: Sequence[int], configurations: int) -> dict[str, Measurements]:
     experiments = random_experiments(
-        robot.chain, robot.joint_limits, 1, "kuka", LOADING, "identification", sets, CONFIGURATIONS
+        robot.chain, robot.joint_limits, 1, "kuka", LOADING, "identification", sets, configurations
     )
     point = robot.chain.end_effector
-    noise = NOISE * measurement_noise(1, "kuka", point.name, sets, CONFIGURATIONS)
+    noise = NOISE * measurement_noise(1, "kuka", point.name, sets, configurations)
     measured = true_deflections(robot, experiments, point, "end_effector") + noise
     columns = {point.name: deflection_columns(point.name, sets, measured)}
     return Situation(experiment_columns(sets, experiments), columns, robot.chain, strategy, ROWS, "end_effector").measurements

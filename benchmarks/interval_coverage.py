@@ -3,6 +3,7 @@
 Prints the table of docs/held_out_intervals.md.
 """
 
+import argparse
 import sys
 import warnings
 from collections.abc import Callable, Mapping
@@ -16,27 +17,30 @@ from elastocal.validation.held_out import Errors, intervals
 sys.path.insert(0, str(ROOT / "tests" / "helpers"))
 from made_errors import KINDS, campaigns_of, true_figures
 
-POSES, CAMPAIGNS, REPLICATES = (9, 18, 36), 400, 999
+POSES, REPLICATES = (9, 18, 36), 999
 FIGURES = ("mean_m", "rms_m", "p95_m", "reduction", "reduction of none")
 METHODS = ("percentile", "BCa", "ours")
 
 
 def main() -> None:
     """Print one line for each kind of errors and number of poses."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--campaigns", type=int, default=400, help="of each line")
+    campaigns = parser.parse_args().campaigns
     print("| errors | poses |" + "|".join(f" {name.removesuffix('_m')} " for name in FIGURES) + "| p95 open above |")
     print("|---" * (3 + len(FIGURES)) + "|")
     for kind in KINDS:
         truth = true_figures(kind)
         for poses in POSES:
-            held, open_above = covered(kind, poses, truth)
+            held, open_above = covered(kind, poses, campaigns, truth)
             cells = [" / ".join(f"{100 * held[name, method]:.0f}" for method in METHODS) for name in FIGURES]
             print(f"| {kind} | {poses} | " + " | ".join(cells) + f" | {100 * open_above:.0f} % |", flush=True)
 
 
-def covered(kind: str, poses: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:
+def covered(kind: str, poses: int, campaigns: int, truth: Mapping[str, float]) -> tuple[dict[tuple[str, str], float], float]:
     """Shares of campaigns whose intervals contain the true value, and whose 95th percentile has no upper limit."""
     rng, hits, open_above = np.random.default_rng(7), {}, 0
-    for before, after, false in campaigns_of(kind, CAMPAIGNS, poses, (8, poses)):
+    for before, after, false in campaigns_of(kind, campaigns, poses, (8, poses)):
         found = {method: by_scipy(before, after, false, method, rng) for method in METHODS[:2]}
         limits, reductions = intervals([before, after], REPLICATES, rng)
         of_none = intervals([after, false], REPLICATES, rng)[1][1]
@@ -46,7 +50,7 @@ def covered(kind: str, poses: int, truth: Mapping[str, float]) -> tuple[dict[tup
         for method, of_method in (found | {"ours": ours}).items():
             for name, (low, high) in of_method.items():
                 hits[name, method] = hits.get((name, method), 0) + (low <= truth[name] <= high)
-    return {key: count / CAMPAIGNS for key, count in hits.items()}, open_above / CAMPAIGNS
+    return {key: count / campaigns for key, count in hits.items()}, open_above / campaigns
 
 
 def by_scipy(before: Errors, after: Errors, false: Errors, method: str, rng: np.random.Generator) -> dict[str, np.ndarray]:

@@ -1,5 +1,6 @@
 """Jacobians of 100,000 configurations against a Python loop over pinocchio, one thread each."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -11,15 +12,24 @@ from elastocal.mechanics.chain import Chain
 from elastocal.mechanics.kinematics import poses_and_jacobians
 
 ROBOTS = ("kuka", "fanuc")
-CONFIGURATIONS = 100_000
-REPETITIONS = 9
 TARGET = 5
 TOLERANCE = 1e-12
 
 
-def rows(work: Path) -> list[Row]:
+@dataclass(frozen=True)
+class Setting:
+    """How many configurations and repetitions."""
+
+    configurations: int
+    repetitions: int
+
+
+FULL, SMALL = Setting(100_000, 9), Setting(100, 1)
+
+
+def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report, one for each robot; `work` is not used."""
-    return [_row(name) for name in ROBOTS]
+    return [_row(name, setting) for name in ROBOTS]
 
 
 def pinocchio_model(chain: Chain) -> tuple[pin.Model, int]:
@@ -47,9 +57,9 @@ def pinocchio_model(chain: Chain) -> tuple[pin.Model, int]:
     return model, model.addFrame(pin.Frame("end-effector", parent, placement, pin.FrameType.OP_FRAME))
 
 
-def _row(name: str) -> Row:
+def _row(name: str, setting: Setting) -> Row:
     chain = load_robot(name).chain
-    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (CONFIGURATIONS, chain.coordinates))
+    angles = np.random.default_rng(1).uniform(-np.pi, np.pi, (setting.configurations, chain.coordinates))
     model, frame = pinocchio_model(chain)
     data, aligned = model.createData(), pin.LOCAL_WORLD_ALIGNED
 
@@ -65,9 +75,9 @@ def _row(name: str) -> Row:
         f"elastocal on {name}": lambda: poses_and_jacobians(chain, angles, chain.end_effector, held),
         "pinocchio": loop,
     }
-    ours, theirs = map(median, interleaved(functions, REPETITIONS))
+    ours, theirs = map(median, interleaved(functions, setting.repetitions))
     how = (
-        f"poses_and_jacobians on {CONFIGURATIONS} random configurations against pin.computeFrameJacobian in a Python loop, "
-        f"one thread, median of {REPETITIONS}, Jacobians equal to {TOLERANCE:g}"
+        f"poses_and_jacobians on {setting.configurations} random configurations against pin.computeFrameJacobian in a Python "
+        f"loop, one thread, median of {setting.repetitions}, Jacobians equal to {TOLERANCE:g}"
     )
     return Row(f"kinematics {name}", ours, theirs, theirs / ours, f">= {TARGET}", theirs / ours >= TARGET, how)

@@ -5,29 +5,33 @@ from statistics import median
 
 from common import Row, interleaved
 from copies import snakemake
-from study import JOBS, finished_study
+from study import FULL, SMALL, Setting, finished_study
 
-REPETITIONS = 7
+__all__ = ["FULL", "SMALL", "rows"]
+
 TARGET = 3
 
 
-def rows(work: Path) -> list[Row]:
+def rows(work: Path, setting: Setting) -> list[Row]:
     """Row of the report.
 
     Parameters
     ----------
     work : Path
         Temporary folder; the study that the benchmark of that name left there serves here too.
+    setting : Setting
     """
     folder = work / "study"
     if not folder.is_dir():
-        finished_study(work)
+        finished_study(work, setting)
 
     def again() -> None:
-        if "Nothing to be done" not in snakemake(folder, *JOBS)[1]:
+        if "Nothing to be done" not in snakemake(folder, *setting.jobs)[1]:
             raise AssertionError("the rerun of the finished study had something to do")
 
     functions = {"rerun": again, "--version": lambda: snakemake(folder, "--version")}
-    ours, theirs = map(median, interleaved(functions, REPETITIONS))
-    how = f"snakemake -j2 study with everything made, against snakemake --version, median of {REPETITIONS}"
+    ours, theirs = map(median, interleaved(functions, setting.repetitions))
+    how = (
+        f"snakemake {' '.join(setting.jobs)} with everything made, against snakemake --version, median of {setting.repetitions}"
+    )
     return [Row("rerun", ours, theirs, ours / theirs, f"<= {TARGET}", ours / theirs <= TARGET, how)]

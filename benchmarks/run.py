@@ -1,4 +1,4 @@
-"""All benchmarks, or those named: `python benchmarks/run.py [--only NAME ...]` writes reports/benchmarks.csv."""
+"""All benchmarks, or those named: `python benchmarks/run.py [--small] [--only NAME ...]` writes reports/benchmarks.csv."""
 
 import argparse
 import csv
@@ -7,7 +7,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Collection, Iterable
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,19 +23,25 @@ def main() -> None:
     """Run the benchmarks; the exit status says whether every target holds."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, metavar="NAME", help=", ".join(NAMES))
-    names = [name for name in NAMES if name in parser.parse_args().only]
+    parser.add_argument("--small", action="store_true", help="seconds instead of minutes: that all run, no target, no report")
+    given = parser.parse_args()
+    names = [name for name in NAMES if name in given.only]
     # Before numpy is imported, so that it too takes one thread.
     for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ[variable] = "1"
-    table = {line["benchmark"]: line for line in _kept(names)}
     with tempfile.TemporaryDirectory(prefix="elastocal-benchmarks-") as work:
+        report = Path(work) / REPORT.name if given.small else REPORT
+        table = {line["benchmark"]: line for line in _kept(names, report)}
         for name in names:
             print(name, flush=True)
-            for row in importlib.import_module(name).rows(Path(work)):
-                line = _line(row)
+            module = importlib.import_module(name)
+            for row in module.rows(Path(work), module.SMALL if given.small else module.FULL):
+                line = _line(replace(row, target="", holds=None) if given.small else row)
                 table[row.benchmark] = line
-                print(f"  {row.benchmark}: ratio {line['ratio']}, target {row.target or 'none'} {line['holds']}", flush=True)
-            _write(table.values())
+                print(
+                    f"  {row.benchmark}: ratio {line['ratio']}, target {line['target'] or 'none'} {line['holds']}", flush=True
+                )
+            _write(table.values(), report)
     sys.exit(any(line["holds"] == "no" for line in table.values()))
 
 
@@ -50,18 +56,18 @@ def _line(row: "Row") -> dict[str, str]:
     return line
 
 
-def _kept(names: Collection[str]) -> list[dict[str, str]]:
+def _kept(names: Collection[str], report: Path) -> list[dict[str, str]]:
     """Lines of an earlier report, of the benchmarks that do not run now."""
-    if not REPORT.is_file():
+    if not report.is_file():
         return []
-    with open(REPORT, encoding="utf-8", newline="") as file:
+    with open(report, encoding="utf-8", newline="") as file:
         return [line for line in csv.DictReader(file) if line["benchmark"].split()[0] not in names]
 
 
-def _write(lines: Iterable[dict[str, str]]) -> None:
+def _write(lines: Iterable[dict[str, str]], report: Path) -> None:
     ordered = sorted(lines, key=lambda line: NAMES.index(line["benchmark"].split()[0]))
-    REPORT.parent.mkdir(exist_ok=True)
-    with open(REPORT, "w", encoding="utf-8", newline="") as file:
+    report.parent.mkdir(exist_ok=True)
+    with open(report, "w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(ordered[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(ordered)

@@ -2,6 +2,7 @@
 
 import csv
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from common import Row
@@ -19,8 +20,6 @@ STEPS = {
     "evaluate": (f"results/metrics/{CELL}/{STRATEGY}.parquet", f"{CELL}/{STRATEGY}"),
     "bound": ("results/bounds/kuka.parquet", "kuka"),
 }
-SIZES = (1000, 10_000)
-REPETITIONS = 2
 TIME_TARGET, MEMORY_TARGET, MEMORY_LIMIT_GB = 11, 1.15, 1.5
 # Snakemake samples memory twice a second and misses peaks: each job notes its own when it ends (Linux).
 NOTE_PEAK = """
@@ -34,33 +33,47 @@ def note_peak():
 """
 
 
-def rows(work: Path) -> list[Row]:
+@dataclass(frozen=True)
+class Setting:
+    """Numbers of data sets, and repetitions."""
+
+    data_sets: tuple[int, int]
+    repetitions: int
+
+
+# The small one runs once for both sizes.
+FULL, SMALL = Setting((1000, 10_000), 2), Setting((10, 10), 1)
+
+
+def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report, for time and for memory.
 
     Parameters
     ----------
     work : Path
         Temporary folder.
+    setting : Setting
     """
-    folders = {size: _copy_that_notes_peaks(work / f"scale-{size}") for size in SIZES}
-    runs: dict[int, list[dict[str, tuple[float, float]]]] = {size: [] for size in SIZES}
-    for repetition in range(1, REPETITIONS + 1):
+    sizes, repetitions = setting.data_sets, setting.repetitions
+    folders = {size: _copy_that_notes_peaks(work / f"scale-{size}") for size in dict.fromkeys(sizes)}
+    runs: dict[int, list[dict[str, tuple[float, float]]]] = {size: [] for size in sizes}
+    for repetition in range(1, repetitions + 1):
         for size, folder in folders.items():
             snakemake(folder, "-j1", *(made for made, _ in STEPS.values()), "--config", f"data_sets={size}", "--forceall")
             runs[size].append({step: _seconds_and_peak(folder, step) for step in STEPS})
             print(
-                f"  {repetition}/{REPETITIONS}: {size} data sets {sum(s for s, _ in runs[size][-1].values()):.1f} s", flush=True
+                f"  {repetition}/{repetitions}: {size} data sets {sum(s for s, _ in runs[size][-1].values()):.1f} s", flush=True
             )
-    (small_s, small_gb), (large_s, large_gb) = (_smallest(runs[size]) for size in SIZES)
+    (small_s, small_gb), (large_s, large_gb) = (_smallest(runs[size]) for size in sizes)
     for step in STEPS:
         growth = f"{small_s[step]:.1f} to {large_s[step]:.1f} s, {small_gb[step]:.3f} to {large_gb[step]:.3f} GB"
         print(f"  {step}: {growth}", flush=True)
     theirs, ours = sum(small_s.values()), sum(large_s.values())
     worst = max(STEPS, key=lambda step: large_gb[step] / small_gb[step])
     growth, peak = large_gb[worst] / small_gb[worst], max(large_gb.values())
-    sizes = f"{SIZES[1]} against {SIZES[0]} data sets, {STRATEGY} on kuka at 200 µm, minimum of {REPETITIONS}"
-    time = f"sum of the seconds of {', '.join(STEPS)}: {sizes}"
-    memory = f"peak memory of the job that grows most, {worst}; largest of any job {peak:.2f} GB: {sizes}"
+    against = f"{sizes[1]} against {sizes[0]} data sets, {STRATEGY} on kuka at 200 µm, minimum of {repetitions}"
+    time = f"sum of the seconds of {', '.join(STEPS)}: {against}"
+    memory = f"peak memory of the job that grows most, {worst}; largest of any job {peak:.2f} GB: {against}"
     within = growth <= MEMORY_TARGET and peak < MEMORY_LIMIT_GB
     return [
         Row("scale time", ours, theirs, ours / theirs, f"<= {TIME_TARGET}", ours / theirs <= TIME_TARGET, time),

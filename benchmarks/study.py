@@ -4,13 +4,28 @@ import shutil
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 from common import ROOT, Row
 from copies import copy_study, reduce_to_imports, reduce_to_records, snakemake
 
-JOBS = ("-j2", "study")
 TARGET = 1.5
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What Snakemake is asked for, and how often `rerun` asks again."""
+
+    jobs: tuple[str, ...]
+    repetitions: int
+
+
+FULL = Setting(("-j2", "study"), 7)
+# From seeds to a table, in three jobs.
+SMALL = Setting(("-j2", "reports/tables/table1.csv", "data/simulated/kuka/ideal.parquet", "--config", "data_sets=10"), 1)
+# Of results/: what Snakemake and `job.run`, which no reduced script calls, note on a job.
+NOTES = ("logs", "timings", "checksums", "jobs")
 # Every recorded job in the order in which they ended, in this one process.
 ONE_PROCESS = """
 import pickle, sys
@@ -24,28 +39,29 @@ for record in sorted(Path("jobs").iterdir()):
 """
 
 
-def rows(work: Path) -> list[Row]:
+def rows(work: Path, setting: Setting) -> list[Row]:
     """Rows of the report.
 
     Parameters
     ----------
     work : Path
         Temporary folder; the finished study stays there.
+    setting : Setting
     """
     empty, importing = copy_study(work / "empty"), copy_study(work / "importing")
     reduce_to_records(empty)
     reduce_to_imports(importing)
-    empty_s, _ = snakemake(empty, *JOBS)
+    empty_s, _ = snakemake(empty, *setting.jobs)
     print(f"  the empty job graph: {empty_s:.1f} s", flush=True)
-    importing_s, _ = snakemake(importing, *JOBS)
+    importing_s, _ = snakemake(importing, *setting.jobs)
     print(f"  importing: {importing_s:.1f} s", flush=True)
-    folder, ours = finished_study(work)
+    folder, ours = finished_study(work, setting)
     alone_s = _in_one_process(empty)
     print(f"  in one process: {alone_s:.1f} s", flush=True)
     for other in (empty, importing):
         if missing := _made(folder) ^ _made(other):
             raise AssertionError(f"one of the two did not make {', '.join(sorted(missing))}")
-    how = f"snakemake {' '.join(JOBS)} on a clean copy, once, against "
+    how = f"snakemake {' '.join(setting.jobs)} on a clean copy, once, against "
     return [
         Row(
             "study",
@@ -69,7 +85,7 @@ def rows(work: Path) -> list[Row]:
     ]
 
 
-def finished_study(work: Path) -> tuple[Path, float]:
+def finished_study(work: Path, setting: Setting) -> tuple[Path, float]:
     """Make the whole study, clean, in the folder ``study`` of `work`.
 
     Returns
@@ -78,7 +94,7 @@ def finished_study(work: Path) -> tuple[Path, float]:
     seconds : float
     """
     folder = copy_study(work / "study")
-    seconds, _ = snakemake(folder, *JOBS)
+    seconds, _ = snakemake(folder, *setting.jobs)
     print(f"  the study: {seconds:.1f} s", flush=True)
     return folder, seconds
 
@@ -92,6 +108,6 @@ def _in_one_process(recorded: Path) -> float:
 
 
 def _made(folder: Path) -> set[str]:
-    """Files that jobs made, without the logs and timings beside them."""
+    """Files that jobs made, without what is noted on each job beside them."""
     files = (path.relative_to(folder) for part in ("data", "results", "reports") for path in (folder / part).rglob("*.*"))
-    return {path.as_posix() for path in files if path.parts[1] not in ("logs", "timings") and (folder / path).is_file()}
+    return {path.as_posix() for path in files if path.parts[1] not in NOTES and (folder / path).is_file()}

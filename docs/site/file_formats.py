@@ -25,7 +25,7 @@ TABLES = {
     "elastocal.study.table_schemas": "The study: `data/simulated`, `results`.",
     "elastocal.loop.schemas": "The loop: `results/loop`, `reports/loop`.",
     "elastocal.league.schemas": "The league of methods: `results/league`, `reports/league`.",
-    "elastocal.blind.closed_loop": "The closed loop: `results/closed_loop`.",
+    "elastocal.blind.schemas": "The closed loop and bad rows: `results/closed_loop`, `results/bad_rows`.",
 }
 # Robots have different numbers of joints; tables are shown for this one.
 JOINTS = 6

@@ -137,6 +137,19 @@ def test_noise_that_is_not_that_of_the_repeats_is_found(run):
     assert checked(run) == ["noise of step 0, from repeats"]
 
 
+@pytest.mark.parametrize(("stated", "expected"), [(1.3, []), (1.31, ["noise of step 1, from repeats"])])
+def test_noise_may_be_that_of_the_repeats_times_the_factor_that_is_stated(run, stated, expected):
+    """Of a step about which measurements scatter more than about each other."""
+    path = run.folder / FOLDER / "diagnosis.json"
+    document = json.loads(path.read_text())
+    noise = document["steps"][1]["noise"]
+    document["steps"][1]["noise"] = noise | {name: 1.3 * noise[name] for name in ("position_m", "orientation_rad")}
+    document["document"] = {"noise": {"factor": stated}}
+    path.write_text(json.dumps(document))
+    found = [name for name in checked(run) if name.startswith("noise")]
+    assert found == expected
+
+
 @pytest.mark.parametrize(
     "other",
     [{"frame": "tracker"}, {"declared": ["joint_offset"]}, {"targets": {"hand": {"point": "hand", "offset_m": "unknown"}}}],

@@ -1,6 +1,9 @@
 """The whole audit of a folder."""
 
-from made_audits import CONFIGURATION
+import pandas as pd
+import pytest
+from audited_campaigns import audit_of, diagnosed_campaign
+from made_audits import CONFIGURATION, failed
 from planted_errors import forge
 from support import refused
 
@@ -29,3 +32,59 @@ def test_a_run_of_which_a_check_does_not_hold_is_refused_by_the_file():
     with refused("b.csv", "column x", "1 of 2 checks"):
         require_all(as_table(rows), "audit.html")
     assert require_all(as_table(rows[:1]), "audit.html") == "1 files, 1 checks, 1 values compared: all hold\n"
+
+
+BARE = {"covariates": ()}
+# Robot, effects, whether it weighs, and how it is measured.
+HONEST = {
+    "nothing wrong, three kilonewtons": ("fanuc", (), False, {"force_N": 3000.0}),
+    "a joint off, no covariates": ("kuka", ("joint_offset",), False, BARE),
+    "a limber arm whose gear errs": ("iiwa14", ("transmission_harmonic",), False, BARE),
+    "links that bend, all points": ("kuka", ("link_elasticity",), False, {**BARE, "points": ("3DoF", "6DoF")}),
+    "declared weights": ("fanuc", ("joint_offset",), True, {}),
+    "declared weights, no covariates": ("abb", (), True, BARE),
+    "weights behind a parallelogram, declared noise": ("gp180", (), True, {"declared_noise": (6e-5, 6e-5)}),
+    "positions alone, a payload": ("abb", ("payload",), True, {"measured": "position"}),
+    "too small a declared noise, no repeats": (
+        *("kuka", (), False),
+        {**BARE, "measured": "position", "declared_noise": (2e-5, 2e-5), "repeats": 1, "repeated_poses": 0},
+    ),
+    "the tracker's frame": ("kuka", ("joint_offset",), False, {"frame": "tracker"}),
+    "declared geometry": ("kuka", (), False, {"declared": ("joint_offset", "link_geometry")}),
+    "a set-up that moved, repeats on both sides": ("kuka", ("setup_step",), False, {"repeated_poses": 12}),
+    "what no catalogue has": ("fanuc", ("outside:foreign_angle_stiffness",), False, BARE),
+}
+
+
+@pytest.mark.parametrize("case", HONEST)
+def test_an_honest_campaign_raises_no_alarm(case, tmp_path):
+    robot, effects, weighs, design = HONEST[case]
+    found = audit_of(diagnosed_campaign(tmp_path, robot, effects, weighs, **design))
+    assert [finding for finding in found if not finding.holds] == []
+    assert len(found) >= 18
+
+
+@pytest.fixture(scope="module")
+def weighing(tmp_path_factory):
+    """A campaign of which neither weights nor approaches are left out."""
+    return diagnosed_campaign(tmp_path_factory.mktemp("audited"), "fanuc", ("joint_offset",), weighs=True)
+
+
+@pytest.mark.parametrize(
+    ("file", "column", "row", "change", "expected"),
+    [
+        ("reports/loop/cell/residuals.parquet", "before_dy", 7, lambda v: v + 1e-7, "residuals of the declared model"),
+        ("reports/loop/cell/residuals.parquet", "after_dz", 7, lambda v: v + 1e-5, "train errors after"),
+        ("reports/loop/cell/residuals.parquet", "after_dz", -1, lambda v: v + 1e-5, "heldout errors after"),
+        ("results/loop/cell/steps.parquet", "value", 1, lambda v: 1.001 * v, "residuals of the declared model"),
+    ],
+)
+def test_one_number_altered_is_found(weighing, file, column, row, change, expected):
+    """A residual by 0.1 µm, or by 10 µm where only means are known; a compliance by a thousandth of itself."""
+    before = (weighing / file).read_bytes()
+    frame = pd.read_parquet(weighing / file)
+    frame.loc[frame.index[row], column] = change(frame[column].iloc[row])
+    frame.to_parquet(weighing / file)
+    found = failed(audit_of(weighing))
+    (weighing / file).write_bytes(before)
+    assert any(name.startswith(expected) for name in found), found

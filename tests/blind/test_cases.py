@@ -262,3 +262,23 @@ def test_nothing_of_the_truth_lies_in_the_blind_folder(tmp_path):
 def test_a_manifest_names_the_hash_of_every_truth(tmp_path):
     write_manifest(tmp_path / "manifest.txt", {"case_b": "22", "case_a": "11"})
     assert (tmp_path / "manifest.txt").read_text() == "11  case_a.json\n22  case_b.json\n"
+
+
+def test_bad_rows_are_planted_and_sealed_and_a_base_is_tilted_against_its_own_frame(tmp_path):
+    clean, _ = made(a_case(), tmp_path / "clean")
+    for setting in ("bad_rows", "tilted_base"):
+        campaign, truth = made(a_case(setting=setting), tmp_path / setting)
+        off = np.linalg.norm(campaign.measurements.position - clean.measurements.position, axis=1)
+        if setting == "bad_rows":
+            rows = {row for slip in truth["bad_rows"] for row in slip["rows"]}
+            read = [part.astype(float) for part in (campaign.measurements.wrench, campaign.measurements.joint_angles)]
+            same = [clean.measurements.wrench, clean.measurements.joint_angles]
+            apart = (off > 0) | (read[0] != same[0]).any(axis=1) | (read[1] != same[1]).any(axis=1)
+            turn = campaign.measurements.rotation_vector != clean.measurements.rotation_vector
+            assert set(np.flatnonzero(apart | turn.any(axis=1)).tolist()) == rows
+            assert 1 <= len(truth["bad_rows"]) <= 3 and "misplaced" not in truth
+        else:
+            turn = np.linalg.norm(truth["misplaced"]["turn_rad"])
+            assert 1e-5 < turn < 1.2e-3 and "bad_rows" not in truth
+            # A tilt moves what is far from the base more.
+            assert off.min() < off.max() < 2e-3

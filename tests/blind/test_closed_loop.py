@@ -19,6 +19,7 @@ from elastocal.blind.closed_loop import (
     closed_loop,
     hidden_effects,
 )
+from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.rehearsal import hidden_robot
 from elastocal.io.storage import read_table, write_table
 
@@ -91,3 +92,16 @@ def test_the_table_goes_to_a_file_and_back(table, tmp_path):
     back = read_table(tmp_path / "t.parquet", schemas.closed_loop(6))
     np.testing.assert_array_equal(back["reached_error_m"], table["reached_error_m"])
     assert set(back["effect"]) == {"compensator_torque"}
+
+
+def test_with_slips_the_floor_is_the_same_in_the_declared_base_and_the_campaign_has_a_lost_beam(monkeypatch):
+    monkeypatch.setattr(module, "_POSES", 6)
+    monkeypatch.setattr(module, "_PATH", 12)
+    written = []
+    monkeypatch.setattr(module, "write_blind_campaign", lambda *a, **k: written.append(write_blind_campaign(*a, **k)))
+    slipped = pd.DataFrame(closed_loop(ROBOTS / "gp180.yaml", ROBOTS, "compensator_torque", 768481013, slips=True))
+    assert 1e-6 < rms(slipped, TRUE) < 4e-5
+    # A tilt of 0.3 mrad and a shift that the uncorrected robot does not know of.
+    assert rms(slipped, UNCORRECTED) > 1e-3
+    ((slip,),) = [made["bad_rows"] for made in written]
+    assert slip["kind"] in ("zeros", "held_point") and len(slip["rows"]) == 1

@@ -13,3 +13,8 @@ def test_columns_are_named_once_and_say_what_they_are():
 
 def test_an_audit_knows_the_table_by_the_name_that_its_file_states():
     assert SCHEMAS[schemas.closed_loop(6).name](6) == schemas.closed_loop(6)
+
+
+def test_an_audit_knows_the_table_of_bad_rows():
+    assert SCHEMAS["bad_rows"](6) == schemas.BAD_ROWS
+    assert all(column.meaning for column in schemas.BAD_ROWS.columns)

@@ -5,7 +5,20 @@ from made_verdicts import truth, verdict_of
 
 from elastocal.blind.scores import outcome
 
+TILTED = {"misplaced": {"shift_m": [0.0, 0.0, 2e-4], "turn_rad": [3e-4, 0.0, 0.0]}}
 OUTCOMES = {
+    "a base that is misplaced": (truth(group="setting") | TILTED, verdict_of("named", "base_placement"), set()),
+    "a base that is not": (truth(group="setting"), verdict_of("named", "base_placement"), {"detected", "wrong_name"}),
+    "another name beside a misplaced base": (
+        truth(group="setting") | TILTED,
+        verdict_of("several", "base_placement", "payload"),
+        {"detected", "wrong_name"},
+    ),
+    "right name beside a misplaced base": (
+        truth("payload", group="setting") | TILTED,
+        verdict_of("several", "base_placement", "payload"),
+        {"detected", "exact", "named_right", "holds_truth"},
+    ),
     "right name": (truth("payload"), verdict_of("named", "payload"), {"detected", "exact", "named_right", "holds_truth"}),
     "wrong name": (truth("payload"), verdict_of("named", "link_weight"), {"detected", "wrong_name"}),
     "class that holds it": (

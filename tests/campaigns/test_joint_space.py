@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from elastocal.campaigns.joint_space import beyond_range, blocks
+from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, repeated
 
 
 @pytest.mark.parametrize(("poses", "count"), [(20, 4), (21, 4), (9, 4), (30, 7), (5, 5), (6, 1)])
@@ -101,3 +101,12 @@ def test_joints_count_alike_whatever_their_range():
     """A joint that moves a tenth as far parts the poses just as well: its spread is its unit."""
     angles = np.random.default_rng(8).uniform(-0.5, 0.5, (24, 3))
     np.testing.assert_array_equal(blocks(angles * [1.0, 0.1, 1.0], 4), blocks(angles, 4))
+
+
+def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_may():
+    fitted = np.random.default_rng(3).uniform(-2, 2, (30, 6))
+    almost, elsewhere = fitted[[4, 17]] + 0.9 * SAME_POSE_RAD, fitted[[4, 17]].copy()
+    elsewhere[:, 5] += 1.1 * SAME_POSE_RAD
+    assert repeated(fitted, almost).all() and not repeated(fitted, elsewhere).any()
+    # Each joint at the angle that it had in another pose is a pose of its own.
+    assert not repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()

@@ -51,6 +51,26 @@ def test_joint_angles_are_judged_in_the_models_convention(cell):
     assert len(cell.read().measurements) == len(cell.table["pose"])
 
 
+def test_a_clock_that_runs_backwards_is_refused(cell):
+    cell.table["time_s"] = [-time for time in cell.table["time_s"]]
+    with refused(cell.measurements, "row 73, column time_s", "the poses before it were measured later", "rise"):
+        cell.read()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_poses_may_be_measured_in_any_order_and_stand_in_any_order(cell, seed):
+    """Backwards in the file, or backwards by their numbers; loads and targets of a pose in any order; the clock of any zero."""
+    order, count = np.random.default_rng(seed).permutation(10), len(cell.table["pose"])
+    if seed == 0:
+        cell.table["pose"] = [9 - pose for pose in cell.table["pose"]]
+    elif seed == 1:
+        cell.table = {name: values[::-1] for name, values in cell.table.items()}
+    elif seed == 2:
+        cell.table["time_s"] = [order[row // 8] * 600.0 - row % 8 for row in range(count)]
+    cell.table["time_s"] = [time - 1.7e9 for time in cell.table["time_s"]]
+    assert len(cell.read().measurements) == count
+
+
 def test_the_same_measurement_twice_is_refused(cell):
     cell.spoil(7, "repeat", 0)
     found = "pose 0, load 1, repeat 0, target A again"

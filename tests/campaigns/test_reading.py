@@ -220,12 +220,30 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 numbers", "or 3"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": -1.0}}, "noise.joint_rad", ["-1"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": 2.0}}, "noise.joint_rad", ["2.0", "0.1 or less"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0.1 or less"]),
+        *(
+            ({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"])
+            for value in (60, 0.2, 6e-12, 1e-300, -1e-4)
+        ),
+        *(({"noise": {"position_m": value}}, "noise.position_m", ["number"]) for value in (float("inf"), float("nan"))),
+        *(
+            ({"noise": {"position_m": 1e-4, "orientation_rad": value}}, "noise.orientation_rad", ["resolves"])
+            for value in (60, 6e-12, 1e-300, -1.0)
+        ),
+        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, 150]}}}, "targets.A.offset_m[2]", ["150", "reaches"]),
     ],
 )
 def test_faulty_document_is_refused_in_one_line(cell, changes, key, words):
     cell.document |= changes
     with refused(f"{cell.source}: ", f" {key}", *words):
         cell.read(effects=["joint_offset", "payload"])
+
+
+@pytest.mark.parametrize("position", [1e-6, 1e-3, 1e-2, 80 * 6e-6 + 15e-6])
+def test_noise_of_an_interferometer_a_camera_a_humanoid_and_a_tracker_far_away_is_read(cell, position):
+    cell.document["noise"] = {"position_m": position, "orientation_rad": min(10 * position, 0.1), "joint_rad": position}
+    assert cell.read().noise == cell.document["noise"]
 
 
 def test_declared_effects_are_not_checked_without_a_list_of_them(cell):

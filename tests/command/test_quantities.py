@@ -1,8 +1,13 @@
 """Lengths need their unit, and lists their count."""
 
-import pytest
-from support import refused
+from typing import get_args
 
+import pytest
+import typer
+from support import refused
+from typer.testing import CliRunner
+
+from elastocal.command.main import app
 from elastocal.command.quantities import length_m, numbers
 
 
@@ -13,7 +18,7 @@ def test_a_length_is_read_with_its_unit(text, metres):
     assert length_m("--tolerance", text) == pytest.approx(metres)
 
 
-@pytest.mark.parametrize("text", ["0.2", "0mm", "-1mm", "200mm", "mm", "1e3mm", "nan mm"])
+@pytest.mark.parametrize("text", ["0.2", "0mm", "-1mm", "200mm", "mm", "1e3mm", "nan mm", "0.000000000001mm"])
 def test_a_length_without_a_unit_or_of_no_sense_is_refused(text):
     with refused("--tolerance", "", "with its unit"):
         length_m("--tolerance", text)
@@ -21,6 +26,30 @@ def test_a_length_without_a_unit_or_of_no_sense_is_refused(text):
 
 def test_numbers_are_counted():
     assert numbers("--tracker", "1,2.5,-3", 3).tolist() == [1.0, 2.5, -3.0]
-    for text in ("1,2", "1,2,x", "1,2,nan"):
+    for text in ("1,2", "1,2,x", "1,2,nan", "1,2,inf", "1,2,1e300"):
         with refused("--tracker", "", "3 numbers"):
             numbers("--tracker", text, 3)
+
+
+def numeric_options(command, words=()):
+    """Of every subcommand: its words with its arguments, and each of its options that is a number."""
+    for name, inner in getattr(command, "commands", {}).items():
+        yield from numeric_options(inner, (*words, name))
+    arguments = [p.name for p in command.params if p.param_type_name == "argument"]
+    for option in command.params:
+        if {int, float} & {option.type_descriptor.annotation, *get_args(option.type_descriptor.annotation)}:
+            yield (*words, *arguments), option.opts[0]
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", "-1", "1e300", "99999999999999999999"])
+def test_every_option_that_is_a_number_has_a_range(value):
+    """Whatever else is missing, the last line says which option is wrong."""
+    found = set()
+    for words, option in numeric_options(typer.main.get_command(app)):
+        result = CliRunner().invoke(app, [*words, option, value])
+        assert result.exit_code == 2 and f"'{option}'" in result.output.splitlines()[-1], (words, result.output)
+        found.add(option)
+    assert found == {
+        *("--mass-std", "--force", "--risk", "--seed", "--poses", "--held-out", "--candidates", "--table", "--header"),
+        "--cores",
+    }

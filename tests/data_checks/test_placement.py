@@ -15,10 +15,10 @@ from elastocal.data_checks.placement import (
     rms,
     robust_sigma,
     robustly_placed,
-    single_observations,
     spread,
     trimmed_rms,
 )
+from elastocal.fitting.observations import single_observations
 
 EXACT = Plan(poses=12, loads=1, noise=0.0, force=0.0)
 

@@ -27,6 +27,7 @@ CALLERS = {
     "src/elastocal/loop/whole.py": "the one call",
     "src/elastocal/loop/proposed.py": "the next experiment",
     "src/elastocal/blind/follow_up.py": "follow-ups",
+    "src/elastocal/blind/bad_rows.py": "the one call, on campaigns with and without bad rows",
     "src/elastocal/blind/closed_loop.py": "makes the call on the case that `cases_in` gives, and corrects by its fits",
     "workflow/scripts/diagnose_campaign.py": "rules",
     "workflow/scripts/diagnose_cases.py": "blind proof",

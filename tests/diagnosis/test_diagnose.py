@@ -11,7 +11,9 @@ from scipy.stats import f
 
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
+from elastocal.diagnosis import kept_rows
 from elastocal.diagnosis.diagnose import _effect_steps, _noise_warnings, _pose_error_warnings, diagnose
+from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes, selected
 from elastocal.diagnosis.search import posterior
@@ -44,9 +46,15 @@ def test_the_problem_is_whitened_by_the_noise_that_is_there(diagnosed):
     assert rows[1].about.noise.position_m == pytest.approx(6e-5, rel=0.3)
 
 
+def _priors(fitted):
+    return {
+        parameter.prior_std for owner, parameter in fitted.parameters if owner.startswith("link_geometry") and parameter.sized
+    }
+
+
 def test_sizes_and_verdict_do_not_follow_the_noise_that_was_declared(diagnosed):
     right, wrong = diagnosed[6e-5], diagnosed[1e-6]
-    assert right.evidence.linearized.declared_size == wrong.evidence.linearized.declared_size
+    assert _priors(right.declared) == _priors(right.final) == _priors(wrong.declared) == _priors(wrong.final)
     # The wrong zero of a joint is a wrong geometry of its link, which is declared.
     assert right.document["verdict"] == wrong.document["verdict"] == "adequate"
     assert right.document["noise"]["factor"] == pytest.approx(1.0, abs=0.3)
@@ -176,8 +184,8 @@ def test_measurements_at_fault_end_the_diagnosis_at_the_declared_model(decisive,
 
 def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
     monkeypatch.setattr(module, "faults", lambda campaign, measurements: faults(True))
-    fitted = module.fit
-    monkeypatch.setattr(module, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
+    fitted = kept_rows.fit
+    monkeypatch.setattr(kept_rows, "fit", lambda *args, **options: replace(fitted(*args, **options), converged=False))
     document = diagnose(case, Settings(), 1).document
     assert document["converged"] == {"declared": False, "final": False}
     assert [line.split(" did")[0] for line in document["warnings"] if "did not converge" in line] == [
@@ -236,3 +244,19 @@ def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_ma
     assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])
     misfit = [(step.fitted.whitened(step.fitted.residual) ** 2).sum() for step in made]
     assert misfit == sorted(misfit, reverse=True)
+
+
+def test_frames_alone_are_kept_where_they_predict_left_out_poses_better(kuka, config_folder, tmp_path, monkeypatch):
+    folder = made_folder(tmp_path / "made", kuka, declared=["link_geometry"])
+    case, held_out = cases_in(folder, config_folder / "robots")
+    settings = replace(Settings(), numbers_a_parameter=np.inf)
+    usual = diagnose(case, settings, 1)
+    assert usual.document["kept"] != "frames" and not any("left out in turn" in line for line in usual.document["warnings"])
+    # Were they to lose.
+    monkeypatch.setattr(module, "certain_loss", lambda squares, others: True)
+    found = diagnose(case, settings, 1)
+    assert found.document["kept"] == "frames" and found.steps[-1].kind == "kept" and found.final.model.effects == ()
+    assert any("left out in turn" in line and "frames and targets alone" in line for line in found.document["warnings"])
+    heldout = judge(found, held_out, 1).document["heldout"]
+    assert heldout["after"]["rms_m"] == pytest.approx(heldout["uncalibrated"]["rms_m"], rel=1e-3)
+    assert diagnose(case, replace(settings, numbers_a_parameter=0.0), 1).document["kept"] != "frames"

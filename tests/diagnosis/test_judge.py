@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from elastocal.diagnosis.diagnose import Diagnosis, Step
 from elastocal.diagnosis.judge import judge, residual_blocks, split_table
+from elastocal.fitting.case import noise_facts
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise import Noise
@@ -42,9 +43,10 @@ def steps_of(case, *keys):
 def diagnosis_of(case, steps):
     """A diagnosis whose document has what `judge` adds to and one thing that it must leave alone."""
     names = [step.name.removeprefix("+ ") for step in steps if step.kind == "effect"]
-    effects = [{"name": name, "heldout_gain": None} for name in names]
-    document = {"verdict": "named", "effects": effects, "heldout": None, "warnings": ["as it was"]}
-    return Diagnosis(case, tuple(steps), None, document)
+    effects = [{"name": name, "family": "geometry", "heldout_gain": None} for name in names]
+    document = {"verdict": "named", "effects": effects, "heldout": None, "warnings": ["as it was"], "gross_errors": []}
+    document["noise"] = noise_facts(NOISE)
+    return Diagnosis(case, tuple(steps), None, document, case.campaign.measurements.select(np.zeros(0, int)))
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +63,10 @@ def judged(steps, case, held_out):
     return judge(diagnosis_of(case, steps), held_out, 1)
 
 
+def blocks_of(diagnosis, held_out):
+    return list(residual_blocks(diagnosis, judge(diagnosis, held_out, 1)))
+
+
 def about_errors(found):
     """Warnings but for that of poses outside the fitted range, of which four random ones among 14 may well have one."""
     return [warning for warning in found.document["warnings"][1:] if "outside the range" not in warning]
@@ -73,16 +79,13 @@ def fitted_of(steps, kind):
 def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_order(made):
     case, held_out, steps = made
     robot = case.campaign.robot
-    blocks = list(residual_blocks(diagnosis_of(case, steps), held_out))
+    blocks = blocks_of(diagnosis_of(case, steps), held_out)
     assert [block["held_out"].all() for block in blocks] == [False, True]
     for block, part in zip(blocks, (case, held_out), strict=True):
         read = part.campaign.measurements
-        # Repeats of one state stand in the order of their target: the rows still are all measurements, each once.
-        assert sorted(block["row"]) == sorted(read.row)
-        order = np.argsort(read.row)[np.searchsorted(np.sort(read.row), block["row"])]
-        for name in ("pose", "load", "repeat", "target"):
-            np.testing.assert_array_equal(block[name], getattr(read, name)[order])
-        measured, angles, wrench = read.position[order], read.joint_angles[order], read.wrench[order]
+        for name in ("row", "pose", "load", "repeat", "target"):
+            np.testing.assert_array_equal(block[name], getattr(read, name))
+        measured, angles, wrench = read.position, read.joint_angles, read.wrench
         np.testing.assert_array_equal(np.column_stack([block[axis] for axis in "xyz"]), measured)
         for stage, kind in (("before", "declared"), ("after", "effect")):
             fitted = fitted_of(steps, kind)
@@ -106,7 +109,7 @@ def test_residuals_are_measured_less_predicted_for_every_measurement_in_its_orde
 def test_each_measurement_stands_by_itself_and_the_training_ones_come_first(made):
     """As many rows as measurements, repeats included, though the fit averages them."""
     case, held_out, steps = made
-    first, second = residual_blocks(diagnosis_of(case, steps), held_out)
+    first, second = blocks_of(diagnosis_of(case, steps), held_out)
     assert len(first["row"]) == len(case.campaign.measurements) > len(case.observations)
     assert len(second["row"]) == len(held_out.campaign.measurements)
     assert {*zip(first["session"], first["pose"], strict=True)}.isdisjoint(zip(second["session"], second["pose"], strict=True))
@@ -152,7 +155,7 @@ def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
     # A pose that was not there at all is far off; the others bear the effect out.
     assert beyond["outside"]["after"]["rms_m"] > 0.1 > beyond["inside"]["after"]["rms_m"]
     assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
-    training, unseen = residual_blocks(diagnosis_of(case, steps), away)
+    training, unseen = blocks_of(diagnosis_of(case, steps), away)
     assert not training["outside_range"].any()
     assert unseen["outside_range"][unseen["pose"] == first].all()
     assert len(np.unique(unseen["pose"][unseen["outside_range"]])) == beyond["poses"]
@@ -189,7 +192,7 @@ def test_a_session_held_out_is_placed_and_judged(frame, kuka, config_folder, tmp
     steps = steps_of(case, "joint_offset@3")
     found = judged(steps, case, held_out).document["heldout"]
     assert found["after"]["rms_m"] < 1.5 * found["noise_floor_rms_m"] and found["after"]["rms_m"] < found["before"]["rms_m"]
-    off = np.column_stack([list(residual_blocks(diagnosis_of(case, steps), held_out))[1][f"after_d{axis}"] for axis in "xyz"])
+    off = np.column_stack([blocks_of(diagnosis_of(case, steps), held_out)[1][f"after_d{axis}"] for axis in "xyz"])
     assert np.sqrt((off**2).sum(axis=1).mean()) < 2e-4
 
 
@@ -253,7 +256,7 @@ def test_another_campaign_as_test_has_frames_and_targets_of_its_own(kuka, config
     found = judged(steps, case, held_out)
     assert found.document["heldout"]["after"]["rms_m"] < 1.3 * found.document["heldout"]["noise_floor_rms_m"]
     assert found.document["heldout"]["after"]["rms_m"] < found.document["heldout"]["before"]["rms_m"]
-    blocks = list(residual_blocks(diagnosis_of(case, steps), held_out))
+    blocks = blocks_of(diagnosis_of(case, steps), held_out)
     off = np.column_stack([blocks[1][f"after_d{axis}"] for axis in "xyz"])
     assert np.sqrt((off**2).sum(axis=1).mean()) < 2e-4
 
@@ -272,3 +275,14 @@ def test_a_remainder_is_judged_where_the_campaign_asks_for_one_and_the_data_are_
     assert facts["physics"] + facts["regression_share"] + facts["left"] == pytest.approx(1.0)
     faulty = asked.document | {"effects": [asked.document["effects"][0] | {"family": "data"}]}
     assert judge(replace(asked, document=faulty), held_out, 1).document["remainder"] is None
+
+
+def test_held_out_poses_that_repeat_fitted_configurations_are_warned_of(made):
+    """At the angles of training poses: whatever the errors are, they say nothing of other poses."""
+    case, held_out, steps = made
+    states, fitted = held_out.observations.states, case.observations.states
+    assert not any("repeat configurations" in warning for warning in judged(steps, case, held_out).document["warnings"])
+    again = fitted.joint_angles[np.searchsorted(np.unique(states.pose), states.pose)] + 1e-3
+    repeating = replace(held_out, observations=replace(held_out.observations, states=replace(states, joint_angles=again)))
+    said = [warning for warning in judged(steps, case, repeating).document["warnings"] if "repeat configurations" in warning]
+    assert len(said) == 1 and said[0].startswith(f"all {len(np.unique(states.pose))} validation poses")

@@ -1,16 +1,17 @@
 """From a fit to a linear problem: columns are changes of exact predictions, and coefficients count from zero."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from planted import HAND, planted, two_loads_a_pose
 from scipy.stats import chi2, ncx2
-from synthetic import NOISE, made_states
+from support import UR10, chain_of
+from synthetic import NOISE, conditions_on, made_states
 
-from elastocal.diagnosis.hypotheses import OTHER
+from elastocal.diagnosis.hypotheses import OTHER, prior_of, units_of
 from elastocal.diagnosis.linearize import (
-    declared_geometry,
     lacking,
     linearized,
     shapes_looked_at_closely,
@@ -20,6 +21,7 @@ from elastocal.diagnosis.linearize import (
 from elastocal.diagnosis.other import competitors
 from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
+from elastocal.effects.catalogue import candidates_on
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.prediction import residuals
 
@@ -91,35 +93,6 @@ def test_an_effect_is_found_at_its_true_size(campaign):
     assert value == pytest.approx(5e-4, abs=4 * unit.sizes[0] / np.sqrt(gram.item()))
 
 
-@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
-def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
-    campaign = planted(kuka, {key: [sign * offset] for key, sign in zip(keys, signs, strict=True)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise, start)
-    # Springs of the joints have no size: they keep their wide priors.
-    assert declared_geometry(model) == {"joint_offset"}
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == size
-    assert size in SETTINGS.declared_sizes
-    alone = linearized(campaign.declared, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert alone.declared_size == 1.0 and declared_geometry(campaign.declared.model) == set()
-
-
-@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
-def test_the_size_of_geometry_is_the_same_whatever_noise_was_taken(share, kuka):
-    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
-    keys = [f"joint_offset@{joint}" for joint in (2, 3, 4, 5)]
-    campaign = planted(kuka, {key: [1e-3 * (-1) ** n] for n, key in enumerate(keys)}, seed=2)
-    known = [campaign.candidates[key] for key in keys]
-    model, start = campaign.declared.model.with_effects(known), campaign.declared.estimate.with_effects(known)
-    fitted = fit(model, campaign.observations, campaign.declared.noise.scaled(share), start)
-    found = linearized(fitted, campaign.observations, [campaign.candidates["payload"]], SETTINGS)
-    assert found.declared_size == 1.0
-
-
 def test_the_competitor_acts_by_all_its_laws_of_which_the_campaign_has_inputs_and_that_show(campaign):
     loud = {unit.key for unit in problem_of(campaign, keys=KEYS[:1]).problem.units if unit.mechanism == OTHER}
     quiet = replace(campaign.declared, noise=campaign.declared.noise.scaled(0.01))
@@ -149,7 +122,7 @@ def test_too_few_angles_of_a_joint_test_no_harmonic_of_it(kuka):
     states.joint_angles[:, 3] = np.arange(30) % 3 * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
     candidate = campaign.candidates["transmission_harmonic@4[orders 1-2]"]
-    told = lacking(candidate, campaign.declared.model.sites, states)
+    told = lacking(candidate, campaign.declared.model, states)
     assert told == f"3 angles of joint 4 where {candidate.distinct_angles} are needed"
 
 
@@ -159,7 +132,7 @@ def test_too_few_angles_of_the_last_joint_test_no_nest(kuka, angles):
     states = made_states(6, 30, seed=4)
     states.joint_angles[:, 5] = np.arange(30) % angles * 0.4
     campaign = planted(kuka, {}, states=states, targets=HAND)
-    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model.sites, states)
+    told = lacking(campaign.candidates["nest_eccentricity"], campaign.declared.model, states)
     assert told == ("" if angles == 8 else f"{angles} angles of joint 6 where 8 are needed")
 
 
@@ -225,6 +198,32 @@ def test_a_step_that_was_fitted_is_tried_close_to_where_it_was_within_its_range(
     assert min(tried) >= shape.lowest and max(tried) <= shape.highest
     assert np.ptp(tried) < 0.5 / 12
     assert (shape.shares(tried) > 0).all()
+
+
+@pytest.mark.parametrize("rows", [40, 3000])
+@pytest.mark.parametrize("dated", [True, False])
+@pytest.mark.parametrize("when", [None, 1 / 12 + 1e-5, float(np.nextafter(1 / 12, 1)), 11 / 12 - 1e-12])
+def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campaign, rows, dated, when):
+    """As tried, and after a closer look about each value that was tried, however close these lie to the end of the range."""
+    states = made_states(6, rows)
+    around = conditions_on(chain_of(UR10), states if dated else replace(states, time_s=None, temperature_c=None))
+    fitted = campaign.declared
+    if when is not None:
+        model, start = with_effect(campaign, "setup_step", 0.0)
+        start.shapes[-1][:] = when
+        fitted = replace(fitted, model=model, estimate=start)
+    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, around.sites, states)]
+    laws = [(each, 1) for each in competitors(around)]
+    tested = [(c, shapes) for c in candidates for shapes in shapes_tried(c, fitted)]
+    units = units_of(tested, laws, SETTINGS)
+    problem = SimpleNamespace(units=units, prior=prior_of(units, SETTINGS))
+    for number in [n for n, unit in enumerate(units) if unit.mechanism == "setup_step"]:
+        alone = np.zeros(len(units))
+        alone[number] = 50.0
+        closer = shapes_looked_at_closely(problem, alone)
+        tested = [(c, shapes) for c in candidates for shapes in closer.get(c.key, shapes_tried(c, fitted))]
+        names = [unit.key for unit in units_of(tested, laws, SETTINGS)]
+        assert len(set(names)) == len(names)
 
 
 def looked_at(problem, alone):

@@ -41,10 +41,8 @@ def test_priors_arrive_in_the_fit(found):
     final = fit_with_sizes(declared, campaign.observations, declared.noise, chosen)
     priors = {owner: parameter.prior_std for owner, parameter in final.parameters if "offset@" in owner}
     plausible = effect.parameters[0].plausible
-    assert priors == pytest.approx(
-        {"joint_offset@2": line.declared_size * plausible, "offset@3": best.scales[0] * plausible}, rel=1e-12
-    )
-    assert line.declared_size in SETTINGS.declared_sizes and best.scales[0] in SETTINGS.scales
+    assert priors["joint_offset@2"] is None and priors["offset@3"] == pytest.approx(best.scales[0] * plausible, rel=1e-12)
+    assert best.scales[0] in SETTINGS.scales
     # And do what a prior does: information of the measurements and of the prior add up.
     about = linearize(final.model, final.estimate, campaign.observations, final.conditions)
     left = final.whitened(about.sensitivities).reshape(-1, len(final.parameters))
@@ -56,7 +54,7 @@ def test_priors_arrive_in_the_fit(found):
 def test_a_later_fit_starts_from_the_shapes_that_one_before_has_found(kuka):
     campaign = planted(kuka, {"thermal_growth[time]": [2e-5]}, seed=4)
     candidate = campaign.candidates["thermal_growth[time]"]
-    tried = Selected(((candidate, np.array([candidate.shapes[0].start])),), 1.0)
+    tried = Selected(((candidate, np.array([candidate.shapes[0].start])),))
     found = fit_with_sizes(campaign.declared, campaign.observations, campaign.declared.noise, tried)
     ((same, shapes),) = with_shapes_of(tried, found).effects
     assert same is candidate and shapes[0] != candidate.shapes[0].start
@@ -94,7 +92,7 @@ def test_the_competitor_and_the_base_are_no_effects_of_the_fit(found):
     _, _, line, _ = found
     other = next(number for number, unit in enumerate(line.problem.units) if unit.candidate is None)
     chosen = selected(line, Model((other,), 0.0, np.array([0.1]), 0.0))
-    assert chosen.effects == () and chosen.declared_size == line.declared_size
+    assert chosen.effects == ()
 
 
 def test_mean_square_left_is_that_of_the_penalised_fit(found):

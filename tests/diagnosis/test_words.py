@@ -1,6 +1,8 @@
 """Mechanisms, locations and hypotheses are named as a robot engineer names them."""
 
 import pytest
+from support import ODD_CHAINS, OTHER_CHAINS, chain_of
+from synthetic import equipped
 
 from elastocal.diagnosis.findings import location_words
 from elastocal.diagnosis.words import (
@@ -15,7 +17,8 @@ from elastocal.diagnosis.words import (
     parameter_words,
     physical_name,
 )
-from elastocal.effects.catalogue import effects
+from elastocal.effects.catalogue import candidates_on, effects
+from elastocal.figures.candidates import short_name
 
 
 def test_every_effect_of_the_catalogue_brings_its_own_physical_name():
@@ -23,6 +26,13 @@ def test_every_effect_of_the_catalogue_brings_its_own_physical_name():
     assert all(named.values()), [name for name, words in named.items() if not words]
     assert len(set(named.values())) == len(named)
     assert not [words for words in named.values() if "_" in words or words != words.strip() or words[0].isupper()]
+
+
+@pytest.mark.parametrize("chain", [*OTHER_CHAINS.values(), *ODD_CHAINS.values()])
+def test_no_two_candidates_are_printed_alike(chain):
+    keys = list(candidates_on(equipped(chain_of(chain))))
+    for printed in (candidate_words, short_name):
+        assert len({printed(key) for key in keys}) == len(keys)
 
 
 def test_an_effect_without_words_falls_back_on_its_name():

@@ -328,6 +328,7 @@ CLOSED_FORMS = {
     "force_scale": lambda arm, law, name: arm.turned(arm.under(arm.states.wrench)),
     "thermal_growth": lambda arm, law, name, *lag: grown(arm, warmth(arm, law, *lag)),
     "temperature_gradient": temperature_gradient,
+    "base_placement": at_the_foot(lambda arm: 1.0),
     "frame_drift": at_the_foot(lambda arm: arm.states.time_s / 3600.0),
     "setup_step": at_the_foot(after_row),
 }

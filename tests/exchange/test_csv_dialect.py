@@ -1,9 +1,9 @@
 """Tables in any dialect: what is found out, and what is refused with its line."""
 
 import itertools
-import time
 
 import pytest
+from durations import growth
 from support import refused
 
 from elastocal.exchange import csv_dialect
@@ -74,11 +74,12 @@ def test_more_than_a_campaign_can_have_is_refused_at_once(tmp_path, monkeypatch)
         read_text_table(path, is_header)
 
 
-def test_thousands_of_columns_are_looked_at_in_no_time(tmp_path):
-    begin = time.monotonic()
-    with refused(tmp_path / "table.txt", "line 2"):
-        read_text_table(written(tmp_path, ";".join(["x", "y", *map(str, range(30_000))]) + "\n1;2\n"), is_header)
-    assert time.monotonic() - begin < 3.0
+def test_ten_times_as_many_columns_take_about_ten_times_as_long(tmp_path):
+    def read(columns):
+        with refused(tmp_path / "table.txt", "line 2"):
+            read_text_table(written(tmp_path, ";".join(["x", "y", *map(str, range(columns))]) + "\n1;2\n"), is_header)
+
+    assert growth(lambda: read(3_000), lambda: read(30_000)) < 20
 
 
 def test_a_missing_file_and_other_encodings_are_refused(tmp_path):

@@ -45,6 +45,8 @@ def test_loads_starts_and_covariates_are_read_where_they_are(tmp_path):
         ("# made by hand\n" + HEADER, "1,0,1e999,0,0,0", "line 3, column z", ["'1e999'"]),
         (HEADER, "1100,0,0,0,0,0", "line 2", ["1100", "metres"]),
         (HEADER, "1,0,0,0,0", "line 2", ["5 cells", "6"]),
+        (HEADER + ",temperature_c", "1,0,0,0,0,0,-500", "line 2, column temperature_c", ["'-500'", "-200 to 200"]),
+        (HEADER + ",fx,fy,fz,mx,my,mz", "1,0,0,0,0,0,0,0,-1e9,0,0,0", "line 2, column fz", ["'-1e9'", "1e+06 N"]),
     ],
 )
 def test_a_fault_is_refused_with_its_place(tmp_path, header, row, key, words):

@@ -1,7 +1,8 @@
 """Kills, full disks, read-only folders, wrong clocks and two runs at once: a plain `snakemake -j2` has to get over each.
 
-`make soak` runs it with forty kills; tests/workflow/test_soak.py with a few. After each fault a plain run has to finish, and
-every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed.
+`make soak` runs it with forty kills; tests/workflow/test_soak.py with one. After each fault a plain run has to finish, and
+every file that the pipeline makes has to be, byte for byte, that of a run that nothing disturbed. No moment is a time, by which
+a fast machine may have ended: kills come when a run has made so many files, of as many as the undisturbed one made.
 
 Usage: python tests/faults/soak.py [--kills 40] [--seed 1]
 """
@@ -16,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import psutil
@@ -62,11 +64,18 @@ def cleared(study):
         shutil.rmtree(study.path(name), ignore_errors=True)
 
 
-def started(study):
-    """A plain run, under way in a process group of its own."""
-    return subprocess.Popen(
-        **study.command("-j2"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
-    )
+def files_made(study):
+    """How many files there are that runs make, what they note for themselves included."""
+    # Folders and files that go while they are counted are not counted.
+    return sum(len(names) for made in (*MADE, ".snakemake") for _, _, names in os.walk(study.path(made)))
+
+
+def started(study, files=0):
+    """A plain run in a process group of its own, under way to its end once there are so many files."""
+    run = subprocess.Popen(**study.command("-j2"), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    while files_made(study) < files and run.poll() is None:
+        time.sleep(0.005)
+    return run
 
 
 def ended_by_itself(study):
@@ -75,33 +84,40 @@ def ended_by_itself(study):
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
 
 
-def killed(study, victim, after_s, draws):
-    """Start a run and kill a part of it.
+def killed(study, victim, files, draws):
+    """Start a run, kill a part of it once there are so many files; False where none is there by then, or it had ended.
 
     Parameters
     ----------
     study : Study
     victim : {"job", "snakemake", "group"}
-    after_s : float
-        Seconds from the start.
+    files : int
     draws : random.Random
         Chooses the job.
-
-    Returns
-    -------
-    bool
-        Whether there was something left to kill.
     """
-    run = started(study)
-    time.sleep(after_s)
-    jobs = psutil.Process(run.pid).children(recursive=True) if run.poll() is None else []
-    there = run.poll() is None and (victim != "job" or bool(jobs))
-    if there and victim == "group":
+    run = started(study, files)
+    hit = run.poll() is None
+    if hit and victim == "group":
         os.killpg(run.pid, signal.SIGKILL)
-    elif there:
-        (draws.choice(jobs) if victim == "job" else psutil.Process(run.pid)).kill()
-    run.wait()
-    return there
+    elif hit and victim == "snakemake":
+        run.kill()
+    elif hit:
+        jobs = psutil.Process(run.pid).children(recursive=True)
+        # One that has ended meanwhile is not hit, and its run ends well.
+        with suppress(psutil.NoSuchProcess, IndexError):
+            draws.choice(jobs).kill()
+    code = run.wait()
+    assert hit or code == 0, f"a run that nobody killed ended with {code}"
+    return code != 0
+
+
+def killed_for_sure(study, victim, moments, draws):
+    """Kill a part of a run at one of the moments, drawn again until there was something to kill; the moment, in files."""
+    while True:
+        cleared(study)
+        files = draws.choice(moments)
+        if killed(study, victim, files, draws):
+            return files
 
 
 def refused_in_one_line(study):
@@ -183,11 +199,10 @@ def clock_set_back(study, expected):
     assert contents(study) == expected
 
 
-def two_at_once(study, expected, apart_s):
-    """One of them may be refused; what they leave is that of one."""
+def two_at_once(study, expected, files):
+    """The second starts when the first has made so many files. One of them may be refused; what they leave is that of one."""
     cleared(study)
-    first = started(study)
-    time.sleep(apart_s)
+    first = started(study, files)
     second = started(study)
     codes = first.wait(), second.wait()
     assert 0 in codes, codes
@@ -200,23 +215,19 @@ def soak(folder, kills, seed):
     """All of it, said line by line."""
     draws = random.Random(seed)
     study = part_of_the_study(Path(folder) / "study")
-    begin = time.monotonic()
     ended_by_itself(study)
-    lasts, expected = time.monotonic() - begin, contents(study)
-    print(f"undisturbed: {lasts:.1f} s, {len(expected)} files", flush=True)
+    expected, files = contents(study), files_made(study)
+    print(f"undisturbed: {files} files, {len(expected)} of them to be identical", flush=True)
     counts = dict.fromkeys(VICTIMS, 0)
-    number = 0
-    while sum(counts.values()) < kills:
-        cleared(study)
-        victim, after = VICTIMS[number % 3], draws.uniform(0.3, lasts)
-        number += 1
-        if killed(study, victim, after, draws):
-            counts[victim] += 1
-            ended_by_itself(study)
-            assert contents(study) == expected, (victim, after)
-            print(f"{sum(counts.values())}: {victim} killed after {after:.1f} s, finished, identical", flush=True)
-    for apart in (0.0, 1.0, lasts / 2):
-        print(f"two runs {apart:.1f} s apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
+    for number in range(kills):
+        victim = VICTIMS[number % 3]
+        at = killed_for_sure(study, victim, range(files), draws)
+        counts[victim] += 1
+        ended_by_itself(study)
+        assert contents(study) == expected, (victim, at)
+        print(f"{number + 1}: {victim} killed at {at} files, finished, identical", flush=True)
+    for apart in (0, 1, files // 2):
+        print(f"two runs {apart} files apart: exit codes {two_at_once(study, expected, apart)}, identical", flush=True)
     clock_set_back(study, expected)
     print("clock set back: identical", flush=True)
     if os.geteuid() == 0:

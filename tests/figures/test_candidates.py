@@ -134,7 +134,7 @@ def test_no_angle_is_written_for_a_pair_that_the_table_lacks():
 
 def test_a_candidate_with_a_shape_is_named_by_its_value_in_the_table_of_pairs():
     table = candidate_table()
-    assert name_in_pairs(table, 1) == "effect_1@2 44.7" and name_in_pairs(table, 0) == "effect_0@1"
+    assert name_in_pairs(table, 1) == "effect_1@2 44.7213" and name_in_pairs(table, 0) == "effect_0@1"
 
 
 def test_a_very_long_name_keeps_its_beginning_and_its_end_in_two_lines():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import statsmodels.api as sm
 from fitted_models import bent, gantry_model, gantry_states, linear_law, model_of, seen_off, waves
+from planted import planted
 from scipy.optimize import minimize
 from scipy.stats import chi2
 from synthetic import NOISE, candidate_on, made_estimate, made_model, made_states, seen_exactly, with_noise
@@ -413,3 +414,14 @@ def test_a_fit_stays_where_no_step_of_it_lowers_the_objective_and_has_not_conver
     assert not found.held[1] and not found.converged
     np.testing.assert_array_equal(found.estimate.shapes[0], 0.0)
     np.testing.assert_allclose(found.residual[:, 0], 2.0)
+
+
+def test_a_fit_has_settled_where_it_ends_whatever_loads_had_to_follow(kuka):
+    """From springs five hundredths off: what goes on from there finds nothing left to do."""
+    campaign = planted(kuka, {}, poses=25)
+    start = replace(campaign.declared.estimate, coefficients=(0.95 * kuka.compliance,))
+    model, seen, noise = campaign.declared.model, campaign.observations, campaign.declared.noise
+    found = fit(model, seen, noise, start)
+    again = fit(model, seen, noise, found.estimate, reweighted=True)
+    left = (again.estimate.coefficients[0] - found.estimate.coefficients[0]) / np.sqrt(np.diag(found.covariance))
+    assert found.converged and np.abs(left).max() < 1e-3

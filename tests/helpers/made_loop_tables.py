@@ -3,6 +3,7 @@
 import numpy as np
 
 from elastocal.diagnosis.settings import Settings
+from elastocal.effects.protocol import at_shapes
 
 FAMILIES = ("geometry", "gravity", "transmission", "elastic", "gearbox", "load", "drift")
 
@@ -66,8 +67,8 @@ def candidate_table(count=30, untestable=5, chosen=1, note="no time in the data"
 
 def confounding_table(candidates):
     """Angles of all pairs of the tested candidates of a table."""
-    shapes = [f" {shape:.3g}" if np.isfinite(shape) else "" for shape in candidates["shape"]]
-    named = candidates["candidate"] + np.array(shapes, object)
+    shapes = [[shape] if np.isfinite(shape) else [] for shape in candidates["shape"]]
+    named = np.array(list(map(at_shapes, candidates["candidate"], shapes)), object)
     names = named[np.isfinite(candidates["log_bayes_factor"])]
     pairs = [(one, other) for number, one in enumerate(names) for other in names[:number]]
     return {
@@ -245,7 +246,9 @@ def verdict_document(
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},
         "remainder": remainder,
+        "kept": "effect" if adopted else "declared",
         "heldout": {
+            "uncalibrated": {name: value / 0.7 for name, value in errors.items()} | {"reduction_ci95": [0.55, 0.75]},
             "before": errors,
             "after": after,
             "noise_floor_rms_m": 5e-5 if known else None,

@@ -10,7 +10,8 @@ from made_leagues import made_entries
 
 from elastocal import __version__
 from elastocal.audit.audited import Audited
-from elastocal.blind import schemas as of_closed_loop
+from elastocal.blind import schemas as of_blind
+from elastocal.blind.bad_rows_summary import judge_cases, summarize
 from elastocal.blind.calibration import reliability, statements
 from elastocal.blind.case_rows import case_row
 from elastocal.blind.closed_loop import MODELS, PARTS
@@ -50,10 +51,18 @@ def made_proofs(folder):
     """Write all of it, with the checksums that jobs would have kept."""
     for name in ("data/sealed/some_1", "results/blind/oracle", "reports/blind", "results/closed_loop", "reports/closed_loop"):
         (folder / name).mkdir(parents=True)
-    for name in ("results/planning", "reports/planning", "results/league/one/random", "reports/league/small"):
+    for name in (
+        "results/bad_rows",
+        "reports/bad_rows",
+        "results/planning",
+        "reports/planning",
+        "results/league/one/random",
+        "reports/league/small",
+    ):
         (folder / name).mkdir(parents=True)
     _blind(folder)
     _closed_loop(folder)
+    _bad_rows(folder)
     _league(folder)
     figures = {"poses": 20, "planned_mm": 0.12345678912, "random_mm": 0.2, "random_poses": 28.0}
     (folder / "results/planning/ur10.json").write_text(json.dumps(figures), encoding="utf-8")
@@ -154,11 +163,43 @@ def _closed_loop(folder):
                 }
                 corrected = (np.arange(count) != 3) | (model != "geometry")
                 blocks.append(columns | {"predicted_std_m": np.full(count, sizes[model]), "corrected": corrected})
-    write_table(folder / "results/closed_loop/kuka.parquet", of_closed_loop.closed_loop(6), blocks, _ORIGIN)
+    write_table(folder / "results/closed_loop/kuka.parquet", of_blind.closed_loop(6), blocks, _ORIGIN)
     errors = case_errors({"kuka": pd.concat([pd.DataFrame(block) for block in blocks], ignore_index=True)})
     write_csv(folder / "reports/closed_loop/cases.csv", errors)
     write_csv(folder / "reports/closed_loop/closed_loop.csv", summary(errors, SEED))
     write_csv(folder / "reports/closed_loop/goals.csv", goals(errors))
+
+
+def made_slips(cases=40, seed=4):
+    """Slips of some cases, of which some change the verdict and some are not named."""
+    draws = np.random.default_rng(seed)
+    rows = []
+    for case in range(cases):
+        changed, lost = draws.random() < 0.2, int(draws.random() < 0.1)
+        count = int(draws.integers(1, 4))
+        head = {"seed": case, "poses": 20, "rows": 40, "loads": 1, "targets": 2, "measured": "pose", "frame": "base"}
+        head |= {"noise": "declared", "covariates": False, "mixture": "nothing", "truth": "none"}
+        head |= {"clean_rows_lost": lost, "wrongly_named": int(draws.integers(2))}
+        for version in ("clean", "damaged", "fewer"):
+            name = "payload" if changed and version == "damaged" else "none"
+            head |= {f"{version}_verdict": "adequate" if name == "none" else "named", f"{version}_found": name}
+            head |= {f"{version}_found_at": name, f"{version}_heldout_rms_m": 1e-4 * (1 + changed * (version == "damaged"))}
+        for slip in range(count):
+            rows.append(
+                head
+                | {"kind": ("zeros", "position")[case % 2], "bad_rows": str(slip + 1), "held_out": bool(draws.integers(2))}
+                | {"size": 10.0 ** draws.uniform(0.7, 5.0), "named": bool(draws.random() < 0.8)}
+            )
+    return pd.DataFrame(rows)
+
+
+def _bad_rows(folder):
+    slips = made_slips()
+    blocks = [{name: column.to_numpy() for name, column in slips.items()}]
+    write_table(folder / "results/bad_rows/kuka.parquet", of_blind.BAD_ROWS, blocks, _ORIGIN)
+    cases = judge_cases({"kuka": slips})
+    write_csv(folder / "reports/bad_rows/cases.csv", cases)
+    write_csv(folder / "reports/bad_rows/summary.csv", summarize(cases))
 
 
 class _Measured:

@@ -379,6 +379,7 @@ BLIND = {
 MOVED = "results/closed_loop/kuka.parquet"
 CASES, TOGETHER, GOALS = (f"reports/closed_loop/{name}.csv" for name in ("cases", "closed_loop", "goals"))
 GAINS = "reports/planning/gains.csv"
+SLIPS, RATES = "reports/bad_rows/cases.csv", "reports/bad_rows/summary.csv"
 FOLDS, ENTRIES = "results/league/one/folds.parquet", "results/league/one/random/half.parquet"
 LEAGUE, MECHANISMS = "reports/league/small/league.csv", "reports/league/small/mechanisms.csv"
 
@@ -426,6 +427,11 @@ PLANTED_IN_PROOFS = {
     "a ratio to the floor altered": (TOGETHER, lambda f: cell(f, TOGETHER, "over_floor", 0.999, 3)),
     "a case more within the goal": (GOALS, lambda f: cell(f, GOALS, "within", 2)),
     "an interval of the goal by another method": (GOALS, lambda f: cell(f, GOALS, "share_low", 0.95)),
+    "a verdict that bad rows changed said to be the same": (
+        SLIPS,
+        lambda f: said(f, SLIPS, "damaged_same", True, int(np.flatnonzero(~pd.read_csv(f / SLIPS)["damaged_same"])[0])),
+    ),
+    "a rate of bad rows altered": (RATES, lambda f: cell(f, RATES, "low", 1.01, 0)),
     "a worth of a plan altered": (GAINS, lambda f: cell(f, GAINS, "random_mm", 1.1)),
     "poses in each other's folds": (FOLDS, lambda f: rewritten(f, FOLDS, swapped_folds)),
     "a pose predicted that was fitted": (ENTRIES, lambda f: rewritten(f, ENTRIES, seen_pose)),

@@ -10,6 +10,8 @@ import time
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from durations import HUNG_S
+
 NODES = ("node1", "node2")
 # Where Slurm's commands look inside of a job, whose environment the plugin clears of Slurm's variables.
 _SYSTEM = Path("/etc/slurm/slurm.conf")
@@ -139,8 +141,8 @@ def _start(command, folder, environment, stack):
     stack.callback(process.terminate)
 
 
-def _wait(ready, name, seconds=30):
-    end = time.monotonic() + seconds
+def _wait(ready, name):
+    end = time.monotonic() + HUNG_S
     while not ready():
-        assert time.monotonic() < end, f"{name} has not started within {seconds} s"
+        assert time.monotonic() < end, f"{name} has not started within {HUNG_S} s"
         time.sleep(0.1)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import yaml
+from durations import HUNG_S
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
@@ -83,7 +84,7 @@ class Study:
         return {"args": [sys.executable, "-m", "snakemake", *arguments], "cwd": self.folder, "env": environment}
 
     def snakemake(self, *arguments):
-        return subprocess.run(**self.command(*arguments), capture_output=True, text=True, timeout=600)
+        return subprocess.run(**self.command(*arguments), capture_output=True, text=True, timeout=HUNG_S)
 
     def run(self, *arguments):
         """Run Snakemake, which must succeed."""

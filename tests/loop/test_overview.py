@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from made_folders import made_folder, made_table
+from small_data import service_arm_folder
 
 from elastocal.loop.overview import overview
 
@@ -58,3 +59,28 @@ def test_held_out_values_change_nothing_that_is_said(kuka, config_folder, tmp_pa
         folder = made_folder(tmp_path / f"made{number}", kuka, "made", table=table, holdout=document)
         results.append(overview(folder, config_folder / "robots"))
     assert results[0] == results[1]
+
+
+@pytest.mark.parametrize(
+    ("many", "said"), [(14, "all 4 validation poses repeat"), (12, "2 of 4 validation poses repeat"), (1, "")]
+)
+def test_poses_held_out_that_repeat_those_fitted_are_suspicious(kuka, config_folder, tmp_path, many, said):
+    """Whatever they are measured at says nothing of other poses."""
+    table, document = made_table(kuka, "made"), {"poses": [10, 11, 12, 13]}
+    alike = table["pose"] < many
+    for joint in range(1, 7):
+        angles = table[f"q{joint}"]
+        table[f"q{joint}"] = np.where(alike, angles[table["pose"] == 0][0] + 1e-4 * table["pose"], angles)
+    facts = overview(made_folder(tmp_path / "made", kuka, table=table, holdout=document), config_folder / "robots")
+    found = [sentence for sentence in facts["suspicious"] if "repeat configurations that were fitted" in sentence]
+    assert len(found) == bool(said) and all(said in sentence and "nothing of other poses" in sentence for sentence in found)
+
+
+def test_parameters_that_are_many_for_the_poses_are_said_and_how_many_poses_it_takes(config_folder, tmp_path, facts):
+    found = overview(service_arm_folder(tmp_path / "made", 1), config_folder / "robots")
+    (said,) = [sentence for sentence in found["suspicious"] if "poses are few" in sentence]
+    least = int(said.split("Measure about ")[1].split(" ")[0])
+    assert said.startswith(f"24 poses are few for {found['parameters']} parameters, of which they determine about")
+    assert found["numbers"] == 72 and least > 48
+    assert 9 < found["effective_parameters"] < found["parameters"]
+    assert not any("poses are few" in sentence for sentence in facts["suspicious"])

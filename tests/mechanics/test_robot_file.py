@@ -173,6 +173,7 @@ def test_robot_becomes_a_document_that_gives_it_back(more):
         ({"masses": [WEIGHED["masses"][0] | {"link": 3}]}, "masses[0].link", ["3", "to 2"]),
         ({"masses": WEIGHED["masses"][:1] * 2}, "masses", ["link 2 twice", "each link once"]),
         ({"gravity_m_s2": [0, 0, 0]}, "gravity_m_s2", ["[0, 0, 0]", "base axes"]),
+        ({"gravity_m_s2": [0, 1e-300, 0]}, "gravity_m_s2", ["[0, 1e-300, 0]", "1e-06 m/s² or more"]),
         ({"gear_ratio": [100]}, "gear_ratio", ["1 entries", "2 joints"]),
         ({"compensator": {"joint": 3, "kind": "gas"}}, "compensator.joint", ["3", "1 to 2"]),
     ],

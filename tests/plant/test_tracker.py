@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from elastocal.plant.arm import turned
-from elastocal.plant.tracker import Drift, EccentricNest, Move, Tracker, rotation_vector
+from elastocal.plant.tracker import Drift, EccentricNest, Move, Tracker, misplaced_base, rotation_vector
 
 
 @pytest.fixture
@@ -102,3 +102,18 @@ def test_rotation_vectors_survive_the_way_there_and_back_up_to_a_half_turn(rng):
     vector = angle[:, None] * axis
     np.testing.assert_allclose(rotation_vector(turned(vector)), vector, atol=1e-9)
     np.testing.assert_allclose(turned(vector), [pin.exp3(v) for v in vector], atol=1e-12)
+
+
+def test_a_misplaced_base_moves_all_measurements_alike_about_its_origin(targets):
+    misplaced = Move(-np.inf, (1e-3, 0.0, -2e-3), (0.0, 0.0, 1e-4))
+    position, rotation, time_s = targets
+    seen, turn = Tracker(misplaced=misplaced).seen(position, rotation, time_s)
+    about = turned(np.array([0.0, 0.0, 1e-4]))
+    np.testing.assert_allclose(seen, position @ about.T + [1e-3, 0.0, -2e-3], atol=1e-12)
+    np.testing.assert_allclose(turn, about @ rotation, atol=1e-12)
+
+
+def test_a_base_is_misplaced_by_three_tenths_of_a_milliradian_and_two_tenths_of_a_millimetre():
+    found = [misplaced_base(np.random.default_rng(seed)) for seed in range(400)]
+    assert np.sqrt(np.mean([np.dot(each.turn_rad, each.turn_rad) for each in found])) == pytest.approx(3e-4, rel=0.1)
+    assert np.sqrt(np.mean([np.dot(each.shift_m, each.shift_m) for each in found])) == pytest.approx(2e-4, rel=0.1)

@@ -79,6 +79,16 @@ ELSEWHERE = {
     ),
     "python workflow/check_crate.py": ("tests/workflow/test_crate.py", 'REPOSITORY / "workflow" / "check_crate.py"'),
     "snakemake --report report.html": ("tests/workflow/test_snakemake_report.py", 'snakemake("--report", str(path))'),
+    # Minutes of measurement: CI runs them in a small setting.
+    **{
+        f"python benchmarks/{script}{options}": ("tests/workflow/test_benchmarks.py", f'ended("{script}", ')
+        for script, options in (
+            ("run.py", ""),
+            ("run.py", " --small"),
+            ("interval_coverage.py", ""),
+            ("cost.py", " few more proof --data-sets 250 750"),
+        )
+    },
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
     "python -m pip wheel --no-deps --no-build-isolation -w dist .": (
@@ -86,12 +96,6 @@ ELSEWHERE = {
         '[*pip, "wheel", *alone, ".", "-w", "dist"]',
     ),
 }
-# Minutes of measurement by hand, of which CI has no room: nothing but that they compile is tested.
-BY_HAND = (
-    "python benchmarks/cost.py few more proof --data-sets 250 750",
-    "python benchmarks/run.py",
-    "python benchmarks/interval_coverage.py",
-)
 # Not of this project, and with an effect on the machine: of the system's own package manager and of git's hooks.
 NOT_OURS = ("docker build", "docker run", "apt-get install", "pre-commit install", "pip show elastocal", "alias elastocal=")
 
@@ -171,8 +175,6 @@ def way_of(text):
         return "story"
     if text in ELSEWHERE:
         return "elsewhere"
-    if text in BY_HAND:
-        return "by hand"
     if text.startswith(NOT_OURS):
         return "not ours"
     if re.fullmatch(r"make [\w./-]+", text):
@@ -195,7 +197,7 @@ def test_no_command_of_a_page_is_run_by_nobody():
 def test_the_search_finds_commands_of_each_kind(tmp_path):
     """Lest a change of the pages' style empty it."""
     ways = {way_of(text) for text, _ in every_command()}
-    assert ways == {"script", "story", "elsewhere", "not ours", "make", "dry run", "help", "by hand"}
+    assert ways == {"script", "story", "elsewhere", "not ours", "make", "dry run", "help"}
     assert len(every_command()) > 60
     new = tmp_path / "new.md"
     new.write_text(
@@ -218,12 +220,6 @@ def test_commands_that_are_only_named_have_help():
         words = [word for word in text.split() if word != "--help"][1:]
         result = CliRunner().invoke(app, [*words, "--help"])
         assert result.exit_code == 0, text
-
-
-@pytest.mark.parametrize("text", BY_HAND)
-def test_what_is_run_by_hand_is_there_and_compiles(text):
-    path = ROOT / text.split()[1]
-    compile(path.read_text(encoding="utf-8"), path, "exec")
 
 
 def test_make_knows_its_targets():

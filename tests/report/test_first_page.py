@@ -2,10 +2,10 @@
 
 import pytest
 from made_loop_facts import CAMPAIGNS, plainly
-from made_loop_tables import effect_entry, experiment_rows, probabilities, verdict_document
+from made_loop_tables import effect_entry, experiment_rows, probabilities, step_rows, verdict_document
 
 from elastocal.diagnosis.verdict import ADEQUATE, CLASS, NAMED, NOT_TESTABLE, SEVERAL, UNEXPLAINED
-from elastocal.report.first_page import TITLES, probability_sentence, sentences, what_to_do
+from elastocal.report.first_page import TITLES, held_out_sentence, probability_sentence, sentences, what_to_do, worth_sentence
 
 WORDS = {
     "adequate": "none of 30 candidate causes is needed",
@@ -54,3 +54,19 @@ def test_what_to_do_follows_from_the_verdict_and_from_the_gain():
     assert not any("extrapolated" in advice for advice in what_to_do(CAMPAIGNS["named"], []))
     assert "Use the declared model" in what_to_do(CAMPAIGNS["adequate"], [])[0]
     assert "loose target" in what_to_do(CAMPAIGNS["unexplained"], [])[0]
+
+
+def test_the_first_page_says_what_calibration_is_worth_against_doing_nothing():
+    heldout = {"uncalibrated": {"rms_m": 3.87e-3, "reduction_ci95": [0.98, 0.99]}, "after": {"rms_m": 57e-6}}
+    said = worth_sentence(heldout)
+    assert "uncalibrated robot" in said and plainly("falls from 3.87 mm to 57.0 µm, by 99 %") in plainly(said)
+    assert "98 to 99 %" in said
+    assert "grows from" in worth_sentence(heldout | {"after": {"rms_m": 5e-3}})
+    assert "as good uncalibrated" in worth_sentence(heldout | {"after": {"rms_m": 3.87e-3}})
+    verdict = CAMPAIGNS["named"]
+    assert worth_sentence(verdict["heldout"]) in held_out_sentence(verdict, step_rows())
+
+
+def test_a_robot_whose_calibration_predicts_worse_is_left_as_it_is():
+    (advice,) = what_to_do(CAMPAIGNS["adequate"] | {"kept": "frames"}, [])
+    assert advice.startswith("Leave the robot as its file has it")

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from durations import HUNG_S
 from made_loop_facts import CAMPAIGNS, facts_of
 from made_loop_tables import candidate_table, residual_table
 
@@ -42,8 +43,6 @@ FARTHEST = """() => {
 }"""
 ALL_IN_SIGHT = f"() => {{ const farthest = ({FARTHEST})(); return 0.2 < farthest && farthest < 1; }}"
 EYE = "JSON.stringify(document.getElementById('robot').layout.scene.camera.eye)"
-# A busy machine draws late (ms).
-PATIENCE = 30_000
 # By how many pixels the narrowest first cell of a table is narrower than its table.
 NARROWER = """() => Math.max(...[...document.querySelectorAll('tbody td:first-child')].map(
   (cell) => cell.closest('table').clientWidth - cell.clientWidth))"""
@@ -184,17 +183,18 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=CHROMIUM, args=IN_SOFTWARE)
         page = browser.new_page(viewport={"width": width, "height": 844}, color_scheme=scheme)
+        page.set_default_timeout(1000 * HUNG_S)
         page.on("console", lambda message: faults.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("request", lambda request: requests.append(request.url))
         page.goto(written.as_uri())
-        page.wait_for_selector("body[data-ready=yes]", timeout=60_000)
+        page.wait_for_selector("body[data-ready=yes]")
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         papers = [page.evaluate(script) for script in (PAPER_OF_PAGE, PAPER_OF_PLOT)]
         assert papers[0] == papers[1] and (min(papers[0]) > 200) == (scheme == "light")
 
         # Nothing of the robot and the arrows is cut off, names in tables have the width of a phone, legends hide no plot.
-        page.wait_for_function(ALL_IN_SIGHT, timeout=PATIENCE)
+        page.wait_for_function(ALL_IN_SIGHT)
         assert width > 600 or page.evaluate(NARROWER) < 1
         legend, plot = (page.query_selector(f"#scatter {part}").bounding_box() for part in (".legend", ".nsewdrag"))
         assert legend["y"] + legend["height"] <= plot["y"]
@@ -224,14 +224,14 @@ def test_in_a_browser_every_control_works_by_key_and_nothing_leaves_the_page(wri
             before = page.evaluate(drawn(plot))
             page.focus(f"#{control}")
             page.keyboard.press(key)
-            page.wait_for_function(f"before => {drawn(plot)} !== before", arg=before, timeout=PATIENCE)
+            page.wait_for_function(f"before => {drawn(plot)} !== before", arg=before)
         for button in page.query_selector_all("button"):
             before = page.evaluate(EYE)
             button.focus()
             page.keyboard.press("Enter")
-            page.wait_for_function(f"before => {EYE} !== before", arg=before, timeout=PATIENCE)
+            page.wait_for_function(f"before => {EYE} !== before", arg=before)
             if button.get_attribute("data-view"):
-                page.wait_for_function(ALL_IN_SIGHT, timeout=PATIENCE)
+                page.wait_for_function(ALL_IN_SIGHT)
         unlabelled = page.evaluate("[...document.querySelectorAll('select, input')].filter(e => !e.labels.length).length")
         browser.close()
     assert faults == [] and unlabelled == 0

@@ -8,6 +8,7 @@ import sys
 from itertools import product
 
 import pytest
+from durations import HUNG_S
 from study_folder import NOISE, REPOSITORY, ROBOTS, STRATEGIES
 
 from import_closure import closure
@@ -283,7 +284,7 @@ def loaded(small_study):
         capture_output=True,
         text=True,
         check=True,
-        timeout=120,
+        timeout=HUNG_S,
     )
     return {script: json.loads(files) for script, files in (line.split(" ", 1) for line in done.stdout.splitlines())}
 

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from durations import HUNG_S
 from study_folder import REPOSITORY
 
 CAMPAIGN = "campaign: cell\nrobot: kuka\nmeasured: pose\nframe: base\ntargets:\n  E: {point: POINT, offset_m: [0, 0, 0]}\n"
@@ -16,7 +17,7 @@ EXAMPLES = {
 def ended(script, folder):
     words = [word.replace("FOLDER", str(folder)) for word in EXAMPLES[script]]
     command = [sys.executable, f"workflow/examples/{script}", *words]
-    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=120)
+    return subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=HUNG_S)
 
 
 @pytest.mark.parametrize("script", EXAMPLES)

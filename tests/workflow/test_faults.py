@@ -9,6 +9,7 @@ import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from durations import HUNG_S
 
 KUKA = "config/robots/kuka.yaml"
 MEASURED = "data/simulated/kuka/200um/measured.parquet"
@@ -209,7 +210,7 @@ def test_a_killed_job_leaves_no_file_under_the_final_name(finished):
     started = subprocess.Popen(
         **finished.command("-j1", MEASURED), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
-    partial, latest = finished.path(f"{MEASURED}.partial"), time.monotonic() + 60
+    partial, latest = finished.path(f"{MEASURED}.partial"), time.monotonic() + HUNG_S
     while not (partial.exists() and partial.stat().st_size > 4):
         assert started.poll() is None
         assert time.monotonic() < latest

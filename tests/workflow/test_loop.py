@@ -164,7 +164,6 @@ EDITS = {
         {"simulate", "measure"},
     ),
     "a fault": (
-        "src/elastocal/data_checks/outliers.py",
         {"diagnose_campaign", "judge_campaign"},
         {"read_campaign"},
     ),

@@ -1,8 +1,8 @@
 """Before any job: locks of killed runs are taken away, those of living ones stay, and a disk that is full is said."""
 
+import fcntl
 import subprocess
 import sys
-import time
 
 import pytest
 from support import refused
@@ -10,11 +10,11 @@ from support import refused
 from one_run import JOBS, RUNS, begin
 
 _HOLD = """
-import fcntl, sys, time
+import fcntl, sys
 with open(sys.argv[1], "a") as file:
     fcntl.flock(file, fcntl.LOCK_SH)
     print("held", flush=True)
-    time.sleep(60)
+    sys.stdin.read()
 """
 
 
@@ -26,7 +26,7 @@ def folder(tmp_path):
 
 
 def holding(path):
-    process = subprocess.Popen([sys.executable, "-c", _HOLD, path], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen([sys.executable, "-c", _HOLD, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "held\n"
     return process
 
@@ -47,18 +47,22 @@ def test_locks_of_a_living_run_stay(folder):
     run.wait()
 
 
-def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd):
-    job = holding(folder / JOBS)
-    waiting = subprocess.Popen(
-        [sys.executable, "-c", f"from one_run import begin; from pathlib import Path; begin(Path({str(folder)!r}), [])"],
-        env={"PYTHONPATH": ":".join(path for path in sys.path if path)},
-    )
-    time.sleep(1.5)
-    assert waiting.poll() is None and len(list((folder / "locks").iterdir())) == 1
-    job.kill()
-    assert waiting.wait(timeout=20) == 0
-    assert list((folder / "locks").iterdir()) == []
-    assert "waiting for the jobs" in capfd.readouterr().out
+def test_jobs_that_a_killed_run_left_behind_are_waited_for(folder, capfd, monkeypatch):
+    """The job ends once it is waited for; until then the locks stay."""
+    job, flock, seen = holding(folder / JOBS), fcntl.flock, []
+
+    def waited(file, operation):
+        if file.name == str(folder / JOBS) and operation == fcntl.LOCK_EX:
+            seen.append((len(list((folder / "locks").iterdir())), job.poll(), capfd.readouterr().out))
+            job.kill()
+        flock(file, operation)
+
+    monkeypatch.setattr(fcntl, "flock", waited)
+    with begin(folder, []):
+        ((locks, ended, said),) = seen
+        assert (locks, ended) == (1, None) and "waiting for the jobs" in said
+        assert list((folder / "locks").iterdir()) == []
+        assert job.wait() != 0
 
 
 def test_a_place_that_cannot_be_written_to_is_one_line(folder):

@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from durations import HUNG_S
 from slurm_on_one_machine import NODES, ended_jobs, missing, slurm_on_one_machine
 from study_folder import REPOSITORY, Study
 
@@ -25,13 +26,17 @@ TINY = {"robots": ["kuka"], "strategies": ["6DoF"], "noise_um": [0, 200]}
 # beside one another, on both nodes, from data that one of these wrote.
 TARGETS = ("results/identified/kuka/0um/6DoF.parquet", "results/identified/kuka/200um/6DoF.parquet")
 ONE_EACH = ("--group-components", "robot=10", "cell=1")
+# The first attempt holds its memory until Slurm, which looks each second, has killed it; before its time is over, 2 minutes.
 NEEDS_MORE = """
 rule needs_more:
     output: "made.txt"
     resources: mem_mb=lambda wildcards, attempt: attempt * 500
-    shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep(6)' && echo {{resources.mem_mb}} > {{output}}"
+    params: seconds=lambda wildcards, resources: 60 if resources.mem_mb == 500 else 0
+    shell: "{python} -c 'import time; held = bytearray(450_000_000); time.sleep({{params.seconds}})'"
+        " && echo {{resources.mem_mb}} > {{output}}"
 """
-# A rule of the profile's array jobs, whose file says which part of an array made it, and one of its groups.
+# A rule of the profile's array jobs, whose file says which part of an array made it, and one of its groups. The first part
+# waits for another, so that they run beside one another, and therefore on both nodes, whatever Slurm takes to start them.
 LONG_AND_SHORT = """
 rule all:
     input: expand("long/{number}.txt", number=range(4)), expand("short/{number}.txt", number=range(4))
@@ -42,7 +47,8 @@ rule simulate:
 
 rule diagnose_cases:
     output: "long/{number}.txt"
-    shell: "sleep 3 && echo $SLURM_ARRAY_TASK_ID > {output}"
+    shell: "touch begun.{wildcards.number}; until [ $(ls begun.* | wc -l) -gt 1 ]; do sleep 0.1; done;"
+        " echo $SLURM_ARRAY_TASK_ID > {output}"
 """
 
 
@@ -55,7 +61,7 @@ def cluster():
 def on_slurm(folder, environment, *arguments):
     profile = REPOSITORY / "profiles" / "slurm"
     called = [sys.executable, "-m", "snakemake", "--profile", str(profile), *ONE_MACHINE, *arguments]
-    return subprocess.run(called, cwd=folder, env=environment, capture_output=True, text=True, timeout=400)
+    return subprocess.run(called, cwd=folder, env=environment, capture_output=True, text=True, timeout=HUNG_S)
 
 
 def contents(study):

@@ -4,11 +4,11 @@ import json
 import os
 import subprocess
 import sys
-import time
 from urllib.parse import unquote
 
 import boto3
 import pytest
+from durations import HUNG_S
 from moto.server import ThreadedMotoServer
 from study_folder import Study
 
@@ -25,7 +25,7 @@ pkgutil.iter_modules = lambda *arguments: (found for found in listed(*arguments)
 
 @pytest.fixture(scope="module")
 def bucket():
-    """A bucket that Snakemake finds by variables of its environment."""
+    """A bucket that Snakemake finds by variables of its environment, and that keeps each version of an object."""
     server = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
     server.start()
     endpoint = "http://{}:{}".format(*server.get_host_and_port())
@@ -35,6 +35,7 @@ def bucket():
         keys = {"aws_access_key_id": "any", "aws_secret_access_key": "any"}
         bucket = boto3.resource("s3", endpoint_url=endpoint, region_name="us-east-1", **keys).Bucket(BUCKET)
         bucket.create()
+        bucket.Versioning().enable()
         yield bucket
     server.stop()
 
@@ -47,8 +48,15 @@ def study(small_study, bucket, tmp_path_factory):
 
 
 def uploaded(bucket, folder=FOLDER):
-    """When each object was uploaded, by the name that its file has here."""
-    return {item.key.removeprefix(folder): item.last_modified for item in bucket.objects.filter(Prefix=folder)}
+    """Version of each object, by the name that its file has here: every upload makes another, however soon."""
+    versions = [version for version in bucket.object_versions.filter(Prefix=folder) if version.is_latest]
+    # A mark that an object was deleted has no size.
+    return {version.key.removeprefix(folder): version.id for version in versions if version.size is not None}
+
+
+def written(study, names):
+    """When each file was written here."""
+    return {name: study.path(name).stat().st_mtime_ns for name in names}
 
 
 def fetched(bucket, folder, place):
@@ -57,7 +65,7 @@ def fetched(bucket, folder, place):
         (place / name).parent.mkdir(parents=True, exist_ok=True)
         bucket.download_file(folder + name, str(place / name))
     for arguments in (("-m", "zipfile", "-e", "reports/sources.zip", "."), ("workflow/check_crate.py",)):
-        done = subprocess.run([sys.executable, *arguments], cwd=place, capture_output=True, text=True, timeout=60)
+        done = subprocess.run([sys.executable, *arguments], cwd=place, capture_output=True, text=True, timeout=HUNG_S)
         assert done.returncode == 0, done.stdout
     crate = json.loads((place / "ro-crate-metadata.json").read_text(encoding="utf-8"))
     return {unquote(entity["@id"]) for entity in crate["@graph"] if "sha256" in entity}
@@ -90,15 +98,14 @@ def test_nothing_is_uploaded_twice(study):
 
 
 def test_only_what_is_made_again_here_or_missing_there_is_uploaded_again(study, bucket):
-    missing, before, start = "results/initial/kuka.parquet", uploaded(bucket), time.time()
+    missing, before = "results/initial/kuka.parquet", uploaded(bucket)
+    earlier = written(study, before)
     bucket.Object(FOLDER + missing).delete()
     study.append("workflow/scripts/typeset_table.py", "# Tables look as they did.\n")
-    # Objects know whole seconds.
-    time.sleep(1)
     study.run(*STORE)
     after = uploaded(bucket)
     assert set(after) == set(before)
-    made_again = {name for name in after if study.path(name).stat().st_mtime > start}
+    made_again = {name for name, when in written(study, after).items() if when != earlier[name]}
     assert {"reports/tables/table1.tex", "reports/sources.zip", "ro-crate-metadata.json"} <= made_again
     assert len(made_again) < 20
     assert {name for name in after if after[name] != before[name]} == {missing} | made_again
@@ -127,6 +134,6 @@ def test_one_line_says_what_the_target_lacks(arguments, refusal, study, tmp_path
     (tmp_path / "sitecustomize.py").write_text(WITHOUT_PLUGIN, encoding="utf-8")
     command = study.command("-n", "store", *arguments)
     command["env"] = command["env"] | {"PYTHONPATH": os.pathsep.join([str(tmp_path), command["env"]["PYTHONPATH"]])}
-    done = subprocess.run(**command, capture_output=True, text=True, timeout=600)
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=HUNG_S)
     assert done.returncode != 0
     assert done.stderr.splitlines()[-1] == refusal

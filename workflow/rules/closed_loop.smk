@@ -19,6 +19,7 @@ rule close_loop:
         "results/timings/close_loop/{robot}.tsv"
     params:
         each=CLOSED_LOOP["each"],
+        slips=CLOSED_LOOP["slips"],
         seed=config["seed"],
     script:
         "../scripts/close_loop.py"

@@ -21,7 +21,7 @@ def outcome(made: Iterable[str]) -> list[str]:
     list of str
     """
     # Only a run that has made a report needs what makes its sentences.
-    from elastocal.report.first_page import sentences
+    from elastocal.report.first_page import sentences, worth_sentence
 
     lines = []
     for path in sorted(map(str, made)):
@@ -29,5 +29,5 @@ def outcome(made: Iterable[str]) -> list[str]:
             lines.append(f"{_REPORTS[path]}: {path}")
         if match := _CAMPAIGN.fullmatch(path):
             verdict = json.loads(Path(path).with_name("verdict.json").read_text(encoding="utf-8"))
-            lines += [f"{match[1]}: {sentences(verdict)[0]}", f"    {path}"]
+            lines += [f"{match[1]}: {sentences(verdict)[0]}", f"    {worth_sentence(verdict['heldout'])}", f"    {path}"]
     return lines

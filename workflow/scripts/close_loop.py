@@ -13,7 +13,10 @@ from elastocal.io.storage import write_table
 
 def close_loop(job: Job) -> None:
     robot = Path(job.input.robot)
-    blocks = (closed_loop(str(robot), str(robot.parent), *case) for case in cases(str(robot), job.params.seed, job.params.each))
+    blocks = (
+        closed_loop(str(robot), str(robot.parent), *case, slips=job.params.slips)
+        for case in cases(str(robot), job.params.seed, job.params.each)
+    )
     write_table(
         job.output.moved, schemas.closed_loop(read_robot(robot).joints), blocks, provenance(job.params, **job.wildcards)
     )

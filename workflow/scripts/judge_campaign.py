@@ -22,10 +22,10 @@ def judge_campaign(job: Job) -> None:
     verdict = judged(found, held_out, job.params.seed)
     write_json(job.output.verdict, verdict.document, allow_nan=False)
     write_csv(job.output.before_after, pd.DataFrame(verdict.rows))
-    write_csv(job.output.splits, pd.DataFrame(split_table(found, held_out, job.params.seed)))
+    write_csv(job.output.splits, pd.DataFrame(split_table(found, verdict.held_out, job.params.seed)))
     schema = residuals(case.campaign.robot.joints)
     origin = provenance(job.params, **job.wildcards)
-    write_table(job.output.residuals, schema, residual_blocks(found, held_out), origin)
+    write_table(job.output.residuals, schema, residual_blocks(found, verdict), origin)
 
 
 run(judge_campaign, snakemake)

@@ -111,8 +111,9 @@ class Arm:
         self.document, self.tool = document, np.array(tool_offset_m, float)
         self.steps = steps_of(document)
         self.points = [step.point for step in self.steps if step.kind == "point"]
-        self.joints = len(document["compliance_urad_per_Nm"])
-        self.compliance = 1e-6 * np.array(document["compliance_urad_per_Nm"], float)
+        self.joints = _joints(document["chain"])
+        # Where a campaign has to identify them, the file need not state any.
+        self.compliance = 1e-6 * np.array(document.get("compliance_urad_per_Nm", [0.0] * self.joints), float)
         self._model = pin.Model()
         self._moved: list[tuple[Step, int]] = []
         parent, placement = 0, pin.SE3.Identity()
@@ -129,6 +130,9 @@ class Arm:
                 parent = self._model.addJoint(parent, joint, placement, f"{len(self._moved)}")
                 placement = pin.SE3.Identity()
                 self._moved.append((step, step.coordinate))
+                if step.coordinate < self.joints:
+                    behind = f"body {step.coordinate + 1}"
+                    self._frames[behind] = self._model.addFrame(pin.Frame(behind, parent, placement, pin.FrameType.OP_FRAME))
         self._data = self._model.createData()
         self.coordinates = 1 + max(coordinate for _, coordinate in self._moved)
         self.springs = self._spring_compliance(diameter)
@@ -156,8 +160,15 @@ class Arm:
         placed = self._data.oMf[self._frames[f"{point} target"]]
         return placed.translation.copy(), placed.rotation.copy()
 
+    def rotation(self, coordinates: np.ndarray, frame: str) -> np.ndarray:
+        """Rotation (3, 3) of a frame, named as for `jacobian`."""
+        pin.framesForwardKinematics(self._model, self._data, self._ordered(coordinates))
+        return self._data.oMf[self._frames[frame]].rotation.copy()
+
     def jacobian(self, coordinates: np.ndarray, frame: str) -> np.ndarray:
-        """Jacobian (6, coordinates), linear over angular, base axes, of a point or, as "NAME target", of its target."""
+        """Jacobian (6, coordinates), linear over angular, base axes, of a point, as "NAME target" of its target, as "body 2" of
+        the frame directly behind joint 2.
+        """
         aligned = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         found = np.reshape(
             pin.computeFrameJacobian(self._model, self._data, self._ordered(coordinates), self._frames[frame], aligned), (6, -1)

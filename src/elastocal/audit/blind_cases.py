@@ -178,7 +178,7 @@ def cases(run: Audited, file: str) -> list[Finding]:
 
 
 def _case(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mapping[str, Any] | None) -> dict[str, Any]:
-    defects, effects, robot = truth["defects"], verdict["effects"], truth["case"]["robot"]
+    defects, effects, robot = truth["defects"], _apart_from_setup(truth, verdict)[1], truth["case"]["robot"]
     recorded = truth["design"]["covariates"]
     aliases = [_ALIASES.get((defect["effect"], tuple(defect["joints"]))) for defect in defects]
     sizes = [defect["signal"]["rms_m"] for defect in defects]
@@ -221,13 +221,12 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
     -------
     dict
     """
-    case, word = truth["case"], verdict["verdict"]
-    true, names = list(case["effects"]), [effect["name"] for effect in verdict["effects"]]
+    case = truth["case"]
+    word, effects = _apart_from_setup(truth, verdict)
+    true, names = list(case["effects"]), [effect["name"] for effect in effects]
     stated = bool(true) and word in ("named", "class", "several")
     exact = stated and sorted(true) == sorted(names)
-    meant = [
-        {effect["name"], *(re.split(r"[@\[]", other)[0] for other in effect["alternatives"])} for effect in verdict["effects"]
-    ]
+    meant = [{effect["name"], *(re.split(r"[@\[]", other)[0] for other in effect["alternatives"])} for effect in effects]
     matched = len(true) == len(meant) and any(
         all(name in among for name, among in zip(true, order, strict=True)) for order in permutations(meant)
     )
@@ -247,6 +246,16 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
         "holds_truth": stated and matched,
         "wrong_name": word == "named" and names != true,
     }
+
+
+def _apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> tuple[str, list[Mapping[str, Any]]]:
+    """Where the base is misplaced, to find so is right, and the rest is judged alone."""
+    word, effects = verdict["verdict"], list(verdict["effects"])
+    others = [effect for effect in effects if effect["name"] != "base_placement" or "misplaced" not in truth]
+    if len(others) < len(effects):
+        single = "class" if any(effect["alternatives"] for effect in others) else "named"
+        word = {0: "adequate", 1: single}.get(len(others), "several")
+    return word, others
 
 
 def _kind(case: Mapping[str, Any]) -> str:
@@ -346,7 +355,8 @@ def _is_so(mechanisms: Sequence[str], truth: Mapping[str, Any]) -> bool:
     if any(effect.startswith("outside:") for effect in effects):
         return "other" in mechanisms
     absorbed = {defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"}
-    return set(mechanisms) == set(effects) - absorbed
+    placement = {"base_placement"} if "misplaced" in truth else set()
+    return set(mechanisms) - placement == set(effects) - absorbed
 
 
 def intervals(proof: Proof) -> pd.DataFrame:

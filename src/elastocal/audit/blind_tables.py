@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 _RESAMPLES, _BATCH, _BINS = 2000, 200, 10
 _WITHIN = 1.05
-_HARD = ("pose_common_15urad", "force_3kN", "off_line_centres", "outliers_2_percent")
+_HARD = ("pose_common_15urad", "force_3kN", "off_line_centres", "outliers_2_percent", "bad_rows", "tilted_base")
 _OF_THEIR_OWN = {
     "several_joints": "one mechanism at several joints: that one alone",
     "gear_gravity": "gear defect under declared gravity: right name alone",

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
 
-from elastocal.audit.arm import Arm
+from elastocal.audit.elastic import STATE, far_off, good_rows
+from elastocal.audit.equilibrium import Sagging, sagging
 from elastocal.audit.findings import Finding, compared, held
+from elastocal.audit.fits import SETTLED, STEP_BACK
 
 if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
 
 _POSE = ["session", "pose"]
-_REPEATED = [*_POSE, "load", "target"]
+# Effects that go with the time or with the row of a measurement.
+_DATED = {"frame_drift", "setup_step", "temperature_gradient", "thermal_growth"}
 
 
 def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
@@ -165,54 +169,83 @@ def residuals(run: Audited, file: str, campaign: str) -> list[Finding]:
     -------
     list of Finding
     """
-    frame, found = run.table(file), []
-    table = f"reports/loop/{campaign}/before_after.csv"
-    before_after = run.table(table)
-    declared = before_after[before_after["kind"] == "declared"]
-    for part, kept in (("train", ~frame["held_out"]), ("heldout", frame["held_out"])):
-        for state, row in (("before", declared.iloc[:1]), ("after", before_after.iloc[-1:])):
-            # An error is that of the mean of what was repeated.
-            means = frame[kept].groupby(_REPEATED)[[f"{state}_d{axis}" for axis in "xyz"]].mean()
-            errors = np.linalg.norm(means.to_numpy(), axis=1)
-            if not len(errors) or row.empty or f"{part}_rms_m" not in row or _session(run, campaign):
-                continue
-            expected = [errors.mean(), np.sqrt((errors**2).mean()), errors.max()]
-            stored = row[[f"{part}_{name}_m" for name in ("mean", "rms", "max")]].to_numpy(float)
-            found.append(compared(table, f"{part} errors {state}", "numpy", stored, expected, 1e-8))
-    return found + _predicted(run, file, campaign, frame)
+    frame, model, found = run.table(file).query("not gross_error"), sagging(run, campaign), []
+    if not _session(run, campaign):
+        table = f"reports/loop/{campaign}/before_after.csv"
+        before_after, means = run.table(table), _means(run, campaign, frame)
+        loaded = frame.iloc[np.argsort(np.linalg.norm(frame[["fx", "fy", "fz"]], axis=1), kind="stable")[-run.sample :]]
+        left = max((stand.left_m for stand in model.standing(loaded)), default=0.0) if model else 0.0
+        allowed = STEP_BACK + means.apart_m + left
+        rows = {"before": before_after[before_after["kind"] == "declared"].iloc[:1], "after": before_after.iloc[-1:]}
+        for part, errors in (("train", means.errors[~means.held_out]), ("heldout", means.errors[means.held_out])):
+            for number, (state, row) in enumerate(rows.items()):
+                if not len(errors) or row.empty or f"{part}_rms_m" not in row or _dated(run, campaign, state, means):
+                    continue
+                each = errors[:, number]
+                expected = [each.mean(), np.sqrt((each**2).mean()), each.max()]
+                stored = row[[f"{part}_{name}_m" for name in ("mean", "rms", "max")]].to_numpy(float)
+                found.append(compared(table, f"{part} errors {state}", "numpy", stored, expected, 1e-8, allowed))
+    return found + (_predicted(run, file, campaign, model, frame) if model else [])
 
 
-def _predicted(run: Audited, file: str, campaign: str, frame: pd.DataFrame) -> list[Finding]:
-    """Residuals of sampled rows by pinocchio, in the base frame with known targets and nothing declared but springs."""
-    described = _document(run, campaign)
-    asked, verdict = described["campaign"], run.document(f"reports/loop/{campaign}/verdict.json")
-    targets = asked["targets"]
-    known = all(target["offset_m"] != "unknown" for target in targets.values())
-    compliance = (verdict.get("compliance_urad_per_Nm") or {}).get("before")
-    if asked["frame"] != "base" or asked["declared"] or not known or compliance is None or _moved_base(run, campaign):
+@dataclass(frozen=True)
+class _Means:
+    """Errors before and after (M, 2) of the mean of what was repeated, m, and which are held out.
+
+    `apart_m`: by how much a mean of predictions is off the prediction at the mean joint angles, at most. `repeated`: whether
+    anything was.
+    """
+
+    errors: np.ndarray
+    held_out: np.ndarray
+    apart_m: float
+    repeated: bool
+
+
+def _means(run: Audited, campaign: str, frame: pd.DataFrame) -> _Means:
+    """Repeats are of one state, target and sense of approach; those that are far off count nowhere, as in a fit."""
+    parts = [good_rows(run, campaign, part) for part in ("training", "held_out")]
+    approach = [name for name in map(str, parts[0]) if name.startswith("approach")]
+    rows = frame.merge(pd.concat([part.loc[~far_off(part), ["row", *approach]] for part in parts]), on="row")
+    state = ["held_out", *STATE, *approach]
+    groups = rows.groupby([*state, "target"], dropna=False)
+    means = groups[[f"{when}_d{axis}" for when in ("before", "after") for axis in "xyz"]].mean()
+    errors = np.linalg.norm(means.to_numpy().reshape(-1, 2, 3), axis=2)
+    angles = [name for name in map(str, rows) if name[0] == "q" and name[1:].isdigit()]
+    # Over turns of joints by t about their mean the target bends off a straight line by t^2 / 2 of its distance.
+    turned = rows[angles] - rows.groupby(state, dropna=False)[angles].transform("mean")
+    reach = np.linalg.norm(rows[list("xyz")].to_numpy(), axis=1).max(initial=0.0)
+    apart = 0.5 * reach * float((turned.abs().sum(axis=1) ** 2).max())
+    return _Means(errors, means.index.get_level_values("held_out").to_numpy(bool), apart, bool((groups.size() > 1).any()))
+
+
+def _dated(run: Audited, campaign: str, state: str, means: _Means) -> bool:
+    """Whether a model goes with time or row: repeats then have predictions of their own, and a fit that of their mean."""
+    names = set(_document(run, campaign)["campaign"]["declared"])
+    if state == "after":
+        names |= {effect["name"] for effect in run.document(f"reports/loop/{campaign}/verdict.json")["effects"]}
+    return means.repeated and bool(names & _DATED)
+
+
+def _predicted(run: Audited, file: str, campaign: str, model: Sagging, frame: pd.DataFrame) -> list[Finding]:
+    """Residuals of sampled rows by pinocchio, in the base frame with known targets, of a robot of springs and masses alone."""
+    asked = _document(run, campaign)["campaign"]
+    known = all(target["offset_m"] != "unknown" for target in asked["targets"].values())
+    if asked["frame"] != "base" or asked["declared"] or not known or not model.complete or _moved_base(run, campaign):
         return []
-    springs, offsets = 1e-6 * np.array(compliance), [np.array(target["offset_m"], float) for target in targets.values()]
-    points = [target["point"] for target in targets.values()]
-    arms = [Arm(described["robot"], offset) for offset in offsets]
-    stored, expected = [], []
-    for place in run.picked(file, len(frame)):
-        row = frame.iloc[place]
-        arm, point = arms[int(row["target"])], points[int(row["target"])]
-        angles = row[[f"q{j}" for j in range(1, arm.joints + 1)]].to_numpy(float)
-        wrench = row[["fx", "fy", "fz", "mx", "my", "mz"]].to_numpy(float)
-        # In this loop the wrench acts at the last measuring point, whatever is measured.
-        torques = arm.jacobian(angles, arm.end_effector).T @ wrench
-        predicted = arm.pose(angles + springs * torques, point)[0]
-        stored.append(row[["before_dx", "before_dy", "before_dz"]].to_numpy(float))
-        expected.append(row[["x", "y", "z"]].to_numpy(float) - predicted)
-    # The load acts on the deflected arm there, on the undeflected one here: a thousandth of the deflection at most.
-    largest = float(np.max(np.abs(np.array(expected)), initial=0.0))
-    checked = f"residuals of the declared model, {len(stored)} rows"
-    return [compared(file, checked, "pinocchio", stored, expected, absolute=_SECOND_ORDER * max(largest, 1e-3))]
-
-
-# A spring turns by some 1e-3 rad, by which the lever of the load changes.
-_SECOND_ORDER = 1e-2
+    rows = frame.iloc[run.picked(file, len(frame))]
+    stands = list(model.standing(rows))
+    expected = rows[list("xyz")].to_numpy(float) - [stand.position for stand in stands]
+    stored = frame[["before_dx", "before_dy", "before_dz"]]
+    # Springs may still settle, all rows together, by thousandths of a standard error of the scatter that is there.
+    scatter = max(float(np.sqrt((stored[~frame["held_out"]] ** 2).to_numpy().mean())) / model.noise_m, 1.0)
+    columns = np.concatenate([stand.doubt_m for stand in stands])
+    picked = stored.loc[rows.index].to_numpy(float)
+    settling = np.linalg.lstsq(columns, (expected - picked).ravel(), rcond=None)[0]
+    expected = expected - (columns @ np.clip(settling, -SETTLED * scatter, SETTLED * scatter)).reshape(expected.shape)
+    checked = f"residuals of the declared model, {len(rows)} rows"
+    allowed = STEP_BACK + max(stand.left_m for stand in stands)
+    return [compared(file, checked, "pinocchio", picked, expected, 0.0, allowed)]
 
 
 def _document(run: Audited, campaign: str) -> dict[str, Any]:

@@ -19,6 +19,8 @@ from elastocal.audit.audited import WRENCH
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from elastocal.audit.audited import Audited
+
 STATE = ("session", "pose", "load")
 # Each pass leaves some 1/500 of the pass before of the load's change by the deflection: metres by deflections of 4 mm.
 _PASSES = 6
@@ -91,6 +93,16 @@ def averages(frame: pd.DataFrame, poses: bool) -> Averages:
     return Averages(states, of_states.ngroup().to_numpy(), each["target"].to_numpy(), means.to_numpy(), rotation)
 
 
+def good_rows(run: Audited, campaign: str, part: str) -> pd.DataFrame:
+    """Measurements of a campaign, ``training`` or ``held_out``, without those that were left out as gross errors."""
+    frame = run.table(f"results/loop/{campaign}/{part}.parquet")
+    stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"]
+    if part == "held_out":
+        stated = run.document(f"reports/loop/{campaign}/verdict.json")
+    out = [row for entry in stated["gross_errors"] if entry["held_out"] == (part == "held_out") for row in entry["rows"]]
+    return frame[~frame["row"].isin(out)].reset_index(drop=True)
+
+
 def far_off(frame: pd.DataFrame) -> np.ndarray:
     """Measurements far from the median of at least three repeats, by the median distance of all repeats (Hampel).
 
@@ -103,7 +115,8 @@ def far_off(frame: pd.DataFrame) -> np.ndarray:
     -------
     ndarray of bool (N,)
     """
-    group = frame.groupby([*STATE, "target"])[list("xyz")]
+    approach = [name for name in map(str, frame) if name.startswith("approach")]
+    group = frame.groupby([*STATE, "target", *approach], dropna=False)[list("xyz")]
     off = (frame[list("xyz")] - group.transform("median")).abs().to_numpy()
     repeated = group.transform("size").to_numpy() > 2 if len(frame) else np.zeros(0, bool)
     apart = off[repeated]

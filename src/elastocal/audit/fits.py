@@ -18,7 +18,7 @@ from scipy import stats
 from statsmodels.robust.norms import HuberT
 
 from elastocal.audit.audited import COMPONENTS
-from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off
+from elastocal.audit.elastic import STATE, Averages, Robot, Springs, averages, far_off, good_rows
 from elastocal.audit.findings import Finding, compared, held
 
 if TYPE_CHECKING:
@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 _SPRINGS, _LINKS = "joint_compliance", "link_elasticity"
 _BENDING, _TORSION, _TAPER = "bending_1_over_EI", "torsion_1_over_GJ", "taper"
 # A fit stops at steps of a thousandth of a standard error of the scatter that is there.
-_SETTLED = 2e-3
+SETTLED = 2e-3
 # Standard errors belong to the estimates one such step before.
 _OF_ERRORS = 1e-3
 # A fit that is read from a file goes on from there: a thousandth of a standard error displaces by less than this (m, rad).
-_STEP_BACK = 2e-8
+STEP_BACK = 2e-8
 # Beyond this quantile of the distance from the prediction a measurement loses weight.
 _HUBER = 0.99
 # A link's taper is between none and this.
@@ -139,22 +139,27 @@ def fits(run: Audited, file: str, campaign: str) -> list[Finding]:
     known = campaign_of(run, campaign)
     if known is None:
         return []
-    training = run.table(file.replace("steps", "training"))
+    training = good_rows(run, campaign, "training")
     seen, found = averages(training, known.poses), []
+    stated = run.document(f"results/loop/{campaign}/diagnosis.json")["document"].get("noise") or {}
+    factor = stated.get("factor", 1.0)
     for number, step in enumerate(known.steps):
         if step is None:
             continue
         # Most steps go by the noise of the one before.
         earlier = known.steps[number - 1] if number else None
         if earlier is None or earlier.noise != step.noise:
-            found += _noise(file, number, step, training, known)
+            found += _noise(file, number, step, training, known, factor)
         if len(step.parameters):
             found += _fit(file, number, step, seen, known.robot)
     return found
 
 
-def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Campaign) -> list[Finding]:
-    """Noise of a measurement from the repeats about their means, where the joints have no part in it."""
+def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Campaign, factor: float) -> list[Finding]:
+    """Noise of a measurement from the repeats about their means, where the joints have no part in it.
+
+    Where measurements scatter more about the model than about each other, it may be larger by the factor that is stated.
+    """
     noise = step.noise
     if noise["source"] != "repeats" or any(noise["joint_rad"]) or noise["pose_rad"] or noise["usual_m"]:
         return []
@@ -166,7 +171,9 @@ def _noise(file: str, number: int, step: Step, training: pd.DataFrame, known: Ca
     free = len(groups) - len(np.unique(groups))
     squares = (off**2).sum(axis=0)
     expected = [np.sqrt(squares[first : first + 3].sum() / (3 * free)) for first in range(0, len(squares), 3)]
-    stated = [noise["position_m"], noise["orientation_rad"]][: len(expected)]
+    stated = np.array([noise["position_m"], noise["orientation_rad"]][: len(expected)])
+    if abs(stated[0] / factor - expected[0]) < abs(stated[0] - expected[0]):
+        stated = stated / factor
     degrees = len(squares) * free
     return [
         compared(file, f"noise of step {number}, from repeats", "pandas on pinocchio", stated, expected, 1e-4),
@@ -185,7 +192,7 @@ def _fit(file: str, number: int, step: Step, seen: Averages, robot: Robot) -> li
     inside = free & ~_at_an_end(step)
     moved = _least_squares(columns[:, inside], residual).params
     checked = f"estimates of step {number} ({step.kind}) stand still, in standard errors"
-    found = [compared(file, checked, by, moved / (scale * error[inside]), np.zeros(inside.sum()), absolute=_SETTLED)]
+    found = [compared(file, checked, by, moved / (scale * error[inside]), np.zeros(inside.sum()), absolute=SETTLED)]
     checked = f"standard errors of step {number} ({step.kind})"
     return [*found, compared(file, checked, by, error[free], fitted.bse, _OF_ERRORS, scale=fitted.bse)]
 
@@ -207,7 +214,7 @@ def correlations(run: Audited, file: str, campaign: str) -> list[Finding]:
     if known is None or step is None or step.parameters["held"].all():
         return []
     table, free = run.table(file), ~step.parameters["held"].to_numpy(bool)
-    seen = averages(run.table(file.replace("correlations", "training")), known.poses)
+    seen = averages(good_rows(run, campaign, "training"), known.poses)
     names = (step.parameters["owner"] + " " + step.parameters["parameter"]).to_numpy()[free]
     columns, residual, _ = _whitened(step, seen, known.robot)
     covariance = np.asarray(_least_squares(columns[:, free], residual).cov_params())
@@ -253,6 +260,19 @@ def _whitened(step: Step, seen: Averages, robot: Robot) -> tuple[np.ndarray, np.
     below = (np.eye(len(prior)) / np.where(known, prior, 1.0)[:, None])[known]
     value = (step.parameters["value"].to_numpy() / prior)[known]
     return np.vstack([white[:, :-1], below]), np.concatenate([white[:, -1], -value]), scale
+
+
+def unsettled(step: Step, seen: Averages, robot: Robot) -> float:
+    """By how much (m, rad) a prediction moves, at most, where a fit goes on from its estimates to where it stands still."""
+    inside = ~step.parameters["held"].to_numpy(bool) & ~_at_an_end(step)
+    if not inside.any():
+        return STEP_BACK
+    columns, residual, _ = _whitened(step, seen, robot)
+    left = np.abs(_least_squares(columns[:, inside], residual).params)
+    loaded = robot.all_loaded(step.springs, seen)
+    moved = np.stack([_units(step, robot)[inside] @ forces for _, forces in loaded])
+    sensitivities = np.abs(robot.jacobians(loaded, seen) @ moved[seen.state].transpose(0, 2, 1))
+    return STEP_BACK + float((sensitivities @ left).max())
 
 
 def _units(step: Step, robot: Robot) -> np.ndarray:
@@ -332,7 +352,8 @@ def predictions(run: Audited, file: str, campaign: str) -> list[Finding]:
             expected.append(each_residual(known, step, measured.sort_values("row")))
         checked = f"residuals {state}, fitted and held out, all rows"
         pair = np.concatenate(stored), np.concatenate(expected)
-        found.append(compared(file, checked, "pinocchio", *pair, 0.0, absolute=_STEP_BACK))
+        allowed = unsettled(step, averages(good_rows(run, campaign, "training"), known.poses), known.robot)
+        found.append(compared(file, checked, "pinocchio", *pair, 0.0, absolute=allowed))
     return found
 
 

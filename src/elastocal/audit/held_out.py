@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from elastocal.audit.elastic import STATE, Averages, averages, far_off
+from elastocal.audit.elastic import STATE, Averages, averages, far_off, good_rows
 from elastocal.audit.findings import Finding, compared, held
-from elastocal.audit.fits import Campaign, Step, campaign_of
+from elastocal.audit.fits import Campaign, Step, campaign_of, unsettled
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
 from elastocal.audit.streams import numbers
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
 
 _METRICS = ("mean", "rms", "p95", "max")
-# Nine digits of a table; beside them, of the metres that a fit read from a file moves on by.
-_DIGITS, _STEP_BACK = 1e-8, 2e-8
-# The same as a share of an interval's end.
+# Nine digits of a table.
+_DIGITS = 1e-8
+# What a fit that is read from a file moves on by, as a share of an interval's end.
 _OF_ENDS = 1e-5
 _BY = "numpy's Philox stream, jackknife"
 
@@ -47,24 +47,23 @@ def before_after(run: Audited, file: str, campaign: str) -> list[Finding]:
     steps = [step for step in known.steps if step is not None]
     table = run.table(file)
     found = [_counts(file, table, steps)]
-    parts = {part: run.table(f"results/loop/{campaign}/{part}.parquet") for part in ("training", "held_out")}
-    fitted, unseen = (averages(parts[part], known.poses) for part in ("training", "held_out"))
+    fitted, unseen = (averages(good_rows(run, campaign, part), known.poses) for part in ("training", "held_out"))
     of_fitted, errors = (Errors(_distances(known, steps, seen), seen.pose) for seen in (fitted, unseen))
     counts = drawn(_stream(run, campaign, "held-out poses"), errors.poses)
     by = "pinocchio"
     for number, row in table.iterrows():
         place = int(str(number))
-        head = f"of step {place}"
+        head, settled = f"of step {place}", unsettled(steps[place], fitted, known.robot)
         for part, of_part in (("train", of_fitted), ("heldout", errors)):
             expected = metrics(of_part.distances[place])
             stored = [row[f"{part}_{name}_m"] for name in _METRICS]
             found.append(
-                compared(file, f"{part} errors {head}", by, stored, [expected[name] for name in _METRICS], _DIGITS, _STEP_BACK)
+                compared(file, f"{part} errors {head}", by, stored, [expected[name] for name in _METRICS], _DIGITS, settled)
             )
         ends = limits(errors, counts, place)
         for name in _METRICS:
             stored = [row[f"heldout_{name}_m_{end}"] for end in ("low", "high")]
-            found.append(compared(file, f"interval of the {name} {head}", _BY, stored, ends[name], _OF_ENDS))
+            found.append(compared(file, f"interval of the {name} {head}", _BY, stored, ends[name], _OF_ENDS, settled))
     over_floor = table[[f"heldout_{name}_over_floor" for name in _METRICS]]
     errors_m = table[[f"heldout_{name}_m" for name in _METRICS]]
     floor = _floor(known, steps[-1], unseen)
@@ -203,12 +202,12 @@ def splits(run: Audited, file: str, campaign: str) -> list[Finding]:
 def _of_residuals(run: Audited, campaign: str) -> Errors | None:
     """Held-out errors before and after from the residuals of a campaign whose test is part of it."""
     described = run.document(f"results/loop/{campaign}/campaign.json")
-    unseen = run.table(f"results/loop/{campaign}/held_out.parquet")
+    unseen = good_rows(run, campaign, "held_out")
     # Of approaches the residuals do not say which they were.
     if described.get("held_out") is not None or unseen["approach1"].notna().any():
         return None
     frame = run.table(f"reports/loop/{campaign}/residuals.parquet")
-    rows = frame[frame["held_out"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
+    rows = frame[frame["held_out"] & ~frame["gross_error"] & ~frame["row"].isin(unseen.loc[far_off(unseen), "row"])]
     errors = _errors(rows)
     outside = rows.groupby(["session", "pose"])["outside_range"].any().to_numpy()[errors.pose]
     return replace(errors, outside=outside)
@@ -253,7 +252,7 @@ def summary(run: Audited, file: str) -> list[Finding]:
         words = [row["verdict"], row["effects"]] == [stated["verdict"], " + ".join(named) or "none"]
         found.append(held(file, f"verdict of {name}", "verdict.json", words, str(row["effects"])))
         frame = run.table(f"reports/loop/{name}/residuals.parquet")
-        errors = _errors(frame[frame["held_out"] & (frame["session"] == row["session"])])
+        errors = _errors(frame[frame["held_out"] & ~frame["gross_error"] & (frame["session"] == row["session"])])
         counts = drawn(numbers(run.seed, name, "summary", row["session"]), errors.poses)
         expected, stored = [float(errors.poses)], [row["poses"]]
         for model, state in enumerate(("before", "after")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from inspect import isfunction
 from typing import TYPE_CHECKING
 
-from elastocal.blind import schemas as of_closed_loop
+from elastocal.blind import schemas as of_blind
 from elastocal.io.storage import TableSchema
 from elastocal.league import schemas as of_league
 from elastocal.loop import schemas as of_loop
@@ -33,4 +33,4 @@ def _constant(schema: TableSchema) -> Callable[[int], TableSchema]:
     return lambda joints: schema
 
 
-SCHEMAS = _of_module(of_study) | _of_module(of_loop) | _of_module(of_league) | _of_module(of_closed_loop)
+SCHEMAS = _of_module(of_study) | _of_module(of_loop) | _of_module(of_league) | _of_module(of_blind)

@@ -14,6 +14,7 @@ OTHERS = {
     "league_small": "reports/league/small/league.csv",
     "blind": "reports/blind/summary.csv",
     "closed_loop": "reports/closed_loop/goals.csv",
+    "bad_rows": "reports/bad_rows/summary.csv",
     "planning": "reports/planning/gains.csv",
     "extended_study": "reports/tables/interpretations.csv",
 }

@@ -8,6 +8,7 @@ import pandas as pd
 
 from elastocal.audit import (
     assumptions,
+    bad_rows,
     blind_cases,
     blind_tables,
     campaign_data,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 _CHECKED = (
     *(data, estimates, scores, questions, choices, assumptions, tables),
-    *(campaign_data, campaigns, fits, held_out, league, closed_loop, blind_cases, blind_tables),
+    *(campaign_data, campaigns, fits, held_out, league, closed_loop, bad_rows, blind_cases, blind_tables),
 )
 _CHECKS = tuple(check for module in _CHECKED for check in module.CHECKS)
 # What an audit itself wrote is not audited.

@@ -14,7 +14,7 @@ import pandas as pd
 
 from elastocal.blind.rates import rate
 from elastocal.blind.robots import PROOF, TUNED
-from elastocal.blind.scores import NONE, kind_of
+from elastocal.blind.scores import NONE, kind_of, wrong_setup
 from elastocal.plant.defects import OUTSIDE
 from elastocal.random_streams import stream
 
@@ -92,7 +92,7 @@ def is_true(mechanisms: Collection[str], truth: Mapping[str, Any]) -> bool:
     if any(effect.startswith(OUTSIDE) for effect in effects):
         return OTHER in mechanisms
     absorbed = {defect["effect"] for defect in truth["defects"] if defect["of"] == "raw"}
-    return set(mechanisms) == set(effects) - absorbed
+    return set(mechanisms) - wrong_setup(truth) == set(effects) - absorbed
 
 
 def credible(ranked: Sequence[tuple[frozenset[str], float]]) -> list[tuple[frozenset[str], float]]:

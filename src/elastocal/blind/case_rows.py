@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.blind.cases import impossible_on
-from elastocal.blind.scores import outcome
+from elastocal.blind.scores import judged_apart_from_setup, outcome
 from elastocal.diagnosis.judge import ABOUT_ERRORS
 from elastocal.plant.defects import KINDS
 
@@ -51,7 +51,7 @@ def case_row(truth: Mapping[str, Any], verdict: Mapping[str, Any], oracle: Mappi
         outcome(truth, verdict)
         | {
             "joints": " + ".join("-".join(map(str, defect["joints"])) for defect in defects),
-            "right_place": _places(defects, "effect") == _places(verdict["effects"], "name"),
+            "right_place": _places(defects, "effect") == _places(judged_apart_from_setup(truth, verdict)[1], "name"),
             # By the ground truth alone.
             "exact_alias": any(_is_alias(defect, truth["case"]["robot"]) for defect in defects),
             "hidden": any(set(KINDS[defect["effect"]].needs) & unrecorded for defect in defects),

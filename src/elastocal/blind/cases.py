@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,17 +18,21 @@ import numpy as np
 from elastocal.blind.folders import write_blind_campaign, write_truth
 from elastocal.io.atomic_writes import atomic_write
 from elastocal.plant.arm import Arm, LinkMass, arm_from_file
+from elastocal.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal.plant.campaigns import FLANGE, Design, schedule_of
 from elastocal.plant.defects import KINDS, OUTSIDE, Defect, drawn_defect, truth_of, with_defects
 from elastocal.plant.drives import PoseError, Repeatability
 from elastocal.plant.physical_robot import PhysicalRobot, specimen
 from elastocal.plant.random_numbers import stream
 from elastocal.plant.sizing import Yardstick, size_for
-from elastocal.plant.tracker import Tracker
+from elastocal.plant.tracker import Tracker, misplaced_base
 from elastocal.plant.weights import declared_masses, on_stretches, usual_gravity_torque
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+
+    from elastocal.plant.bad_rows import BadReading
+    from elastocal.plant.physical_robot import Schedule
 
     _Sized = tuple[Defect, dict[str, Any]]
 
@@ -92,6 +97,9 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "outliers_1_percent": {"tracker": {"outliers": 0.01}},
     "outliers_5_percent": {"tracker": {"outliers": 0.05}},
     "outliers_2_percent_far": {"tracker": {"outliers": 0.02, "outlier_sigmas": 30.0}},
+    # 1 to 3 rows that a lost beam or a slipped decimal point spoiled, and a base that is not quite where it is declared.
+    "bad_rows": {"bad_rows": 3},
+    "tilted_base": {"tilted": True},
     "without_approach": {"design": {"covariates": ("time", "temperature")}},
     "without_time_and_temperature": {"design": {"covariates": ("approach",)}},
     "without_covariates": {"design": {"covariates": ()}},
@@ -114,7 +122,7 @@ SWEEP_PAIRS = (
 )
 SWEEP_LEVEL = 50.0
 # Of which the proof counts false alarms by the hundred.
-HARD = ("pose_common_15urad", "force_3kN", "off_line_centres", "outliers_2_percent")
+HARD = ("pose_common_15urad", "force_3kN", "off_line_centres", "outliers_2_percent", "bad_rows", "tilted_base")
 _HARD_NULLS = tuple(name for name in SETTINGS if name != "usual" and not name.startswith("without"))
 # Effects that cannot be seen without what a setting leaves out.
 _UNSEEN: dict[str, tuple[str, ...]] = {
@@ -395,6 +403,8 @@ def specimen_of(case: Case, robots_folder: str | Path) -> PhysicalRobot:
     arm = replace(arm, gravity_m_s2=setting.get("gravity_m_s2", arm.gravity_m_s2))
     robot = specimen(arm, case.seed, weighs=_weighs(case), off_line_m=setting.get("off_line_m", 0.0))
     robot = replace(robot, tracker=replace(robot.tracker, **setting.get("tracker", {})))
+    if setting.get("tilted"):
+        robot = replace(robot, tracker=replace(robot.tracker, misplaced=misplaced_base(stream(case.seed, "tilted base"))))
     for key, purpose, law in (("joint_rad", "repeatability", Repeatability), ("pose_rad", "pose errors", PoseError)):
         if key in setting:
             # Repeatabilities differ from joint to joint, errors of a pose do not.
@@ -565,11 +575,26 @@ def make_case(case: Case, blind_folder: str | Path, sealed_folder: str | Path, r
     bad = with_defects(robot, [defect for defect, _ in sized])
     folder = Path(blind_folder) / case.name
     schedule, declared = schedule_of(robot.arm, design, case.seed), declared_of(case, robot.arm)
-    made = write_blind_campaign(folder, case.name, robot_file(case, robots_folder), bad, design, schedule, declared)
+    slipped = partial(_slipped, case, bad, schedule) if "bad_rows" in _setting(case) else None
+    made = write_blind_campaign(
+        folder, case.name, robot_file(case, robots_folder), bad, design, schedule, declared, slipped=slipped
+    )
     truth = {"case": asdict(case), "defects": [truth_of(robot, defect) | sizing for defect, sizing in sized]}
+    if robot.tracker.misplaced is not None:
+        misplaced = robot.tracker.misplaced
+        truth["misplaced"] = {"shift_m": list(misplaced.shift_m), "turn_rad": list(misplaced.turn_rad)}
     if case.alternative:
         truth["alternative"] = {"effect": case.alternative, "angle_deg": angle_to_alternative(case, robot, design, bad)}
     return write_truth(Path(sealed_folder) / f"{case.name}.json", truth | made, folder)
+
+
+def _slipped(
+    case: Case, robot: PhysicalRobot, schedule: Schedule, table: dict[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], list[BadReading]]:
+    """A table with up to so many bad rows as the setting says, of one kind."""
+    draws = stream(case.seed, "bad rows")
+    kind, count = draws.choice(possible_kinds(table)), draws.integers(1, _setting(case)["bad_rows"] + 1)
+    return with_bad_rows(table, robot, schedule, str(kind), int(count), draws)
 
 
 def write_manifest(path: str | Path, digests: Mapping[str, str]) -> None:

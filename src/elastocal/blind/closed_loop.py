@@ -26,16 +26,18 @@ from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
 from elastocal.exchange.target_path import OK
-from elastocal.fitting.least_squares import fit
 from elastocal.fitting.model import declared_model
 from elastocal.fitting.observations import select_states
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import calibrated_by, cases_in
 from elastocal.mechanics.kinematics import jacobians
 from elastocal.mechanics.pose_differences import pose_differences
+from elastocal.plant.bad_rows import HELD_POINT, ZEROS, with_bad_rows
 from elastocal.plant.campaigns import Design, schedule_of, usual_force_N
 from elastocal.plant.defects import KINDS
 from elastocal.plant.drives import Repeatability
 from elastocal.plant.random_numbers import stream
+from elastocal.plant.tracker import misplaced_base
 from elastocal.plant.weights import declared_masses
 
 if TYPE_CHECKING:
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.mechanics.robot import Robot
+    from elastocal.plant.bad_rows import BadReading
     from elastocal.plant.physical_robot import PhysicalRobot
 
 UNCORRECTED, GEOMETRY, DECLARED, FOUND, TRUE = "uncorrected", "geometry", "declared", "found", "true"
@@ -105,7 +108,9 @@ def hidden_effects(robot: PhysicalRobot) -> list[str]:
     )
 
 
-def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int) -> dict[str, np.ndarray]:
+def closed_loop(
+    robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int, slips: bool = False
+) -> dict[str, np.ndarray]:
     """One robot with one hidden defect, from campaign to corrected targets that were measured.
 
     Parameters
@@ -114,6 +119,9 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
     effect : str
         Hidden, of plausible size at a joint that is drawn, beside errors of geometry, gears and weights.
     seed : int
+    slips : bool
+        Whether the base is a little tilted against where it is declared, and the beam was lost in one row. What is wanted, and
+        whether the robot reached it, is then of the declared base.
 
     Returns
     -------
@@ -121,7 +129,9 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
         One row for each wanted pose and model, columns as `schema` has them.
     """
     plant, _ = hidden_robot(robot_file, seed, [effect])
-    training, held_out = measured_cases(plant, robot_file, robots_folder, CAMPAIGN, seed)
+    if slips:
+        plant = replace(plant, tracker=replace(plant.tracker, misplaced=misplaced_base(stream(seed, "tilted base"))))
+    training, held_out = measured_cases(plant, robot_file, robots_folder, CAMPAIGN, seed, slips)
     found = diagnose(training, Settings(), seed)
     robot = training.campaign.robot
     wanted = wanted_poses(robot, plant, seed)
@@ -148,12 +158,22 @@ def closed_loop(robot_file: str | Path, robots_folder: str | Path, effect: str, 
 
 
 def measured_cases(
-    plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, design: Design, seed: int
+    plant: PhysicalRobot, robot_file: str | Path, robots_folder: str | Path, design: Design, seed: int, lost_beam: bool = False
 ) -> tuple[Case, Case]:
-    """Training and held-out part of a campaign of the plant, by way of its folder."""
-    schedule = schedule_of(plant.arm, design, seed)
+    """Training and held-out part of a campaign of the plant, by way of its folder; perhaps with a fitted row that was lost."""
+    schedule, declared = schedule_of(plant.arm, design, seed), declared_masses(plant.arm)
+    draws = stream(seed, "lost beam")
+
+    def lost(table: dict[str, np.ndarray]) -> tuple[dict[str, np.ndarray], list[BadReading]]:
+        """One lost row, of a pose that is fitted."""
+        kind, held_out = str(draws.choice([ZEROS, HELD_POINT])), design.poses - design.held_out
+        tries = iter(lambda: with_bad_rows(table, plant, schedule, kind, 1, draws), None)
+        return next((bad, lost) for bad, lost in tries if table["pose"][lost[0].rows[0]] < held_out)
+
     with tempfile.TemporaryDirectory() as folder:
-        write_blind_campaign(Path(folder), "closed_loop", robot_file, plant, design, schedule, declared_masses(plant.arm))
+        write_blind_campaign(
+            Path(folder), "closed_loop", robot_file, plant, design, schedule, declared, slipped=lost if lost_beam else None
+        )
         return cases_in(folder, robots_folder)
 
 
@@ -166,7 +186,7 @@ def _geometry(case: Case, found: Diagnosis) -> Fit:
     bare = declared_model(rigid)
     model = bare.with_effects(declared_candidates(campaign.declared, bare.sites, "closed loop"))
     unloaded = np.asarray(~case.observations.states.wrench.any(axis=1))
-    return fit(model, select_states(case.observations, unloaded), found.declared.noise)
+    return fit_declared(model, select_states(case.observations, unloaded), found.declared.noise)
 
 
 def wanted_poses(robot: Robot, plant: PhysicalRobot, seed: int) -> Wanted:
@@ -242,16 +262,23 @@ def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> 
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
     for _ in range(_STEPS):
-        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+        off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
         step = (inverse @ off[..., None])[..., 0]
         commands = robot.reported_angles(robot.model_angles(commands) + step)
-    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
+    off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
     return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
+
+
+def _reached(plant: PhysicalRobot, commands: np.ndarray, wrench: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where the end effector comes to rest, in the frame that is declared as the base's."""
+    position, rotation = reached(plant, commands, wrench, seed)
+    seen = plant.tracker.seen(position[:, None], rotation[:, None], np.zeros(len(position)))
+    return seen[0][:, 0], seen[1][:, 0]
 
 
 def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
-    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
+    position, rotation = _reached(plant, commands, wanted.wrench, seed + 1)
     read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,

@@ -19,10 +19,14 @@ from elastocal.plant.campaigns import Design, measured_table
 from elastocal.plant.dynamic import DYNAMIC, dynamic_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping, Sequence
 
     from elastocal.plant.arm import Arm, LinkMass
+    from elastocal.plant.bad_rows import BadReading
     from elastocal.plant.physical_robot import PhysicalRobot, Schedule
+
+    Table = dict[str, np.ndarray]
+    Slip = Callable[[Table], tuple[Table, list[BadReading]]]
 
 ROBOT_FILE = "robot.yaml"
 
@@ -89,6 +93,7 @@ def write_blind_campaign(
     schedule: Schedule,
     declared: Sequence[LinkMass] = (),
     kind: str = "parquet",
+    slipped: Slip | None = None,
 ) -> dict[str, Any]:
     """Measure, and write what the analyst gets.
 
@@ -106,6 +111,8 @@ def write_blind_campaign(
     declared : tuple of LinkMass
         Weights as they are declared to the analyst.
     kind : {"parquet", "csv"}
+    slipped : callable, optional
+        From a measured table to the same with what went wrong in the file, and a list of that.
 
     Returns
     -------
@@ -113,8 +120,9 @@ def write_blind_campaign(
         How the data were made, for the ground truth of the case.
     """
     table, outliers = measured_table(robot, design, schedule)
+    table, slips = slipped(table) if slipped else (table, [])
     write_campaign(folder, campaign_document(name, robot.arm, design), table, robot.arm.joints, kind)
-    _write_robot(folder, robot_file, robot, declared)
+    write_robot(folder, robot_file, robot, declared)
     return {
         "campaign": name,
         "robot": Path(robot_file).stem,
@@ -127,7 +135,7 @@ def write_blind_campaign(
         "outliers": [list(outlier) for outlier in outliers],
         "measurements": len(table["pose"]),
         "made_with": {"mujoco": mujoco.__version__, "numpy": np.__version__, "python": platform.python_version()},
-    }
+    } | ({"bad_rows": [asdict(slip) for slip in slips]} if slipped else {})
 
 
 def write_dynamic_campaign(
@@ -156,10 +164,11 @@ def write_dynamic_campaign(
         "holdout": {"fraction": 0.3, "seed": 1},
     }
     write_campaign(folder, document, dynamic_table(robot, measurements, seed), robot.arm.joints, "parquet")
-    _write_robot(folder, robot_file, robot, declared)
+    write_robot(folder, robot_file, robot, declared)
 
 
-def _write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
+def write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot, declared: Sequence[LinkMass]) -> None:
+    """Write the campaign's own robot file; see `robot_document`."""
     nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2)
     with atomic_write(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:

@@ -20,6 +20,7 @@ from elastocal.diagnosis.search import initial_screening
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, noise_from
 from elastocal.fitting.least_squares import fit
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.loop.whole import cases_in
 from elastocal.plant.defects import OUTSIDE
 
@@ -72,7 +73,7 @@ def oracle(
         # Without an effect the declared model is the right one, and has been judged already.
         return _outcome((), 1.0, verdict["heldout"]["before"])
     case, unseen = cases_in(folder, robots_folder)
-    declared = fit(case.model, case.observations, noise_from(verdict).of_measurements)
+    declared = fit_declared(case.model, case.observations, noise_from(verdict).of_measurements)
     fitted, members, variants = _with_effects(declared, case, effects)
     p_value = min(variants * _wald(fitted, members), 1.0)
     _, heldout, _ = heldout_errors([Step("oracle", "declared", fitted)], case, unseen, seed)

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 NONE = "none"
 SILENT = (ADEQUATE, NOT_TESTABLE)
+# The effect by which a diagnosis says that the base is not where it is declared.
+MISPLACED = "base_placement"
 
 
 def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, Any]:
@@ -43,8 +45,9 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
     ----------
     .. [1] Kuhn, H. W., The Hungarian method for the assignment problem, Naval Research Logistics Quarterly 2, 1955.
     """
-    case, kind = truth["case"], verdict["verdict"]
-    names, true = [effect["name"] for effect in verdict["effects"]], list(case["effects"])
+    case = truth["case"]
+    kind, effects = judged_apart_from_setup(truth, verdict)
+    names, true = [effect["name"] for effect in effects], list(case["effects"])
     stated = bool(true) and kind in (NAMED, CLASS, SEVERAL)
     right = stated and sorted(names) == sorted(true)
     return {
@@ -60,9 +63,24 @@ def outcome(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> dict[str, A
         "detected": kind not in SILENT,
         "exact": right,
         "named_right": right and kind == NAMED,
-        "holds_truth": stated and _each_is_held(true, verdict["effects"]),
+        "holds_truth": stated and _each_is_held(true, effects),
         "wrong_name": kind == NAMED and names != true,
     }
+
+
+def wrong_setup(truth: Mapping[str, Any]) -> set[str]:
+    """Mechanisms of the set-up that a case has beside what it is about: right to find, and no fault not to name."""
+    return {MISPLACED} if "misplaced" in truth else set()
+
+
+def judged_apart_from_setup(truth: Mapping[str, Any], verdict: Mapping[str, Any]) -> tuple[str, list[Mapping[str, Any]]]:
+    """Verdict and effects without those of `wrong_setup`."""
+    kind, effects = verdict["verdict"], list(verdict["effects"])
+    kept = [effect for effect in effects if effect["name"] not in wrong_setup(truth)]
+    if len(kept) == len(effects):
+        return kind, effects
+    one = CLASS if kept and kept[0]["alternatives"] else NAMED
+    return (ADEQUATE, one, SEVERAL)[min(len(kept), 2)], kept
 
 
 def kind_of(robot: str) -> str:

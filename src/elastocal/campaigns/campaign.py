@@ -124,6 +124,10 @@ class Campaign:
     measurements : Measurements
     remainder : str or None
         Regression on what the final model leaves, a name in `remainder.catalogue`.
+    table : str
+        Name of the file of measurements; empty where they come from none.
+    header_line : int or None
+        Line of the file in which its header stands, where it is a text whose rows are lines.
     """
 
     name: str
@@ -137,6 +141,13 @@ class Campaign:
     holdout: dict[str, Any]
     measurements: Measurements
     remainder: str | None = None
+    table: str = ""
+    header_line: int | None = None
+
+    def place_of(self, row: int) -> str:
+        """Where a row of the measurements stands, in words: by its line where it has one."""
+        line = f"row {row}" if self.header_line is None else f"line {row + self.header_line}"
+        return f"{line} of {self.table}" if self.table else line
 
 
 def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: Measurements, source: str) -> Campaign:
@@ -172,6 +183,8 @@ def described_campaign(document: Mapping[str, Any], robot: Robot, measurements: 
         holdout=document.get("holdout", DEFAULT_HOLDOUT),
         measurements=measurements,
         remainder=None if remainder == NO_REMAINDER else remainder,
+        table=document.get("table", ""),
+        header_line=document.get("header_line"),
     )
 
 

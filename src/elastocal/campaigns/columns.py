@@ -45,14 +45,20 @@ def measurements_from(columns: Mapping[str, np.ndarray]) -> Measurements:
 
 
 def residual_columns(
-    measurements: Measurements, held_out: bool, outside: np.ndarray, position: np.ndarray, before: np.ndarray, after: np.ndarray
+    measurements: Measurements,
+    held_out: bool,
+    gross_errors: bool,
+    outside: np.ndarray,
+    position: np.ndarray,
+    before: np.ndarray,
+    after: np.ndarray,
 ) -> dict[str, np.ndarray]:
     """Columns of the residuals table.
 
     Parameters
     ----------
     measurements : Measurements
-    held_out : bool
+    held_out, gross_errors : bool
     outside : ndarray of bool (N,)
         Whether each lies outside of the range of the poses fitted.
     position : ndarray (N, 3)
@@ -66,7 +72,7 @@ def residual_columns(
     """
     count, joints = measurements.joint_angles.shape
     columns = {name: getattr(measurements, name) for name in IDENTITY}
-    columns |= {"held_out": np.full(count, held_out), "outside_range": outside}
+    columns |= {"held_out": np.full(count, held_out), "gross_error": np.full(count, gross_errors), "outside_range": outside}
     columns |= {"time_s": _or_missing(measurements.time_s, (count,))}
     columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
     columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))

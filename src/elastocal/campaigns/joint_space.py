@@ -1,9 +1,11 @@
 """Where poses lie in joint space: blocks of neighbours, and what lies beyond the range of others."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-# A joint that moves less than measurements of one pose may differ does not distinguish poses.
-_STILL_RAD = 0.02
+# Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
+# does not distinguish poses.
+SAME_POSE_RAD = 0.02
 _ROUNDS = 100
 # How often a pose drawn like the others, from a box, is called beyond their range.
 _LEVEL = 0.05
@@ -37,7 +39,7 @@ def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
     circle = np.stack([np.cos(joint_angles), np.sin(joint_angles)], axis=-1)
     circle = circle - circle.mean(axis=0)
     spread = np.sqrt((circle**2).mean(axis=0).sum(axis=-1))
-    points = (circle / np.maximum(spread, _STILL_RAD)[:, None]).reshape(len(joint_angles), -1)
+    points = (circle / np.maximum(spread, SAME_POSE_RAD)[:, None]).reshape(len(joint_angles), -1)
     found = np.zeros(len(points), int)
     waiting = [(np.arange(len(points)), 0, count)]
     while waiting:
@@ -108,5 +110,10 @@ def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndar
     poses, joints = fitted_angles.shape
     low, high = fitted_angles.min(axis=0), fitted_angles.max(axis=0)
     share = max((2.0 * joints / (_LEVEL * (poses + 1))) ** (1.0 / max(poses - 1, 1)) - 1.0, 0.0)
-    margin = np.maximum(share * (high - low), _STILL_RAD)
+    margin = np.maximum(share * (high - low), SAME_POSE_RAD)
     return ((joint_angles < low - margin) | (joint_angles > high + margin)).any(axis=1)
+
+
+def repeated(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:
+    """Whether states (S, n) have in every joint the angle of a same one of those fitted (P, n), rad: ndarray of bool (S,)."""
+    return np.isfinite(cKDTree(fitted_angles).query(joint_angles, p=np.inf, distance_upper_bound=SAME_POSE_RAD)[0])

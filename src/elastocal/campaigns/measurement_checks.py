@@ -9,6 +9,7 @@ import numpy as np
 
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
+from elastocal.campaigns.joint_space import SAME_POSE_RAD
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,12 +19,15 @@ if TYPE_CHECKING:
     from elastocal.campaigns.measurements import MeasurementFile
     from elastocal.mechanics.robot import Robot
 
-# Measurements of one pose share their joint angles up to what a controller's servo error can differ.
-_SAME_POSE_RAD = 0.02
 # No joint of a serial arm reports more than one and a half turns unless its limits say so.
 _FARTHEST_RAD = 3.0 * np.pi
+# From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
+# least so many steps with a probability of one in 700 at most.
+_BACKWARDS, _FEWEST_IN_ORDER = 0.875, 5
 # A joint this far beyond its limits is no joint at its limit.
 _BEYOND_LIMITS_RAD = 0.5
+# A unit is wrong in a whole file. What is off in fewer rows than this is a gross error of theirs, which the diagnosis names.
+_SINGLE_ROWS = 0.2
 # Positions spread over more reaches than this are not in metres. Millimetres spread so unless all lie within centimetres.
 _FARTHEST_REACHES = 10.0
 # A target sits at most about this far from its measuring point.
@@ -55,7 +59,7 @@ def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> 
     # An angle that its opposite would bring inside the limits has rather a wrong sign, which is for the diagnosis to trace.
     beyond = ~inside(reported, _BEYOND_LIMITS_RAD) & ~inside(-reported, _BEYOND_LIMITS_RAD)
     wrong = (np.abs(reported) > farthest) | (beyond & inside(np.radians(reported)))
-    if wrong.any():
+    if wrong.any(axis=1).mean() > _SINGLE_ROWS:
         index, joint = np.argwhere(wrong)[0]
         allowed = (
             f"rad, not degrees, of a joint that goes from {low[joint]:.2f} to {high[joint]:.2f} rad"
@@ -82,12 +86,13 @@ def check_measurements(
     Raises
     ------
     InputError
-        The first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places,
-        millimetres or degrees, a target without a measurement.
+        The first fault: a measurement that is there twice, a load that contradicts its wrench, a pose at two places, times
+        that run backwards, millimetres or degrees, a target without a measurement.
     """
     _check_duplicates(measurements, table, targets)
     _check_loads(measurements, table)
     _check_poses(measurements, table)
+    _check_times(measurements, table)
     _check_units(measurements, table, robot, targets)
     for index, target in enumerate(targets):
         if not (measurements.target == index).any():
@@ -135,12 +140,33 @@ def _check_poses(measurements: Measurements, table: MeasurementFile) -> None:
     np.minimum.at(first, pose_of, np.arange(len(measurements)))
     reported = table.numbers(table.angles)
     away = np.abs(reported - reported[first[pose_of]])
-    wrong = away > _SAME_POSE_RAD
+    wrong = away > SAME_POSE_RAD
     if wrong.any():
         index, joint = np.argwhere(wrong)[0]
         earlier = table.rows[first[pose_of[index]]]
         found = f"{reported[index, joint]:g}, {away[index, joint]:.3g} rad from row {earlier} of the same pose"
-        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {_SAME_POSE_RAD} rad")
+        raise table.cell_fault(index, table.angles[joint], found, f"measurements of one pose within {SAME_POSE_RAD} rad")
+
+
+def _check_times(measurements: Measurements, table: MeasurementFile) -> None:
+    """Refuse a clock that runs backwards: in a session times fall from pose to pose, by their numbers and as they stand.
+
+    Poses may be measured in another order than that of their numbers, and stand in any order in the file: one of the two alone
+    says nothing of the clock.
+    """
+    if measurements.time_s is None:
+        return
+    pairs, pose_of = measured_poses(measurements)
+    first, begun = np.full(len(pairs), len(measurements)), np.full(len(pairs), np.inf)
+    np.minimum.at(first, pose_of, np.arange(len(measurements)))
+    np.minimum.at(begun, pose_of, measurements.time_s)
+    for session in np.unique(pairs[:, 0]):
+        members = np.flatnonzero(pairs[:, 0] == session)
+        falling = [np.diff(begun[members[order]]) < 0 for order in (slice(None), np.argsort(first[members]))]
+        if len(members) > _FEWEST_IN_ORDER and all(each.mean() > _BACKWARDS for each in falling):
+            last = members[np.argmax(first[members])]
+            found = f"{begun[last]:.15g}, when the poses before it were measured later"
+            raise table.cell_fault(int(first[last]), "time_s", found, "times that rise from pose to pose: s since any instant")
 
 
 def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> None:
@@ -150,7 +176,7 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
         members = np.flatnonzero(measurements.session == session)
         position = measurements.position[members]
         away = np.abs(position - np.median(position, axis=0))
-        if away.max() > _FARTHEST_REACHES * reach:
+        if np.quantile(away.max(axis=1), 1.0 - _SINGLE_ROWS) > _FARTHEST_REACHES * reach:
             index, axis = np.unravel_index(np.argmax(away), away.shape)
             found = f"{position[index, axis]:g}, {away[index, axis]:.4g} from the middle of the measurements"
             raise table.cell_fault(

@@ -13,6 +13,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.errors import InputError
 from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
@@ -303,6 +304,13 @@ class MeasurementFile:
                 unit = f" in {known[name].unit}" if known[name].unit else ""
                 raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
 
+    @property
+    def header_line(self) -> int | None:
+        """Line of the header, where every row of data is a line of a text."""
+        if self.lines is None or np.ptp(self.lines - self.rows):
+            return None
+        return int(self.lines[0] - self.rows[0])
+
     def fault(self, key: str, found: str, allowed: str) -> InputError:
         """InputError of this file."""
         return InputError(self.path, key, found, allowed)
@@ -345,6 +353,8 @@ class MeasurementFile:
         if not sound.all():
             index = int(np.argmin(sound))
             raise self.cell_fault(index, name, shown(self.columns[name][index]), f"a finite number, up to {LARGEST_NUMBER:g}")
+        if (place := beyond(name, values)) is not None:
+            raise self.cell_fault(place, name, shown(self.columns[name][place]), BOUNDS[name].allowed)
         return values
 
 

@@ -68,7 +68,8 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     _check_compliance(document, robot, robot_path, measurements, source)
     _check_noise(document, measurements, robot.joints, source)
     held_out_mask(holdout, measurements, source)
-    return described_campaign(document | {"holdout": holdout}, robot, measurements, source)
+    place = {"table": Path(table.path).name, "header_line": table.header_line}
+    return described_campaign(document | {"holdout": holdout} | place, robot, measurements, source)
 
 
 def read_descriptions(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Path]:
@@ -225,16 +226,6 @@ def _check_compliance(
         raise InputError(source, "compliance", found, "identify, or nominal with compliance_urad_per_Nm in the robot file")
 
 
-def _uncertainties(table: MeasurementFile) -> np.ndarray | None:
-    if not table.has(["u95_m"]):
-        return None
-    stated = table.numbers(["u95_m"])[:, 0]
-    if (stated <= 0.0).any():
-        index = int(np.argmin(stated))
-        raise table.cell_fault(index, "u95_m", f"{stated[index]:g}", "metres, more than 0")
-    return stated
-
-
 def _check_noise(document: Mapping[str, Any], measurements: Measurements, joints: int, source: str) -> None:
     """Refuse noise of positions that is declared twice or not at all, and repeatabilities of other joints."""
     declared = document.get("noise")
@@ -294,8 +285,6 @@ def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target
         position=table.numbers("xyz"),
         rotation_vector=table.numbers(table.orientation) if table.orientation else None,
         approach=approach,
-        time_s=table.numbers(["time_s"])[:, 0] if table.has(["time_s"]) else None,
-        temperature_c=table.numbers(["temperature_c"])[:, 0] if table.has(["temperature_c"]) else None,
-        u95_m=_uncertainties(table),
+        **{name: table.numbers([name])[:, 0] if table.has([name]) else None for name in ("time_s", "temperature_c", "u95_m")},
         row=table.rows,
     )

@@ -12,7 +12,7 @@ from rich.console import Console
 from elastocal.command.campaign import diagnosed_campaign, report_file
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, printed
-from elastocal.command.quantities import length_m
+from elastocal.command.quantities import LARGEST_SEED, length_m
 from elastocal.errors import InputError
 
 DOCUMENT, PAGES = "certificate.json", "certificate.pdf"
@@ -33,7 +33,7 @@ def certificate(
     serial: Annotated[str | None, typer.Option(help="Serial number of the robot; the campaign's without.")] = None,
     date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
     output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
 ) -> None:
     """Accuracy against a tolerance, with the risk of being wrong; repeatability, error budget and map; what changed.
 

@@ -56,7 +56,8 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """What is shown, as pairs of a heading and words."""
     from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 
-    noise, held = facts["noise"], facts["held"]
+    noise = facts["noise"]
+    left = f"; not identifiable: {_listed(facts['held'])}" if facts["held"] else ""
     sessions = f", {facts['sessions']} sessions" if facts["sessions"] > 1 else ""
     robot = f"{facts['campaign']}: {facts['robot']}, {facts['joints']} joints"
     poses = f"{facts['training']['poses']} poses to fit and {facts['held_out']['poses']} held out"
@@ -67,7 +68,7 @@ def lines(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("", f"{loads}; up to {facts['repeats']} repeats"),
         ("noise", f"{1e6 * noise['position_m']:.0f} µm a coordinate, by {_SOURCES[noise['source']]}"),
         ("declared model", f"leaves {1e3 * facts['residual_rms_m']:.3f} mm RMS on the poses that it was fitted to"),
-        ("identified", f"{facts['parameters']} parameters" + (f"; not identifiable: {_listed(held)}" if held else "")),
+        ("identified", f"{facts['parameters']} parameters, effectively {facts['effective_parameters']:.0f}{left}"),
     ]
     for joint, spring in enumerate(facts.get("compliance", []), 1):
         error = spring["relative_std_error"]

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from elastocal.command.pipeline import pipeline, workplace
+from elastocal.command.quantities import MOST_JOBS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -24,7 +25,7 @@ _JOBS = re.compile(r"\d+ jobs")
 
 def diagnose(
     folder: Annotated[Path, typer.Argument(help="Folder of the campaign.")],
-    cores: Annotated[int, typer.Option("--cores", "-j", min=1, help="Jobs at a time.")] = 2,
+    cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
 ) -> None:
     """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
     place, snakefile = workplace(), pipeline() / "Snakefile"

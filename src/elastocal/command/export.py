@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,7 +27,10 @@ def export(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
     table: Annotated[
-        int, typer.Option(min=0, help="Rows of a table of errors over the joint space, for programs that cannot run the model.")
+        int,
+        typer.Option(
+            min=0, max=MOST_ROWS, help="Rows of a table of errors over the joint space, for programs that cannot run the model."
+        ),
     ] = 0,
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
@@ -50,7 +51,9 @@ def csv(
     skip_empty: Annotated[bool, typer.Option("--skip-empty", help="Leave out rows without a position.")] = False,
     separator: Annotated[Separator | None, typer.Option(help="Found out where not given.")] = None,
     decimal: Annotated[Decimal | None, typer.Option(help="Found out where not given.")] = None,
-    header: Annotated[int | None, typer.Option(min=1, help="Line of the names of columns; found out where not given.")] = None,
+    header: Annotated[
+        int | None, typer.Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
+    ] = None,
     options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is there.")] = False,
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from elastocal.command.quantities import LARGEST_RELATIVE_STD
 from elastocal.errors import printable
 from elastocal.exchange.dh import RELATIVE_STD, robot_from_dh
 from elastocal.exchange.robot_text import refuse_existing, summary, write_robot
@@ -35,7 +36,12 @@ def dh(
     lengths: Annotated[Lengths, typer.Option(help="Unit of columns of lengths that do not end in one.")] = Lengths.M,
     name: Annotated[str | None, typer.Option(help="Maker and model; the file's name without.")] = None,
     mass_std: Annotated[
-        float, typer.Option(min=0.001, help="How well the masses are known: standard deviation over the value.")
+        float,
+        typer.Option(
+            min=0.001,
+            max=LARGEST_RELATIVE_STD,
+            help="How well the masses are known: standard deviation over the value.",
+        ),
     ] = RELATIVE_STD,
     force: Annotated[bool, typer.Option("--force", help="Replace the file that is there.")] = False,
 ) -> None:

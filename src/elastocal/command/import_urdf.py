@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from elastocal.command.quantities import LARGEST_RELATIVE_STD
 from elastocal.errors import printable
 from elastocal.exchange.robot_text import refuse_existing, summary, write_robot
 from elastocal.exchange.urdf import robot_from_urdf
@@ -20,7 +21,12 @@ def urdf(
     output: Annotated[Path, typer.Option("--output", "-o", help="The robot file to write.")],
     point: Annotated[list[str] | None, typer.Option(help="A link between them that targets may sit on; any number.")] = None,
     mass_std: Annotated[
-        float, typer.Option(min=0.001, help="How well the masses are known: standard deviation over the value.")
+        float,
+        typer.Option(
+            min=0.001,
+            max=LARGEST_RELATIVE_STD,
+            help="How well the masses are known: standard deviation over the value.",
+        ),
     ] = RELATIVE_STD,
     force: Annotated[bool, typer.Option("--force", help="Replace the file that is there.")] = False,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from elastocal.command.quantities import length_m, numbers
+from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, length_m, numbers
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -24,10 +24,14 @@ def plan(
     robot: Annotated[Path, typer.Argument(help="Robot file.")],
     output: Annotated[Path | None, typer.Option(help="CSV of the plan; a picture goes beside it.")] = None,
     folder: Annotated[Path | None, typer.Option(help="New campaign folder, whose measurement columns are empty.")] = None,
-    poses: Annotated[int, typer.Option(min=1, help="Poses to fit.")] = 20,
-    held_out: Annotated[int, typer.Option(min=3, help="Poses that judge the result and choose nothing, drawn at random.")] = 9,
+    poses: Annotated[int, typer.Option(min=1, max=MOST_POSES, help="Poses to fit.")] = 20,
+    held_out: Annotated[
+        int, typer.Option(min=3, max=MOST_POSES, help="Poses that judge the result and choose nothing, drawn at random.")
+    ] = 9,
     accuracy: Annotated[str | None, typer.Option(help="Wanted accuracy such as 0.1mm: as few poses as reach it.")] = None,
-    number: Annotated[int, typer.Option("--candidates", min=10, help="Configurations among which is chosen.")] = 10_000,
+    number: Annotated[
+        int, typer.Option("--candidates", min=10, max=MOST_ROWS, help="Configurations among which is chosen.")
+    ] = 10_000,
     criterion: Annotated[str, typer.Option(help="D, A or I: determinant, parameters, error over the workspace.")] = "D",
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
     pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction; otherwise it hangs.")] = False,
@@ -39,7 +43,7 @@ def plan(
     tracker: Annotated[str | None, typer.Option(help="Where the tracker stands, x,y,z in m, base axes.")] = None,
     box: Annotated[list[str] | None, typer.Option(help="Keep out of xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
     noise: Annotated[str, typer.Option(help="Standard deviation of a coordinate.")] = "0.03mm",
-    seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
 ) -> None:
     """Choose configurations and loads that say most about a robot, among those that arm, cell and tracker allow."""
     import numpy as np
@@ -118,7 +122,9 @@ def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
         known = [place.name for place in chain.points]
         if point not in known:
             raise InputError("--target", "", repr(point), ", ".join(known))
-        found.append(Target(point, point, tuple(numbers("--target", offset, 3).tolist()) if offset else None))
+        found.append(
+            Target(point, point, tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M).tolist()) if offset else None)
+        )
     return tuple(found)
 
 

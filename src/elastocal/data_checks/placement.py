@@ -9,11 +9,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from elastocal.fitting.model import declared_model
-from elastocal.fitting.observations import Observations, States, select_states
+from elastocal.fitting.observations import select_states, single_observations
 from elastocal.fitting.prediction import measured_in_base
 from elastocal.fitting.registration import nominal_poses, registered_to
 from elastocal.mechanics.pose_differences import rotation_vectors
@@ -21,6 +20,7 @@ from elastocal.mechanics.pose_differences import rotation_vectors
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements
     from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.observations import Observations
 
 # Poses enough to tell what concerns all measurements.
 MANY_POSES = 80
@@ -154,33 +154,6 @@ def spread(measurements: Measurements, poses: int = MANY_POSES) -> Measurements:
         first = order[np.unique(measurements.pose[order], return_index=True)[1]]
         chosen.append(first[np.unique(np.linspace(0, len(first) - 1, poses).round().astype(int))])
     return measurements.select(np.sort(np.concatenate(chosen)))
-
-
-def single_observations(measurements: Measurements) -> Observations:
-    """Every measurement as an observation in a state of its own.
-
-    Parameters
-    ----------
-    measurements : Measurements
-
-    Returns
-    -------
-    Observations
-        In the order of the measurements.
-    """
-    states = States(
-        measurements.session,
-        measurements.pose,
-        measurements.load,
-        measurements.joint_angles,
-        measurements.wrench,
-        np.ones(len(measurements), int),
-        measurements.approach,
-        measurements.time_s,
-        measurements.temperature_c,
-    )
-    rotation = None if measurements.rotation_vector is None else Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
-    return Observations(states, np.arange(len(measurements)), measurements.target, measurements.position, rotation)
 
 
 def rms(values: np.ndarray) -> float:

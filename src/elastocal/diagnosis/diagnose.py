@@ -12,18 +12,22 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
+from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
 from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
-from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.random_streams import stream
+from elastocal.validation.left_out import certain_loss, left_out_squares
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.data_checks.protocol import Fault
     from elastocal.diagnosis.linearize import Linearized
     from elastocal.diagnosis.search import Posterior
@@ -32,6 +36,7 @@ if TYPE_CHECKING:
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
 
 # Mechanisms that are added one at a time, each by a fit; of more, only the first.
 _MOST_STEPS = 4
@@ -44,7 +49,8 @@ class Step:
     Attributes
     ----------
     name : str
-    kind : {"frames", "declared", "effect"}
+    kind : {"frames", "declared", "effect", "kept"}
+        Of the last, "kept" where frames alone predict training poses better than what was fitted.
     fitted : Fit
         To the training poses.
     """
@@ -87,12 +93,15 @@ class Diagnosis:
     evidence : Evidence or None
     document : dict
         Contents of verdict.json, but for what held-out poses say.
+    left_out : Measurements
+        Gross errors, which are no part of the case.
     """
 
     case: Case
     steps: tuple[Step, ...]
     evidence: Evidence | None
     document: dict[str, Any] = field(repr=False)
+    left_out: Measurements
 
     @property
     def declared(self) -> Fit:
@@ -122,24 +131,68 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     -------
     Diagnosis
     """
+    whole = case.campaign
     tell = progress or (lambda line: None)
-    known = faults(case.campaign, case.campaign.measurements)
+    part = first_kept(case, settings)
+    known = faults(part.case.campaign, part.case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
-    noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise)
-    tell(f"declared model fitted to {len(case.observations)} measurements")
+    if decisive:
+        # Of measurements that mean something else no row can be told to be wrong.
+        part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
+    tell(f"declared model fitted to {len(part.case.observations)} measurements")
+    found, final = None, part.declared
+    errors = Deviations.none(len(part.kept), case.model.rows)
+    good = np.zeros(len(part.kept), bool)
+    for number in range(0 if decisive else settings.gross_error_rounds):
+        found, final = _explained(part.case, part.declared, settings, seed, tell)
+        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
+        # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
+        good |= ~part.kept & ~errors.gross
+        without = fitted_to(case, ~errors.gross | good, part)
+        if without is part or number + 1 == settings.gross_error_rounds:
+            break
+        tell(f"{(~without.kept).sum()} of {len(good)} rows are gross errors: once more without them")
+        part = without
+    errors = replace(errors, gross=~part.kept)
+    case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
     steps = [Step("frames and targets", "frames", bare), Step("declared model", "declared", declared)]
-    if decisive:
-        found, final = None, declared
-    else:
-        found, final = _explained(case, declared, settings, seed, tell)
+    lost: list[str] = []
+    if found:
         if not found.conclusion.best.named:
             steps[-1] = replace(steps[-1], fitted=final)
+        lost = _losses(bare, [steps[-1].fitted, *([final] if found.adopted else [])], case.observations, settings)
+        found = replace(found, adopted=found.adopted and not lost)
         if found.adopted:
             steps += _effect_steps(case, declared, final, found)
-    document = _document(case, noise, steps, final, found, known, settings, warnings)
-    return Diagnosis(case, tuple(steps), found, document)
+        elif lost and lost[0]:
+            kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
+            steps.append(Step("frames and targets, kept", "kept", kept))
+    document = _document(case, noise, steps, final, found, known, settings, [*part.warnings, *filter(None, lost)])
+    left_out = entries_of(errors, whole, held_out=False)
+    document |= {"gross_errors": left_out, "warnings": [*document["warnings"], *warnings_of(left_out)]}
+    return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
+
+
+def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settings: Settings) -> list[str]:
+    """A sentence for each model that predicts left-out training poses worse than frames alone, empty for one that does not.
+
+    Of the declared model and, if it is given, that with effects; nothing where the last holds.
+    """
+    found: list[str] = []
+    for fitted, name in zip(models, ("declared model", "model with the effects found"), strict=False):
+        numbers, words = fitted.residual.size, ""
+        if numbers < settings.numbers_a_parameter * effective_parameters(fitted):
+            mine, others = (left_out_squares(each, observations) for each in (fitted, bare))
+            if certain_loss(mine, others):
+                rms = [f"{1e3 * np.sqrt(each.mean()):.2f} mm" for each in (mine, others)]
+                words = (
+                    f"training poses left out in turn are off by {rms[0]} RMS by the {name}, by {rms[1]} with frames and"
+                    f" targets alone: {len(mine)} poses are too few for {effective_parameters(fitted):.0f} parameters, and the"
+                    f" {name} is not kept"
+                )
+        found.append(words)
+    return found if found[-1] else []
 
 
 def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:
@@ -173,7 +226,7 @@ def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: C
     if named:
         final = fit_with_sizes(declared, case.observations, noise, with_shapes_of(chosen, about), about)
     else:
-        final = fit(case.model, case.observations, noise, declared.estimate, reweighted=True)
+        final = fit(declared.model, case.observations, noise, declared.estimate, reweighted=True)
     adopted = bool(named) and expected_to_help(problem.problem, found, model)
     return Evidence(problem, found, alarm, conclusion, adopted), final
 
@@ -250,6 +303,7 @@ def _document(
         # Root mean square by which positions may be elsewhere by other models than the one that is kept.
         "other_models_m": other_m,
         "heldout": None,
+        "kept": steps[-1].kind.replace("kept", "frames"),
         "compliance_urad_per_Nm": _compliances(declared, final, springs),
         "held": sorted({f"{o} {p.name}" for (o, p), held in zip(final.parameters, final.held, strict=True) if held}),
         "candidates_tested": len(tested),

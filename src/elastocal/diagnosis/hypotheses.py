@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import gammaln, logsumexp
 
+from elastocal.effects.protocol import at_shapes, require_unique
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -69,7 +71,7 @@ class Unit:
         else:
             assert self.competitor is not None
             name = f"{OTHER}{list(self.location)} {self.competitor.name}"
-        return name + "".join(f" {shape:.3g}" for shape in self.shapes)
+        return at_shapes(name, self.shapes)
 
 
 @dataclass(frozen=True)
@@ -184,6 +186,7 @@ def units_of(
         columns, log_share = np.arange(start, start + count), -float(np.log(at.count(each.location)))
         units.append(Unit(OTHER, each.location, None, (), columns, np.ones(count), np.zeros(count, int), log_share, each))
         start += count
+    require_unique([unit.key for unit in units])
     return tuple(units)
 
 

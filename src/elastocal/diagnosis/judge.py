@@ -8,13 +8,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of
+from elastocal.diagnosis.settings import Settings
+from elastocal.fitting.case import noise_from
 from elastocal.fitting.displacement import conditions
-from elastocal.fitting.observations import each_approach, state_clusters
+from elastocal.fitting.observations import single_observations, state_clusters
 from elastocal.fitting.prediction import measured_in_base, residuals
 from elastocal.random_streams import stream
 from elastocal.remainder.corrected import Plan
 from elastocal.remainder.shares import remainder_facts
-from elastocal.validation.fitted_range import outside_poses
+from elastocal.validation.fitted_range import outside_poses, repeat_warnings
 from elastocal.validation.held_out import (
     METRICS,
     errors_by_range,
@@ -34,7 +37,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.case import Case
-    from elastocal.fitting.observations import Observations
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
@@ -53,10 +55,16 @@ class Verdict:
         Contents of verdict.json.
     rows : list of dict
         Of before_after.csv.
+    held_out : Case
+        What was held out, without its gross errors.
+    left_out : Measurements
+        These.
     """
 
     document: dict[str, Any]
     rows: list[dict[str, Any]]
+    held_out: Case
+    left_out: Measurements
 
 
 def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -75,16 +83,45 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     Verdict
     """
     case, steps = diagnosis.case, diagnosis.steps
-    rows, heldout, warnings = heldout_errors(steps, case, held_out, seed)
+    errors, part = _gross_errors(diagnosis, held_out)
+    left_out = entries_of(errors, held_out.campaign, held_out=True)
+    rows, heldout, warnings = heldout_errors(steps, case, part, seed)
+    every = rows
+    if left_out:
+        every, whole, _ = heldout_errors(steps, case, held_out, seed)
+        heldout["with_gross_errors"] = {"before": whole["before"], "after": whole["after"]}
+        warnings.append(_with_gross_errors(heldout, len(left_out)))
+    else:
+        heldout["with_gross_errors"] = None
+    rows = [row | {"heldout_rms_all_rows_m": other["heldout_rms_m"]} for row, other in zip(rows, every, strict=True)]
     gains = _gains(rows)
     effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
     document = diagnosis.document | {
         "effects": effects,
         "heldout": heldout,
-        "remainder": _remainder(diagnosis, held_out, seed),
-        "warnings": [*diagnosis.document["warnings"], *warnings],
+        "remainder": _remainder(diagnosis, part, seed),
+        "gross_errors": [*diagnosis.document["gross_errors"], *left_out],
+        "warnings": [*diagnosis.document["warnings"], *warnings_of(left_out), *warnings],
     }
-    return Verdict(document, rows)
+    return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross))
+
+
+def _gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
+    """Held-out rows that the final model does not explain, by the rule of the training rows; and the case without."""
+    final, count = diagnosis.final, len(held_out.campaign.measurements)
+    if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):
+        return Deviations.none(count, held_out.model.rows), held_out
+    part, settings = held_out, Settings()
+    errors = Deviations.none(count, held_out.model.rows)
+    for _ in range(settings.gross_error_rounds):
+        # Frames of another campaign are fitted to what is kept of it.
+        there, last = placed(final, diagnosis.case, part), errors.gross
+        noise = noise_from(diagnosis.document).of_measurements
+        errors = held_out_gross_errors(final, there, noise, held_out, settings)
+        part = held_out.select(~errors.gross) if errors.gross.any() else held_out
+        if (errors.gross == last).all():
+            break
+    return errors, part
 
 
 def _remainder(diagnosis: Diagnosis, held_out: Case, seed: int) -> dict[str, Any] | None:
@@ -134,9 +171,10 @@ def heldout_errors(
     there = [placed(step.fitted, case, held_out) for step in steps]
     errors = [position_errors(model, estimate, held_out.observations) for model, estimate in there]
     before = next(number for number, step in enumerate(steps) if step.kind == "declared")
-    after = max(number for number, step in enumerate(steps) if step.kind in ("declared", "effect"))
+    after = len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
+    of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
     floor = noise_floor(steps[after].fitted, held_out.observations, *there[after])
     rows = []
     for step, error, limit in zip(steps, errors, limits, strict=True):
@@ -149,12 +187,13 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
-    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (before, after)]
+    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (0, before, after)]
     outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
-        "before": ends[0],
-        "after": ends[1],
+        "uncalibrated": ends[0] | {"reduction_ci95": [of_calibration.low, of_calibration.high]},
+        "before": ends[1],
+        "after": ends[2],
         "noise_floor_rms_m": None if np.isnan(floor) else floor,
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
@@ -162,7 +201,8 @@ def heldout_errors(
         "share_below_max": share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }
-    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside))
+    again = repeat_warnings(case.observations.states, held_out.observations.states)
+    return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)) + again
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:
@@ -170,7 +210,10 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
 
     Parameters
     ----------
-    diagnosis, held_out, seed
+    diagnosis : Diagnosis
+    held_out : Case
+        Of the verdict.
+    seed : int
         As in `judge`.
 
     Returns
@@ -185,26 +228,25 @@ def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[st
     return rows + split_rows(before, after, case.observations, _REPLICATES, draws)
 
 
-def residual_blocks(diagnosis: Diagnosis, held_out: Case) -> Iterator[dict[str, np.ndarray]]:
-    """Blocks of the residuals table: training measurements, then held-out ones; every measurement before and after."""
+def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str, np.ndarray]]:
+    """Blocks of the residuals table: every measurement before and after, gross errors behind the others."""
     case, before, after = diagnosis.case, diagnosis.declared, diagnosis.final
-    inside = np.zeros(case.observations.cluster.max() + 1, bool)
-    for part, unseen, outside in ((case, False, inside), (held_out, True, outside_poses(after, case, held_out))):
-        observations, order = _in_order(part.campaign.measurements)
+    for part, left_out, unseen in ((case, diagnosis.left_out, False), (verdict.held_out, verdict.left_out, True)):
         there = [placed(fitted, case, part) for fitted in (before, after)]
-        off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
-        position = measured_in_base(there[-1][1], observations)[0]
-        measurements = part.campaign.measurements.select(order)
-        yield residual_columns(measurements, unseen, outside[state_clusters(measurements)], position, *off)
+        outside = outside_poses(after, case, part) if unseen else np.zeros(part.observations.cluster.max() + 1, bool)
+        measurements = part.campaign.measurements
+        for some, beyond in ((measurements, outside[state_clusters(measurements)]), (left_out, np.zeros(len(left_out), bool))):
+            if not len(some):
+                continue
+            observations = single_observations(some)
+            off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
+            position = measured_in_base(there[-1][1], observations)[0]
+            yield residual_columns(some, unseen, some is left_out, beyond, position, *off)
 
 
-def _in_order(measurements: Measurements) -> tuple[Observations, np.ndarray]:
-    """Every measurement as an observation of its own, and the order of the measurements in which they come."""
-    observations, _ = each_approach(measurements)
-    approach = () if measurements.approach is None else tuple(measurements.approach.T[::-1])
-    return observations, np.lexsort(
-        (measurements.target, measurements.repeat, *approach, measurements.load, measurements.pose, measurements.session)
-    )
+def _with_gross_errors(heldout: Mapping[str, Any], count: int) -> str:
+    without, whole = (1e3 * part["after"]["rms_m"] for part in (heldout, heldout["with_gross_errors"]))
+    return f"held-out errors are without {count} gross errors: with them the RMS is {whole:.3g} mm instead of {without:.3g} mm"
 
 
 def _range_warnings(by_range: Mapping[str, Any], poses: int) -> list[str]:

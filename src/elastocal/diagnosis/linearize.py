@@ -21,7 +21,7 @@ from elastocal.diagnosis.summed import (
     summed,
     triangle_of,
 )
-from elastocal.effects.conditions import at_states, offered
+from elastocal.effects.conditions import at_states
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import linearize
@@ -31,7 +31,7 @@ from elastocal.fitting.parameters import parameter_values
 from elastocal.fitting.whitening import whitening
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     from elastocal.diagnosis.hypotheses import Unit
     from elastocal.diagnosis.settings import Settings
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from elastocal.fitting.model import Model as FittedModel
     from elastocal.fitting.observations import Observations, States
     from elastocal.fitting.whitening import Scaling, Whitening
-    from elastocal.mechanics.sites import Sites
 
 # Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
@@ -68,8 +67,6 @@ class Linearized:
     problem : Problem
     products : Products or Sums
         Of one pass over the measurements.
-    declared_size : float
-        Size of declared geometry, in plausible sizes, that makes the measurements most probable.
     untestable : dict of str to str
         Why a candidate is not tested.
     about : Fit
@@ -83,7 +80,6 @@ class Linearized:
 
     problem: Problem
     products: Products | Sums
-    declared_size: float
     untestable: dict[str, str]
     about: Fit
     around: Conditions
@@ -118,7 +114,7 @@ def linearized(
     Linearized
     """
     around, sites = _conditions_of(fitted, observations), fitted.model.sites
-    untestable = {c.key: reason for c in candidates if (reason := lacking(c, sites, observations.states))}
+    untestable = {c.key: reason for c in candidates if (reason := lacking(c, fitted.model, observations.states))}
     tried = {c.key: shapes_tried(c, fitted) for c in candidates if c.key not in untestable} | (shapes or {})
     tested = [(c, values) for c in candidates if c.key in tried for values in tried[c.key]]
     against = other.competitors(around)
@@ -128,19 +124,17 @@ def linearized(
     keys = frozenset(candidate.key for candidate in candidates)
     found = np.isin(owners, list(keys))
     values = np.where(shape_parameters(fitted.model, fitted.estimate), 0.0, parameter_values(fitted.model, fitted.estimate))
-    present = np.where(has_prior(fitted)[~found], values[~found], 0.0)
+    parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
+    deviation = prior_deviations(parameters)
+    present = np.where([parameter.prior_std is not None for parameter in parameters], values[~found], 0.0)
     source = _Source(fitted, observations, around, tested, laws, units, found, values)
     width = int((~found).sum()) + sum(len(unit.columns) for unit in units)
     held = len(observations) * observations.rows * width <= MOST_HELD
     parts = parts_of(observations, len(observations) if held else OBSERVATIONS_AT_ONCE)
-    parameters = [parameter for (_, parameter), left in zip(fitted.parameters, found, strict=True) if not left]
     # Held, one linearisation serves the declared part and the candidates; else the declared part alone takes larger parts.
     larger_parts = parts if held else parts_of(observations, rows_at_once(len(owners) + 60) // observations.rows)
     lines = [*source.lines(parts)] if held else source.lines(larger_parts)
     triangle, unit_rad = source.declared_part(lines)
-    rows = len(observations) * observations.rows
-    size = declared_size(fitted, parameters, owners[~found], triangle, rows, present, settings)
-    deviation = prior_deviations(fitted, parameters, owners[~found], size)
     still = np.zeros(sites.joints)
     grid = unit_rad * np.array(settings.pose_steps)
     if held:
@@ -160,7 +154,7 @@ def linearized(
     untestable |= dict.fromkeys(sorted(small), "too small to be seen at its plausible size")
     # Columns of units that are left out stay in the statistics, where nothing refers to them.
     problem = Problem(statistics, shown, prior_of(shown, settings), settings)
-    return Linearized(problem, products, size, untestable, fitted, around, keys, unit_rad)
+    return Linearized(problem, products, untestable, fitted, around, keys, unit_rad)
 
 
 def _conditions_of(fitted: Fit, observations: Observations) -> Conditions:
@@ -170,89 +164,9 @@ def _conditions_of(fitted: Fit, observations: Observations) -> Conditions:
     return fitted.conditions
 
 
-def declared_geometry(model: FittedModel) -> set[str]:
-    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
-    return {
-        effect.effect
-        for effect in model.effects
-        if effect.family != "declared"
-        and all(parameter.prior_std is None or parameter.sized for parameter in effect.parameters)
-    }
-
-
-def prior_deviations(fitted: Fit, parameters: Sequence[Parameter], owners: Iterable[str], size: float) -> np.ndarray:
-    """Standard deviations of the priors of declared parameters, for one size of declared geometry.
-
-    Parameters
-    ----------
-    fitted : Fit
-    parameters : sequence of Parameter
-    owners : sequence of str
-        Of each parameter.
-    size : float
-        In plausible sizes.
-
-    Returns
-    -------
-    ndarray (P,)
-    """
-    sized = {effect.key for effect in fitted.model.effects if effect.effect in declared_geometry(fitted.model)}
-    own = [p.plausible * size if owner in sized else p.prior_std for p, owner in zip(parameters, owners, strict=True)]
-    return np.array([_WIDE * p.plausible if prior is None else prior for p, prior in zip(parameters, own, strict=True)])
-
-
-def has_prior(fitted: Fit) -> np.ndarray:
-    """Which parameters of a fit have a prior about zero, declared geometry among them, ndarray of bool (P,)."""
-    sized = declared_geometry(fitted.model)
-    effects = {effect.key: effect.effect for effect in fitted.model.effects}
-    return np.array([p.prior_std is not None or effects.get(owner) in sized for owner, p in fitted.parameters], bool)
-
-
-def declared_size(
-    fitted: Fit,
-    parameters: Sequence[Parameter],
-    owners: Collection[str],
-    triangle: np.ndarray,
-    count: int,
-    present: np.ndarray,
-    settings: Settings,
-) -> float:
-    """Size of declared geometry that makes the measurements most probable by type II maximum likelihood [1]_.
-
-    One number for all, at the noise that the unrestricted fit leaves: a size means the same whatever noise was taken for the
-    measurements.
-
-    Parameters
-    ----------
-    triangle : ndarray (P + 1, P + 1)
-        Of the sensitivities to the declared parameters and the residual, whitened.
-    count : int
-        Rows of these.
-    present : ndarray (P,)
-        As in `statistics.products_of`.
-
-    Returns
-    -------
-    float
-        1 where no geometry is declared.
-
-    References
-    ----------
-    .. [1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
-    """
-    if not declared_geometry(fitted.model):
-        return 1.0
-    best = (-np.inf, 1.0)
-    spread = max(abs(triangle[-1, -1]) / np.sqrt(max(count - len(parameters), 1)), 1.0)
-    for size in settings.declared_sizes:
-        deviation = prior_deviations(fitted, parameters, owners, size)
-        rows = np.concatenate([triangle[:, :-1] * deviation / spread, np.eye(len(deviation))])
-        right = np.concatenate([triangle[:, -1] / spread, -present / deviation])
-        basis, factor = np.linalg.qr(rows)
-        squares = right @ right - ((basis.T @ right) ** 2).sum()
-        evidence = -0.5 * squares - np.log(np.abs(np.diag(factor))).sum()
-        best = max(best, (float(evidence), size))
-    return best[1]
+def prior_deviations(parameters: Sequence[Parameter]) -> np.ndarray:
+    """Standard deviations of the priors of declared parameters about zero, wide ones where there is none, ndarray (P,)."""
+    return np.array([_WIDE * p.plausible if p.prior_std is None else p.prior_std for p in parameters])
 
 
 def smallest_shown(statistics: Statistics, units: Sequence[Unit], settings: Settings) -> np.ndarray:
@@ -483,13 +397,13 @@ def shapes_looked_at_closely(problem: Problem, alone: np.ndarray) -> dict[str, l
             # The best may lie at an end of the range.
             sides = [edges for edges in ((below, best), (best, above)) if edges[0] < edges[1]]
             closer = [value for edges in sides for value in shape.between(*edges, _SHAPES_CLOSER)]
-            found[unit.candidate.key] = [(float(value),) for value in sorted([*tried, *closer])]
+            found[unit.candidate.key] = [(float(value),) for value in sorted({*tried, *closer})]
     return found
 
 
-def lacking(candidate: Candidate, sites: Sites, states: States) -> str:
+def lacking(candidate: Candidate, model: FittedModel, states: States) -> str:
     """Why the measurements cannot test a candidate at all; empty where they might."""
-    missing = sorted(candidate.needs - offered(sites, states))
+    missing = sorted(candidate.needs - model.offered(states))
     if missing:
         return f"no {' and no '.join(missing)} in the data"
     for joint in (candidate.joints or candidate.turning) if candidate.distinct_angles else ():

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.diagnosis.linearize import declared_geometry
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.parameters import parameter_values
+from elastocal.fitting.tolerances import with_prior
 
 if TYPE_CHECKING:
     from elastocal.diagnosis.linearize import Linearized
@@ -37,12 +37,9 @@ class Selected:
     ----------
     effects : tuple of (Candidate, ndarray)
         Found, with normal priors on their parameters, and shape values. Without the competitor, which predicts nothing.
-    declared_size : float
-        Size of declared geometry, in plausible sizes.
     """
 
     effects: tuple[tuple[Candidate, np.ndarray], ...]
-    declared_size: float
 
 
 def selected(linearized: Linearized, model: Model) -> Selected:
@@ -61,8 +58,8 @@ def selected(linearized: Linearized, model: Model) -> Selected:
     for number, scale in zip(model.units, model.scales, strict=True):
         unit = linearized.problem.units[number]
         if unit.candidate:
-            effects.append((_with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
-    return Selected(tuple(effects), linearized.declared_size)
+            effects.append((with_prior(unit.candidate, scale * unit.sizes), np.array(unit.shapes, float)))
+    return Selected(tuple(effects))
 
 
 def with_shapes_of(chosen: Selected, fitted: Fit) -> Selected:
@@ -104,22 +101,16 @@ def fit_with_sizes(
     -------
     Fit
     """
-    model, sized = declared.model, declared_geometry(declared.model)
-    known = tuple(
-        _with_prior(effect, chosen.declared_size * np.array([parameter.plausible for parameter in effect.parameters]))
-        if effect.effect in sized
-        else effect
-        for effect in model.effects
-    )
+    model = declared.model
     effects = [candidate for candidate, _ in chosen.effects]
     start = declared.estimate.with_effects(effects)
     start = replace(start, shapes=(*declared.estimate.shapes, *(shapes for _, shapes in chosen.effects)))
     if near is not None:
         met = {effect.key for effect in near.model.effects}
-        values = zip((*known, *effects), start.coefficients, strict=True)
+        values = zip((*model.effects, *effects), start.coefficients, strict=True)
         coefficients = tuple(near.values_of(effect.key)[0] if effect.key in met else value for effect, value in values)
         start = replace(near.estimate, coefficients=coefficients, shapes=start.shapes)
-    return fit(replace(model, effects=known).with_effects(effects), observations, noise, start, near is not None, **options)
+    return fit(model.with_effects(effects), observations, noise, start, near is not None, **options)
 
 
 def mean_square_left(problem: Problem, model: Model) -> float:
@@ -184,11 +175,3 @@ def remaining_noise(problem: Problem, model: Model, taken: Noise, least: Noise) 
     left = mean_square_left(problem, model)
     factor = float(np.sqrt(max(left * (taken.position_m / least.position_m) ** 2, 1.0)))
     return replace(least.scaled(factor), pose_rad=float(np.sqrt(max(left, 1.0))) * model.pose_error_rad)
-
-
-def _with_prior(candidate: Candidate, deviations: np.ndarray) -> Candidate:
-    parameters = tuple(
-        replace(parameter, prior_std=float(deviation), sized=True)
-        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
-    )
-    return replace(candidate, parameters=parameters)

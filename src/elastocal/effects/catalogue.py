@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
 import elastocal.effects
+from elastocal.effects.protocol import require_unique
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ def candidates_on(sites: Sites) -> dict[str, Candidate]:
         By their keys.
     """
     found = [candidate for module in effects().values() for candidate in module.candidates(sites)]
+    require_unique([candidate.key for candidate in found])
     return {candidate.key: candidate for candidate in found}
 
 

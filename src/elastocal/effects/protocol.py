@@ -15,6 +15,7 @@ Nothing else knows the effects by name: a new module is a new effect.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Protocol
@@ -22,7 +23,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from typing import Concatenate
 
     from elastocal.effects.conditions import Conditions
@@ -144,7 +145,7 @@ class Candidate:
         displacement per unit of the parameter, ndarray (S,). It may go with the total loads of the coordinates that it
         displaces, of no others.
     needs : frozenset of str
-        What must be there, see `conditions.offered`: "load", "external load", "approach", "time", "temperature".
+        What must be there, see `Model.offered`: "load", "external load", "approach", "time", "temperature", "declared base".
     shapes : tuple of Shape
     distinct_angles : int
         How many different angles of its joints the law needs to be distinguishable from a smooth one.
@@ -180,6 +181,18 @@ class Candidate:
         """Unique name, such as ``link_weight@2`` or ``transmission_harmonic@1[orders 3-12]``."""
         where = "@" + "+".join(map(str, self.joints)) if self.joints else ""
         return f"{self.effect}{where}" + (f"[{self.detail}]" if self.detail else "")
+
+
+def at_shapes(key: str, shapes: Iterable[float]) -> str:
+    """Unique name of a candidate at values of its shapes: as many digits as tell any two numbers apart."""
+    return key + "".join(f" {float(shape)!r}" for shape in shapes)
+
+
+def require_unique(names: Sequence[str]) -> None:
+    """Refuse two candidates of one name, a ValueError: what is said of one could not be told from what is said of the other."""
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"candidates of one name: {', '.join(twice)}")
 
 
 class Effect(Protocol):

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
+from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.campaigns.measurements import closest_first, file_columns, shown
 from elastocal.errors import InputError
 from elastocal.exchange.column_names import (
@@ -279,7 +280,10 @@ class _Reader:
         if not np.isfinite(values).all():
             raise self.fault(int(np.argmin(np.isfinite(values))), name, "a number such as -0.25 or 2.5e-3")
         unit = self.units.get(name)
-        return values if unit is None else values * (unit_scale(name, unit) or 1.0)
+        values = values if unit is None else values * (unit_scale(name, unit) or 1.0)
+        if (index := beyond(name, values)) is not None:
+            raise self.fault(index, name, BOUNDS[name].allowed)
+        return values
 
     def integers(self, name: str) -> np.ndarray:
         """ndarray of int (N,)."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import read_text_table
@@ -153,4 +154,7 @@ def _numbers(read: TextTable, name: str) -> np.ndarray:
                 read.path, f"line {read.lines[index]}, column {name}", repr(cell), "a number such as -0.25 or 2.5e-3"
             )
         values[index] = value
+    if (place := beyond(name, values)) is not None:
+        found = repr(read.columns[name][place])
+        raise InputError(read.path, f"line {read.lines[place]}, column {name}", found, BOUNDS[name].allowed)
     return values

@@ -26,6 +26,7 @@ LOOKS = {
     "frames": ("#b9b9b9", "frames and targets only"),
     "declared": (PALETTE[1], "declared model"),
     "effect": (PALETTE[0], "with the effects found"),
+    "kept": ("#777777", "frames and targets only, kept"),
 }
 # Beyond this ratio the smallest bars would be lost on a linear axis.
 _LARGEST_RATIO = 25

@@ -10,6 +10,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.patches import Patch, Rectangle
 
 from elastocal.diagnosis.words import candidate_words, hypotheses_words
+from elastocal.effects.protocol import at_shapes
 from elastocal.figures.style import PALETTE, ink_on, note, panels, styled
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ def shortlist(order: Sequence[int] | np.ndarray, chosen: np.ndarray, count: int 
 def name_in_pairs(table: Mapping[str, np.ndarray], index: int) -> str:
     """Name of a candidate in the confounding table, which has it once for each value of its shape."""
     shape = table["shape"][index]
-    return table["candidate"][index] + (f" {shape:.3g}" if np.isfinite(shape) else "")
+    return at_shapes(table["candidate"][index], [shape] if np.isfinite(shape) else [])
 
 
 def angle_matrix(names: Sequence[str], pairs: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,11 @@ class Case:
     observations: Observations
     model: Model
     candidates: dict[str, Candidate]
+
+    def select(self, kept: np.ndarray) -> Case:
+        """The same without some of the measurements; ndarray of bool (N,)."""
+        some = replace(self.campaign, measurements=self.campaign.measurements.select(kept))
+        return replace(self, campaign=some, observations=averaged(without_outlying_repeats(some.measurements)))
 
 
 def case_from(descriptions: Mapping[str, Any], columns: Mapping[str, np.ndarray]) -> Case:

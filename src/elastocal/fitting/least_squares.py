@@ -68,6 +68,12 @@ def fit(
     return robustly(model, observations, around, noise, start, reweighted=reweighted, settled=settled)
 
 
+def evaluated(model: Model, observations: Observations, noise: Noise, estimate: Estimate) -> Fit:
+    """An estimate as a fit to observations that it need not come of; they have weight one, whatever their distance."""
+    around = kept_conditions(model, estimate, observations)
+    return replace(robustly(model, observations, around, noise, estimate, frozen=True), weights=np.ones(len(observations)))
+
+
 def fit_frames(fitted: Fit, model: Model, observations: Observations, noise: Noise, own_targets: bool = True) -> Estimate:
     """Fit frames and targets of other observations; everything else stays as it was found.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.effects import declared_weight
+from elastocal.effects.conditions import offered
 from elastocal.effects.joint_compliance import candidate as joint_compliance
 from elastocal.mechanics.sites import Sites, sites_of
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
     from elastocal.campaigns.campaign import Campaign, Target
     from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.observations import States
 
 
 @dataclass(frozen=True)
@@ -57,6 +59,10 @@ class Model:
     def identifies_compliance(self) -> bool:
         """Whether the joint compliances are parameters."""
         return any(effect.effect == "joint_compliance" for effect in self.effects)
+
+    def offered(self, states: States) -> frozenset[str]:
+        """What effects may need that some states and the campaign have: see `Candidate.needs`."""
+        return offered(self.sites, states) | (frozenset() if self.fitted_frames else {"declared base"})
 
     def with_effects(self, effects: Iterable[Candidate]) -> Model:
         """The same model with more effects."""

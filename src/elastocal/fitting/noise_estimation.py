@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.fitting.case import noise_facts, noise_from
-from elastocal.fitting.least_squares import fit
+from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.noise import FINEST, Noise, chosen_noise
 from elastocal.fitting.registration import registered
+from elastocal.fitting.tolerances import SIZES, most_probable, with_size
 
 if TYPE_CHECKING:
     from typing import Any
@@ -42,7 +43,12 @@ def noise_of(case: Case) -> dict[str, Any]:
     noise, warnings = chosen_noise(case.campaign, case.model, start, case.campaign.measurements)
     if noise is None:
         assumed = Noise("residual", _ASSUMED_M, _ASSUMED_M, np.zeros(case.campaign.robot.joints))
-        left = fit(case.model, case.observations, assumed, start).residual
+        # The widest prior leaves nearly what none would leave, without parameters that nothing determines.
+        model = with_size(case.model, SIZES[-1])
+        left = fit(model, case.observations, assumed, start).residual
         typical = [max(float(np.sqrt((part**2).mean())), FINEST) for part in (left[:, :3], left[:, -3:])]
         noise = replace(assumed, position_m=typical[0], orientation_rad=typical[1])
+        # What parameters have taken of it is given back.
+        wide = fit(model, case.observations, noise, start, settled=ON_THE_WAY)
+        noise = noise.scaled(most_probable(wide)[1])
     return {"noise": noise_facts(noise), "warnings": warnings}

@@ -160,6 +160,25 @@ def each_approach(measurements: Measurements) -> tuple[Observations, np.ndarray]
     return _observations(measurements, single), groups_of(key[groups_of(single)[0]])[1]
 
 
+def single_observations(measurements: Measurements) -> Observations:
+    """Every measurement as an observation in a state of its own, in the order of the measurements."""
+    states = States(
+        measurements.session,
+        measurements.pose,
+        measurements.load,
+        measurements.joint_angles,
+        measurements.wrench,
+        np.ones(len(measurements), int),
+        measurements.approach,
+        measurements.time_s,
+        measurements.temperature_c,
+        measurements.row,
+    )
+    rotation = None if measurements.rotation_vector is None else Rotation.from_rotvec(measurements.rotation_vector).as_matrix()
+    spread = None if measurements.u95_m is None else standard_uncertainty(measurements.u95_m)
+    return Observations(states, np.arange(len(measurements)), measurements.target, measurements.position, rotation, spread)
+
+
 def without_outlying_repeats(measurements: Measurements) -> Measurements:
     """Measurements without those that are far from the other repeats of their state and target.
 
@@ -198,9 +217,21 @@ def _medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
     return 0.5 * (rising[start + (count - 1) // 2] + rising[start + count // 2])
 
 
-def _approached_alike(measurements: Measurements) -> np.ndarray:
+def _approached_alike(measurements: Measurements | States) -> np.ndarray:
     key = np.column_stack([measurements.session, measurements.pose, measurements.load])
     return key if measurements.approach is None else np.column_stack([key, measurements.approach])
+
+
+def measured_in(some: Measurements | Observations, others: Measurements | Observations, chosen: np.ndarray) -> np.ndarray:
+    """Which of some measurements, or averages of them, are of the same state and target as those chosen of others, (N,)."""
+    mine, theirs = _states_and_targets(some), _states_and_targets(others)
+    group = groups_of(np.concatenate([mine, theirs]))[1]
+    return np.isin(group[: len(mine)], group[len(mine) :][chosen])
+
+
+def _states_and_targets(some: Measurements | Observations) -> np.ndarray:
+    states, each = (some.states, some.state) if isinstance(some, Observations) else (some, slice(None))
+    return np.column_stack([_approached_alike(states)[each], some.target])
 
 
 def _observations(measurements: Measurements, key: np.ndarray) -> Observations:

@@ -26,6 +26,8 @@ _STEPS = 30
 _HALVINGS = 6
 # Largest step that remains, in standard errors.
 SETTLED = 1e-3
+# Loads are those of the step before: of a step so much is still to come, at most, by deflection over reach.
+_LAGGING = 1e-2
 # Share of the slope by which a step must lower the objective (Armijo); a parabola gives a half.
 _LEAST_FALL = 0.1
 # Of the objective. In a fit of a thousand rows a thousandth of a standard error in one parameter makes half of that.
@@ -106,7 +108,8 @@ def robustly(
 
     # Given what goes with the loads that other parameters make, and shapes, the residual is nearly linear in all others.
     through = {effect.key for effect in model.effects if effect.effect == "joint_compliance" or "load" in effect.needs}
-    bending = nonlinear | np.array([owner in through for owner, _ in parameters(model, estimate)], bool)
+    yielding = np.array([owner in through for owner, _ in parameters(model, estimate)], bool)
+    bending = nonlinear | yielding
 
     def solved(gram: np.ndarray, along: np.ndarray, present: np.ndarray, frozen: bool | np.ndarray) -> Solved:
         """Gauss-Newton step, covariance and what is held, as of `solve_normal`, within the ranges of the shapes."""
@@ -136,7 +139,9 @@ def robustly(
         deviation = np.sqrt(np.diag(covariance))
         # Standard errors of the errors that are there, which the noise may be less than.
         small = settled * (scale * deviation) + (deviation == 0)
-        converged = bool(step_number or reweighted) and bool((np.abs(step) <= small).all())
+        # A small step under the loads of before a large one says nothing of what these loads still bring about.
+        coming = np.maximum(np.abs(step), _LAGGING * np.abs(last) * plausible * yielding)
+        converged = bool(step_number or reweighted) and bool((coming <= small).all())
         if converged:
             estimate = stepped(model, estimate, step)
             break

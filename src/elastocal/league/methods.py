@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.fitting.least_squares import fit
 from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import fit_declared
 from elastocal.league.folds import RANDOM
 from elastocal.remainder.catalogue import regressions
 from elastocal.remainder.corrected import Plan, corrected
@@ -115,7 +115,7 @@ def fitted_physics(physics: str, case: Case) -> Fit:
     Fit
     """
     model = replace(case.model, effects=()) if physics == FRAMES else case.model
-    return fit(model, case.observations, estimated_noise(case)[0])
+    return fit_declared(model, case.observations, estimated_noise(case)[0])
 
 
 def entered(method: Method, fitted: Fit, case: Case, held_out: Case, split: str, seed: int) -> Entry:

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from pathlib import Path
     from typing import Any
 
-    from elastocal.campaigns.campaign import Measurements
+    from elastocal.campaigns.campaign import Campaign, Measurements
 
 
 def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements, Measurements]:
@@ -36,13 +36,13 @@ def load_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[s
     InputError
     """
     campaign = read_campaign(folder, robots_folder, effects())
-    descriptions = _descriptions(folder, robots_folder)
+    descriptions = _descriptions(folder, robots_folder, campaign)
     training, held_out = split(campaign)
     other = held_out_campaign(campaign, folder, robots_folder, effects())
     if other is None:
         return descriptions | {"held_out": None}, training, held_out
     elsewhere = f"{folder}/{campaign.holdout['campaign']}"
-    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder)}, training, other.measurements
+    return descriptions | {"held_out": _descriptions(elsewhere, robots_folder, other)}, training, other.measurements
 
 
 def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[dict[str, Any], Measurements]:
@@ -63,11 +63,13 @@ def load_whole_campaign(folder: str | Path, robots_folder: str | Path) -> tuple[
     ------
     InputError
     """
-    return _descriptions(folder, robots_folder), read_campaign(folder, robots_folder, effects()).measurements
+    campaign = read_campaign(folder, robots_folder, effects())
+    return _descriptions(folder, robots_folder, campaign), campaign.measurements
 
 
-def _descriptions(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
+def _descriptions(folder: str | Path, robots_folder: str | Path, campaign: Campaign) -> dict[str, Any]:
     document, robot_path = read_descriptions(folder, robots_folder)
     # What a campaign may leave out gets its default here, so that no later step has to know what its absence means.
     complete = {"compliance": "nominal", "declared": [], "holdout": DEFAULT_HOLDOUT} | document
+    complete |= {"table": campaign.table, "header_line": campaign.header_line}
     return {"source": f"{folder}/{DOCUMENT}", "campaign": complete, "robot": read_document(robot_path)}

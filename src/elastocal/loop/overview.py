@@ -1,12 +1,13 @@
 """What a campaign can show, before anything is diagnosed: what was read, what is identified and testable, what is suspicious.
 
-Held-out poses are counted and no more.
+Held-out poses are counted, and their joint angles compared with those fitted; what was measured at them is not looked at.
 """
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +15,15 @@ import numpy as np
 from elastocal.application.scope import calibrated_on, campaign_accuracy
 from elastocal.campaigns.columns import columns_of
 from elastocal.data_checks.catalogue import faults
+from elastocal.diagnosis.gross_errors import entries_of, gross_errors, warnings_of
+from elastocal.diagnosis.kept_rows import first_kept
 from elastocal.diagnosis.linearize import linearized, searched_part
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import case_from
 from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.least_squares import fit
-from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.tolerances import effective_parameters
 from elastocal.loop.loading import load_campaign
+from elastocal.validation.fitted_range import repeat_warnings
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,25 +51,27 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
     -------
     dict
         ``campaign, robot, joints, targets, frame, measured``; ``training`` and ``held_out`` with their ``poses``; ``states,
-        measurements, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad); ``faults``
-        (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters`` and ``held`` (those that are not
-        identifiable); ``compliance`` (value, relative standard error of each joint) where identified; ``testable`` and
-        ``untestable`` (how many candidate effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that
-        a robot is predicted to have which is corrected by the declared model, if nothing is missing in it
-        (`Accuracy.document`), None where the data are at fault.
+        measurements, numbers, loads, repeats, sessions, largest_force_N``; ``noise`` (source, position_m, orientation_rad);
+        ``faults`` (name, sentence, decisive); ``residual_rms_m`` of the declared model; ``parameters``,
+        ``effective_parameters`` (without what priors decide) and ``held`` (those that are not identifiable); ``compliance``
+        (value, relative standard error of each joint) where identified; ``testable`` and ``untestable`` (how many candidate
+        effects, by reason); ``suspicious``, sentences; ``diagnosable``; ``accuracy`` that a robot is predicted to have which is
+        corrected by the declared model, if nothing is missing in it (`Accuracy.document`), None where the data are at fault.
 
     Raises
     ------
     InputError
     """
     descriptions, training, held_out = load_campaign(folder, robots_folder)
-    case = case_from(descriptions, columns_of(training))
+    whole, settings = case_from(descriptions, columns_of(training)), Settings()
+    part = first_kept(whole, settings)
+    errors = gross_errors(part.declared, part.noise, whole.campaign.measurements, part.kept, settings)
+    left_out = entries_of(replace(errors, gross=~part.kept), whole.campaign, held_out=False)
+    case, noise, warnings, declared = part.case, part.noise, part.warnings, part.declared
     campaign, states = case.campaign, case.observations.states
     found = faults(campaign, campaign.measurements)
-    noise, warnings = estimated_noise(case)
-    declared = fit(case.model, case.observations, noise)
     decisive = any(fault.decisive for fault in found)
-    facts: dict[str, Any] = {
+    facts: dict[str, Any] = _identified(declared) | {
         "campaign": campaign.name,
         "robot": campaign.robot.name,
         "joints": campaign.robot.joints,
@@ -77,6 +82,7 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         "held_out": {"poses": _poses(held_out.session, held_out.pose)},
         "states": len(states),
         "measurements": len(training),
+        "numbers": declared.residual.size,
         "loads": sorted({int(load) for load in states.load}),
         "repeats": int(states.repeats.max()),
         "sessions": len(np.unique(states.session)),
@@ -92,9 +98,15 @@ def overview(folder: str | Path, robots_folder: str | Path) -> dict[str, Any]:
         facts["accuracy"] = campaign_accuracy(fitted, states).document()
     return (
         facts
-        | _identified(declared)
         | _testable(case, declared)
-        | {"suspicious": [*warnings, *_suspicious(campaign, facts, case)]}
+        | {
+            "suspicious": [
+                *warnings,
+                *warnings_of(left_out),
+                *_suspicious(campaign, facts, case, settings),
+                *repeat_warnings(training, held_out),
+            ]
+        }
     )
 
 
@@ -106,6 +118,7 @@ def _identified(declared: Fit) -> dict[str, Any]:
     named = [f"{owner} {parameter.name}" for owner, parameter in declared.parameters]
     found: dict[str, Any] = {
         "parameters": int((~declared.held).sum()),
+        "effective_parameters": effective_parameters(declared),
         "held": [name for name, held in zip(named, declared.held, strict=True) if held],
     }
     if declared.model.identifies_compliance:
@@ -126,8 +139,16 @@ def _testable(case: Case, declared: Fit) -> dict[str, Any]:
     return {"testable": len(case.candidates) - len(found.untestable), "untestable": dict(reasons.most_common())}
 
 
-def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case) -> list[str]:
+def _suspicious(campaign: Campaign, facts: dict[str, Any], case: Case, settings: Settings) -> list[str]:
     found, states = [], case.observations.states
+    effective, poses = facts["effective_parameters"], facts["training"]["poses"]
+    least = int(np.ceil(poses * settings.numbers_a_parameter * effective / facts["numbers"]))
+    if least > poses:
+        found.append(
+            f"{poses} poses are few for {facts['parameters']} parameters, of which they determine about {effective:.0f}, by"
+            f" {facts['numbers']} numbers: other poses will be off by more than these. Measure about {least} poses to fit, or"
+            " orientations too, or declare fewer errors"
+        )
     if facts["repeats"] == 1:
         found.append("no pose is repeated: the noise is what the campaign declares, or what the model leaves")
     if facts["held_out"]["poses"] < FEWEST_HELD_OUT:

@@ -116,6 +116,7 @@ def residuals(joints: int) -> TableSchema:
         (
             *_IDENTITY,
             Column("held_out", "bool", "", "whether no step but the last has seen it"),
+            Column("gross_error", "bool", "", "whether no model explains the row, so that every fit and error leaves it out"),
             Column("outside_range", "bool", "", "whether its held-out pose lies outside the range of the fitted poses"),
             Column("time_s", "float64", "s", "time since any instant", missing=True),
             *_angles_and_wrench(joints),

@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 # The longest serial arms of the market reach 4.7 m and their lengths, the column's included, sum to 7; any of them written in
 # centimetres, inches or millimetres is beyond this.
 LONGEST_REACH_M = 10.0
+# In orbit there is still a microgravity of some 1e-5 m/s².
+_LEAST_GRAVITY = 1e-6
 
 
 def robot_from_document(document: Mapping[str, Any], source: str = "robot") -> Robot:
@@ -210,8 +212,8 @@ def _link_of(mass: Mass) -> int:
 
 
 def _gravity(vector: Sequence[float], source: str) -> tuple[float, ...]:
-    if not any(vector):
-        raise InputError(source, "gravity_m_s2", str(list(vector)), "a vector with a length, in base axes")
+    if math.hypot(*vector) < _LEAST_GRAVITY:
+        raise InputError(source, "gravity_m_s2", str(list(vector)), f"a vector in base axes of {_LEAST_GRAVITY:g} m/s² or more")
     return tuple(map(float, vector))
 
 

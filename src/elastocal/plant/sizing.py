@@ -92,12 +92,13 @@ class Yardstick:
         if free_frame:
             columns += self._frame_columns()
         weights = [self._turned_by(None, turn) for turn in _turns_of_weights(machine, self._rest, robot, declared)]
+        height = len(columns[0])
         # A column of nothing, such as the compliance of a joint that no load turns, absorbs nothing.
         columns = [column / np.linalg.norm(column) for column in columns if column.any()]
         weights = [column for column in weights if column.any()]
-        stacked = np.zeros((len(columns[0]) + len(weights), len(columns) + len(weights)))
-        stacked[: len(columns[0])] = np.array([*columns, *weights]).T
-        stacked[len(columns[0]) :, len(columns) :] = np.eye(len(weights))
+        stacked = np.zeros((height + len(weights), len(columns) + len(weights)))
+        stacked[:height] = np.array([*columns, *weights]).reshape(-1, height).T
+        stacked[height:, len(columns) :] = np.eye(len(weights))
         self._absorbed, self._priors = np.linalg.qr(stacked)[0], len(weights)
 
     def change(self, robot: PhysicalRobot) -> np.ndarray:

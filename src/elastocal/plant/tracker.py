@@ -7,6 +7,8 @@ import numpy as np
 from elastocal.plant.arm import turned
 
 _HOUR_S = 3600.0
+# Of one axis, so that the whole is 0.3 mrad and 0.2 mm in the mean square.
+_TILT_RAD, _SHIFT_M = 3e-4 / np.sqrt(3.0), 2e-4 / np.sqrt(3.0)
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,11 @@ class Move:
         return later * np.array(self.shift_m), turned(later * np.array(self.turn_rad))
 
 
+def misplaced_base(draws: np.random.Generator) -> Move:
+    """A base frame that was found badly: tilted by about 0.3 mrad and shifted by about 0.2 mm, all measurements alike."""
+    return Move(-np.inf, tuple(_SHIFT_M * draws.standard_normal(3)), tuple(_TILT_RAD * draws.standard_normal(3)))
+
+
 @dataclass(frozen=True)
 class Tracker:
     """A laser tracker; the default only has noise.
@@ -70,6 +77,8 @@ class Tracker:
         Rotation vector of its own axes in the base's; measurements are in the base frame unless the design says otherwise.
     drift : Drift or None
     move : Move or None
+    misplaced : Move or None
+        Of the base frame as the tracker has it against the robot's own, about its origin; see `misplaced_base`.
     refraction_per_m : float
         Bent light: a target at range r is read at r + k r^2.
     scale : float
@@ -87,6 +96,7 @@ class Tracker:
     frame_turn: tuple[float, ...] = (0.0, 0.0, 0.0)
     drift: Drift | None = None
     move: Move | None = None
+    misplaced: Move | None = None
     refraction_per_m: float = 0.0
     scale: float = 0.0
     outliers: float = 0.0
@@ -109,7 +119,8 @@ class Tracker:
         sight = position - np.array(self.stand_m)
         far = np.linalg.norm(sight, axis=-1, keepdims=True)
         position = (1.0 + self.scale) * position + self.refraction_per_m * far * sight
-        for motion, about in ((self.drift, np.zeros(3)), (self.move, np.array(self.stand_m))):
+        stand, base = np.array(self.stand_m), np.zeros(3)
+        for motion, about in ((self.drift, base), (self.move, stand), (self.misplaced, base)):
             if motion is not None:
                 shift, turn = motion.moved(time_s)
                 position = np.einsum("sij,stj->sti", turn, position - about) + about + shift[:, None]

@@ -129,6 +129,11 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
     kind, found, heldout = verdict["verdict"], verdict["effects"], verdict["heldout"]
     if any(effect["family"] == OF_DATA for effect in found):
         return ["Correct the data as stated, in the file or where they are exported, and diagnose again.", *_transforms(found)]
+    if verdict["kept"] == "frames":
+        return [
+            "Leave the robot as its file has it: a calibration by these measurements predicts poses that were left out worse "
+            "than none. Measure more poses all over the joint ranges, and diagnose again."
+        ]
     if kind == "not_testable":
         return [
             "Measure more: more poses all over the joint ranges, repeats, loads if the robot carries any. The section on what "
@@ -190,18 +195,30 @@ def held_out_sentence(verdict: Mapping[str, Any], steps: Sequence[Mapping[str, A
     poses = counted(held_out["poses"], "pose")
     floor = held_out["noise_floor_rms_m"]
     noise = f" Noise alone leaves {length(floor)}." if floor else ""
-    ends = [step for step in steps if step["kind"] in ("declared", "effect")]
+    ends = [step for step in steps if step["kind"] != "frames"]
     if len(ends) < 2:
         error = _with_interval(after, ends[-1])
-        return f"On {poses} that were not fitted the declared model leaves an RMS error of {error}.{noise}"
-    low, high = (100 * value for value in held_out["reduction_ci95"])
+        worth = worth_sentence(held_out)
+        return f"On {poses} that were not fitted the declared model leaves an RMS error of {error}. {worth}{noise}"
+    named = [_with_interval(before, ends[0]), _with_interval(after, ends[-1])]
+    change = _change(before, after, held_out["reduction_ci95"], named)
+    return f"On {poses} that were not fitted the RMS error {change}. {worth_sentence(held_out)}{noise}"
+
+
+def worth_sentence(held_out: Mapping[str, Any]) -> str:
+    """What calibration is worth against doing nothing, on held-out poses; ``heldout`` of verdict.json."""
+    nothing, after = held_out["uncalibrated"]["rms_m"], held_out["after"]["rms_m"]
+    if nothing == after:
+        return f"The robot is as good uncalibrated, at {length(after)} RMS with nothing but its placement fitted."
+    change = _change(nothing, after, held_out["uncalibrated"]["reduction_ci95"], [length(nothing), length(after)])
+    return f"Against the uncalibrated robot, with nothing but its placement fitted, it {change}."
+
+
+def _change(before: float, after: float, interval: Sequence[float], named: Sequence[str]) -> str:
     fall = 100 * (1 - after / before)
     verb, by = ("falls", fall) if fall >= 0 else ("grows", -fall)
-    interval = f"95 % interval of the reduction: {minus(f'{low:.0f}')} to {minus(f'{high:.0f}')} %"
-    return (
-        f"On {poses} that were not fitted the RMS error {verb} from {_with_interval(before, ends[0])} to "
-        f"{_with_interval(after, ends[-1])}, by {by:.0f} % ({interval}).{noise}"
-    )
+    low, high = (minus(f"{100 * value:.0f}") for value in interval)
+    return f"{verb} from {named[0]} to {named[1]}, by {by:.0f} % (95 % interval of the reduction: {low} to {high} %)"
 
 
 def _found(effect: Mapping[str, Any]) -> str:

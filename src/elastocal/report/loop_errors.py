@@ -87,7 +87,7 @@ def as_judged(
     -------
     list of dict
     """
-    ends = [step for step in steps if step["kind"] in ("declared", "effect")]
+    ends = [step for step in steps if step["kind"] != "frames"]
     judged = {
         f"{stage}_rms_m_{end}": step[f"heldout_rms_m_{end}"]
         for stage, step in (("before", ends[0]), ("after", ends[-1]))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import blas
 
-from elastocal.campaigns.joint_space import beyond_range
+from elastocal.campaigns.joint_space import beyond_range, repeated
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.linearization import linearize
 from elastocal.fitting.memory import observations_at_once
@@ -15,6 +15,7 @@ from elastocal.fitting.observations import part_at, parts_of, state_clusters
 from elastocal.validation.placing import carried_over, placed, same_campaign
 
 if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
     from elastocal.fitting.model import Estimate, Model
@@ -56,7 +57,7 @@ def outside_fitted_range(
     return outside | (variance > fitted_variance.max(initial=0.0))
 
 
-def _angles_of_poses(states: States) -> np.ndarray:
+def _angles_of_poses(states: States | Measurements) -> np.ndarray:
     """Joint angles of each pose, (P, n): its loads and repeats share them."""
     return states.joint_angles[np.unique(state_clusters(states), return_index=True)[1]]
 
@@ -78,10 +79,19 @@ def outside_poses(fitted: Fit, case: Case, held_out: Case) -> np.ndarray:
     """
     unseen = held_out.observations
     if not same_campaign(case, held_out):
-        fitted = carried_over(fitted, unseen.states)
+        fitted = carried_over(fitted, held_out.model, unseen.states)
     variances = predictive_variances(fitted, case.observations, *placed(fitted, case, held_out), unseen)
     outside = outside_fitted_range(case.observations.states, unseen.states, *variances)
     return np.bincount(state_clusters(unseen.states), outside) > 0
+
+
+def repeat_warnings(fitted_states: States | Measurements, states: States | Measurements) -> list[str]:
+    """What to say of poses for the test whose configurations were fitted as well, see `joint_space.repeated`; empty of none."""
+    again = repeated(_angles_of_poses(fitted_states), _angles_of_poses(states))
+    if not again.any():
+        return []
+    count = f"{again.sum()} of {len(again)}" if not again.all() else f"all {len(again)}"
+    return [f"{count} validation poses repeat configurations that were fitted: these errors say nothing of other poses"]
 
 
 def beyond_campaign(fitted_states: States, joint_angles: np.ndarray, wrench: np.ndarray | None) -> np.ndarray:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.effects.conditions import offered
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import select_states
 
@@ -36,7 +35,7 @@ def placed(fitted: Fit, case: Case, part: Case) -> tuple[Model, Estimate]:
     """
     if same_campaign(case, part):
         return fitted.model, placed_estimate(fitted, part.observations)
-    carried = carried_over(fitted, part.observations.states)
+    carried = carried_over(fitted, part.model, part.observations.states)
     model = replace(part.model, nominal_compliance=fitted.model.nominal_compliance, effects=carried.model.effects)
     return model, fit_frames(carried, model, part.observations, fitted.noise)
 
@@ -76,12 +75,13 @@ def placed_estimate(fitted: Fit, observations: Observations) -> Estimate:
     )
 
 
-def carried_over(fitted: Fit, states: States) -> Fit:
+def carried_over(fitted: Fit, model: Model, states: States) -> Fit:
     """A fit without the effects that another campaign cannot have, or does not record: a wandering tracker, a temperature.
 
     Parameters
     ----------
     fitted : Fit
+    model : Model
     states : States
         Of the other campaign.
 
@@ -89,11 +89,11 @@ def carried_over(fitted: Fit, states: States) -> Fit:
     -------
     Fit
     """
-    there = offered(fitted.model.sites, states) | {"load", "external load"}
+    there = model.offered(states) | {"load", "external load"}
     kept = [n for n, effect in enumerate(fitted.model.effects) if not effect.of_setup and effect.needs <= there]
-    model = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
+    known = replace(fitted.model, effects=tuple(fitted.model.effects[n] for n in kept))
     coefficients, shapes = fitted.estimate.coefficients, fitted.estimate.shapes
     estimate = replace(
         fitted.estimate, coefficients=tuple(coefficients[n] for n in kept), shapes=tuple(shapes[n] for n in kept)
     )
-    return replace(fitted, model=model, estimate=estimate)
+    return replace(fitted, model=known, estimate=estimate)

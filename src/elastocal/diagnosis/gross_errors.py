@@ -1,0 +1,300 @@
+"""Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
+
+A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
+studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows
+exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is the larger of one
+standard deviation and of two robust estimates of scale, so that a model that does not fit makes no row stand out.
+
+Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
+whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
+so on. Rows that the final model explains after all are taken back.
+
+References
+----------
+.. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
+.. [2] Barnett, V. and Lewis, T., Outliers in Statistical Data, section 8.2, Wiley, 1994.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from elastocal.diagnosis.evidence import scale_weights
+from elastocal.diagnosis.linearize import prior_deviations
+from elastocal.diagnosis.statistics import Products
+from elastocal.fitting.displacement import conditions
+from elastocal.fitting.linearization import linearize
+from elastocal.fitting.memory import observations_at_once
+from elastocal.fitting.noise import measurement_covariances
+from elastocal.fitting.observations import part_at, parts_of, select_states, single_observations, spread_poses
+from elastocal.fitting.prediction import residuals
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Campaign, Measurements
+    from elastocal.diagnosis.linearize import Linearized
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
+
+# Shares of the distances from which the scale is estimated: the second sees tails that are heavier than normal ones.
+_SCALE_QUANTILES = (0.5, 0.75)
+# Least share of a row's variance that is its own and not that of the parameters fitted to it.
+_LEAST_OWN = 0.01
+# Rows of which the scale is estimated at most, and of which the parameters' variance matters.
+_MOST = 20_000
+# Gross errors that have a sentence each among the warnings; the table of residuals has all.
+_MOST_NAMED = 10
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Rows beside a model.
+
+    Attributes
+    ----------
+    residual : ndarray (N, rows)
+        m and rad, base axes.
+    distance : ndarray (N,)
+        From what the other rows predict, in robust standard deviations.
+    gross : ndarray of bool (N,)
+    """
+
+    residual: np.ndarray
+    distance: np.ndarray
+    gross: np.ndarray
+
+    @classmethod
+    def none(cls, count: int, rows: int) -> Deviations:
+        """Of rows that nothing is said of."""
+        return cls(np.zeros((count, rows)), np.zeros(count), np.zeros(count, bool))
+
+
+def deviations(
+    model: Model,
+    estimate: Estimate,
+    measurements: Measurements,
+    noise: Noise,
+    covariance: np.ndarray | None,
+    fitted: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of rows and their distances from the prediction, in standard deviations by the noise given.
+
+    ``covariance`` is that of the parameters, None where it does not matter; ``fitted`` says which rows the parameters were
+    fitted to, (N,): their residuals are smaller by it, those of all others larger.
+    """
+    single = single_observations(measurements)
+    near = np.ones(len(single), bool)
+    if len(single) > _MOST:
+        covariance, near = None, spread_poses(single, _MOST)
+    residual, distance = np.empty((len(single), model.rows)), np.empty(len(single))
+    sensor = np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows]
+    for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
+        part = part_at(single, states, seen)
+        residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
+        # No less than the whole distance, as the sensor is only a part of the variance.
+        distance[seen] = np.linalg.norm(residual[seen] / sensor, axis=1)
+    limit = np.quantile(distance[near], _SCALE_QUANTILES[-1])
+    closely = near | (distance > limit)
+    some = select_states(single, closely)
+    parts = parts_of(some, observations_at_once(model.rows, 0 if covariance is None else len(covariance)))
+    distance[closely] = np.concatenate(
+        [_distances(model, estimate, part_at(some, *edges), noise, covariance, fitted[closely][edges[1]]) for edges in parts]
+    )
+    return residual, distance
+
+
+def _distances(
+    model: Model, estimate: Estimate, some: Observations, noise: Noise, covariance: np.ndarray | None, fitted: np.ndarray
+) -> np.ndarray:
+    line = linearize(model, estimate, some, conditions(model, estimate, some.states))
+    spread = noise.spread(some)
+    jacobian = line.coordinate_jacobian[..., : model.sites.joints]
+    variance = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+    variance += noise.pose_rad**2 * (jacobian @ jacobian.transpose(0, 2, 1))
+    root = np.linalg.cholesky(variance)
+    white = np.linalg.solve(root, line.residual[..., None])[..., 0]
+    if covariance is None:
+        return np.linalg.norm(white, axis=1)
+    seen = np.linalg.solve(root, line.sensitivities)
+    share, axes = np.linalg.eigh(seen @ covariance @ seen.transpose(0, 2, 1))
+    own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
+    along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
+    return np.sqrt((along**2 / own).sum(axis=1))
+
+
+def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
+    """Distances in units of their scale, and which of them are gross errors, (N,).
+
+    ``rows`` says how many numbers a distance is of. Those not ``kept`` count as large for the scale. Where more than
+    `gross_error_share` of all stand out, none does: then it is the model that is wrong.
+    """
+    ordered = np.sort(np.where(kept, distance, np.inf))
+    usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
+    scale = np.max(usual[np.isfinite(usual)] / np.sqrt(chi2.ppf(_SCALE_QUANTILES, rows))[np.isfinite(usual)], initial=1.0)
+    gross = distance > scale * _limit(len(distance), rows, settings)
+    return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
+
+
+def _limit(count: int, rows: int, settings: Settings) -> float:
+    """Standard deviations that the largest of so many good rows exceeds with the probability of the settings."""
+    return float(np.sqrt(chi2.isf(settings.gross_error_level / count, rows)))
+
+
+def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
+    """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
+    noise, covariance = _without_their_share(fitted, noise)
+    found = deviations(fitted.model, fitted.estimate, measurements, noise, covariance, kept)
+    return Deviations(found[0], *beyond_chance(found[1], fitted.model.rows, kept, settings))
+
+
+def _without_their_share(fitted: Fit, noise: Noise) -> tuple[Noise, np.ndarray]:
+    """Noise and covariance by which rows are judged: what the fit leaves may be the very errors that are looked for."""
+    smaller = (noise.position_m / fitted.noise.position_m) ** 2
+    return replace(noise, pose_rad=fitted.noise.pose_rad), smaller * fitted.covariance
+
+
+def held_out_gross_errors(
+    fitted: Fit, there: tuple[Model, Estimate], noise: Noise, held_out: Case, settings: Settings
+) -> Deviations:
+    """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them."""
+    model, estimate = there
+    measurements = held_out.campaign.measurements
+    noise, covariance = _without_their_share(fitted, noise)
+    carried = model is not fitted.model or estimate is not fitted.estimate
+    unseen, every = np.zeros(len(measurements), bool), np.ones(len(measurements), bool)
+    residual, distance = deviations(model, estimate, measurements, noise, None if carried else covariance, unseen)
+    return Deviations(residual, *beyond_chance(distance, model.rows, every, settings))
+
+
+def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
+    """Which observations all candidates together do not explain, ndarray of bool (M,).
+
+    The whitened residual has the covariance I + X D X' + W S W', with X the declared sensitivities, D their priors, W those
+    of all candidates and S their mean square sizes. Observations are taken out, the worst first, until what is left agrees;
+    then those come back that it predicts.
+    """
+    products, about = problem.products, problem.about
+    observed, own = about.residual.shape
+    kept = np.ones(observed, bool)
+    if not isinstance(products, Products):
+        return ~kept
+    rows = products.rows
+    deviation = prior_deviations([parameter for owner, parameter in about.parameters if owner not in problem.candidates])
+    sizes = np.sqrt(np.exp(scale_weights(settings.scales, settings)) @ np.square(settings.scales))
+    declared = (rows.declared * deviation).reshape(about.residual.size, -1)
+    columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
+    covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
+    precision, limit = _precision(covariance, declared)[0], _limit(observed, own, settings)
+    while kept.mean() > 1.0 - settings.gross_error_share:
+        distance = _deletion_distances(precision, residual, kept, own)
+        worst = int(np.argmax(distance))
+        if distance[worst] <= limit:
+            break
+        kept[worst] = False
+        precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
+    if not kept.all():
+        covariance = covariance + _pose_error(problem, covariance, declared, np.repeat(kept, own))
+    whole = _precision(covariance, declared)[0]
+    while not kept.all():
+        out = np.flatnonzero(np.repeat(~kept, own))
+        distance = _deletion_distances(_without(whole, out), residual, kept, own)
+        variance = np.linalg.inv(whole[np.ix_(out, out)])
+        rest = (variance @ (whole @ residual)[out]).reshape(-1, own, 1)
+        distance[~kept] = np.sqrt((rest * np.linalg.solve(_blocks(variance, own), rest)).sum(axis=(1, 2)))
+        back = ~kept & ~beyond_chance(distance, own, kept, settings)[1]
+        if not back.any():
+            break
+        kept |= back
+    return ~kept
+
+
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Inverse of a covariance to which that of declared columns of unit size is added, and the logarithm of its determinant."""
+    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
+    basis, triangle = np.linalg.qr(np.concatenate([inverse @ declared, np.eye(declared.shape[1])]))
+    beside = basis[: len(declared)].T @ inverse
+    log_det = 2.0 * (np.log(np.abs(np.diag(triangle))).sum() - np.log(np.diag(inverse)).sum())
+    return inverse.T @ inverse - beside.T @ beside, float(log_det)
+
+
+def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
+    """The inverse covariance of the rows without some, in whose place it is zero."""
+    left = precision - precision[:, out] @ np.linalg.solve(precision[np.ix_(out, out)], precision[out])
+    left[out], left[:, out] = 0.0, 0.0
+    return left
+
+
+def _pose_error(problem: Linearized, covariance: np.ndarray, declared: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Covariance of the error common to a pose, at the size that makes the rows known most probable."""
+    assert isinstance(problem.products, Products)
+    rows = problem.products.rows
+    residual, own = rows.residual.ravel()[known], rows.residual.shape[1]
+    jacobian, pose = rows.jacobian.reshape(len(known), -1), np.repeat(rows.pose, own)
+    common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
+    best = (-np.inf, 0.0)
+    for tau in problem.problem.statistics.pose_error_rad:
+        precision, log_det = _precision((covariance + tau**2 * common)[np.ix_(known, known)], declared[known])
+        best = max(best, (-0.5 * (float(residual @ precision @ residual) + log_det), float(tau)))
+    return best[1] ** 2 * common
+
+
+def _deletion_distances(precision: np.ndarray, residual: np.ndarray, kept: np.ndarray, own: int) -> np.ndarray:
+    """Length of the deletion residual of each observation that is kept, 0 of others, (M,)."""
+    blocks = np.where(kept[:, None, None], _blocks(precision, own), np.eye(own))
+    along = (precision @ residual).reshape(-1, own, 1)
+    squares = (along * np.linalg.solve(blocks, along)).sum(axis=(1, 2))
+    return np.where(kept, np.sqrt(np.maximum(squares, 0.0)), 0.0)
+
+
+def _blocks(matrix: np.ndarray, own: int) -> np.ndarray:
+    """Blocks on the diagonal, ndarray (M, own, own)."""
+    every = np.arange(len(matrix) // own)
+    return matrix.reshape(len(every), own, len(every), own)[every, :, every]
+
+
+def entries_of(found: Deviations, campaign: Campaign, held_out: bool) -> list[dict[str, Any]]:
+    """Gross errors as verdict.json has them, each with its row, its size and a sentence."""
+    measurements = campaign.measurements
+    return [
+        {
+            "rows": [int(measurements.row[place])],
+            "session": int(measurements.session[place]),
+            "pose": int(measurements.pose[place]),
+            "load": int(measurements.load[place]),
+            "target": campaign.targets[measurements.target[place]].name,
+            "held_out": held_out,
+            "distance_m": float(np.linalg.norm(found.residual[place, :3])),
+            "turn_rad": float(np.linalg.norm(found.residual[place, 3:])) if found.residual.shape[1] > 3 else None,
+            "standard_deviations": float(found.distance[place]),
+            "detail": _sentence(found, campaign, int(place)),
+        }
+        for place in np.flatnonzero(found.gross)
+    ]
+
+
+def warnings_of(entries: list[dict[str, Any]]) -> list[str]:
+    """A sentence for each of the first gross errors, and how many more there are."""
+    more = len(entries) - _MOST_NAMED
+    return [entry["detail"] for entry in entries[:_MOST_NAMED]] + ([f"{more} further rows left out"] if more > 0 else [])
+
+
+def _sentence(found: Deviations, campaign: Campaign, place: int) -> str:
+    measurements, away = campaign.measurements, 1e3 * float(np.linalg.norm(found.residual[place, :3]))
+    size = f"{away:.3g} mm" if away < 1e3 else f"{1e-3 * away:.3g} m"
+    if found.residual.shape[1] > 3:
+        size += f" and {1e3 * np.linalg.norm(found.residual[place, 3:]):.3g} mrad"
+    alike = (measurements.position == measurements.position[place]).all(axis=1)
+    alike[place] = False
+    reason = ""
+    if not measurements.position[place].any():
+        reason = ", reads 0, 0, 0"
+    elif alike.any():
+        reason = f", the same point as {campaign.place_of(int(measurements.row[np.argmax(alike)]))}"
+    return f"{campaign.place_of(int(measurements.row[place]))}: {size} off{reason}, left out"

@@ -1,0 +1,62 @@
+"""The rows of a case that are fitted: all but those that stand out, at first beside everything that the model might lack."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.diagnosis.gross_errors import gross_errors, improbable
+from elastocal.diagnosis.linearize import linearized
+from elastocal.fitting.least_squares import evaluated
+from elastocal.fitting.noise_estimation import estimated_noise
+from elastocal.fitting.observations import measured_in, select_states, spread_poses
+from elastocal.fitting.tolerances import fit_declared
+
+if TYPE_CHECKING:
+    from elastocal.diagnosis.settings import Settings
+    from elastocal.fitting.case import Case
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.noise import Noise
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The part of a case that is fitted, ``kept`` of all its measurements (N,), with its noise and declared model."""
+
+    case: Case
+    kept: np.ndarray
+    noise: Noise
+    warnings: list[str]
+    declared: Fit
+
+
+def fitted_to(case: Case, kept: np.ndarray, last: Kept | None = None) -> Kept:
+    """The part of a case that is kept, or the last one where that is the same."""
+    if last is not None and (kept == last.kept).all():
+        return last
+    part = case.select(kept)
+    noise, warnings = estimated_noise(part)
+    return Kept(part, kept, noise, warnings, fit_declared(part.model, part.observations, noise))
+
+
+def first_kept(case: Case, settings: Settings) -> Kept:
+    """The part of a case that its declared model, or all candidates together, might explain."""
+    measurements, candidates = case.campaign.measurements, list(case.candidates.values())
+    whole = part = fitted_to(case, np.ones(len(measurements), bool))
+    for _ in range(settings.gross_error_rounds):
+        errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
+        last, part = part, fitted_to(case, ~errors.gross, part)
+        if part is last:
+            break
+    observations, apart = case.observations, measured_in(case.observations, measurements, ~part.kept)
+    few = spread_poses(observations, settings.gross_start_numbers // case.model.rows)
+    if part is whole and not few.all():
+        # Nothing stands apart, and there are too many to look more closely.
+        return whole
+    few[observations.state[apart]] = True
+    some = select_states(observations, few)
+    about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
+    taken = improbable(linearized(about, some, candidates, settings), settings)
+    return fitted_to(case, ~measured_in(measurements, some, taken), whole)

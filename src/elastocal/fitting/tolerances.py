@@ -1,0 +1,113 @@
+"""Tolerances of what a campaign declares: every fit of its geometry has one prior, whose size the measurements say.
+
+A robot is off its drawing by so many times what is plausible; one number for all declared geometry, by type II maximum
+likelihood [1]_, together with how many times the noise taken the measurements scatter. Both come of the declared model alone,
+so that all models of a campaign, with effects and without, have the same geometry beforehand.
+
+References
+----------
+.. [1] Good, I. J., The Estimation of Probabilities: An Essay on Modern Bayesian Methods, MIT Press, 1965.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from elastocal.fitting.least_squares import ON_THE_WAY, fit
+from elastocal.fitting.observations import sample_of
+from elastocal.fitting.parameters import parameter_values
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from elastocal.effects.protocol import Candidate
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.model import Estimate, Model
+    from elastocal.fitting.noise import Noise
+    from elastocal.fitting.observations import Observations
+
+# Sizes of declared geometry, in plausible sizes: measured robots exceed data-sheet tolerances tenfold, and none is ten times
+# better than these.
+SIZES = np.geomspace(0.1, 10.0, 9)
+# Noise that is there over the noise taken, in steps that change no verdict.
+_FACTORS = np.geomspace(1.0, 1e4, 185)
+# So many observations show the size of some fifty parameters as well as any number.
+_MOST = 2_000
+# Shares of a prior's variance that measurements leave below this are rounding.
+_ROUNDING = 1e-14
+
+
+def fit_declared(model: Model, observations: Observations, noise: Noise, start: Estimate | None = None) -> Fit:
+    """Fit a declared model, its geometry under priors of the most probable size; without geometry as `least_squares.fit`."""
+    if not declared_geometry(model):
+        return fit(model, observations, noise, start)
+    wide = fit(with_size(model, SIZES[-1]), sample_of(observations, _MOST), noise, start, settled=ON_THE_WAY)
+    return fit(with_size(model, most_probable(wide)[0]), observations, noise, wide.estimate, reweighted=True)
+
+
+def declared_geometry(model: Model) -> set[str]:
+    """Names of declared effects whose size is estimated: those whose parameters have no prior of their own, but for springs."""
+    return {
+        effect.effect
+        for effect in model.effects
+        if effect.family != "declared"
+        and all(parameter.prior_std is None or parameter.sized for parameter in effect.parameters)
+    }
+
+
+def with_size(model: Model, size: float) -> Model:
+    """A declared model with priors of a size, in plausible sizes, on its geometry."""
+    sized = declared_geometry(model)
+    effects = tuple(
+        with_prior(effect, [size * parameter.plausible for parameter in effect.parameters])
+        if effect.effect in sized
+        else effect
+        for effect in model.effects
+    )
+    return replace(model, effects=effects)
+
+
+def with_prior(candidate: Candidate, deviations: Sequence[float] | np.ndarray) -> Candidate:
+    """A candidate with normal priors about zero whose standard deviations were estimated."""
+    parameters = tuple(
+        replace(parameter, prior_std=float(deviation), sized=True)
+        for parameter, deviation in zip(candidate.parameters, deviations, strict=True)
+    )
+    return replace(candidate, parameters=parameters)
+
+
+def most_probable(wide: Fit, least: float = 1.0) -> tuple[float, float]:
+    """Size of declared geometry, in plausible sizes, and noise over the noise taken that make the measurements most probable.
+
+    In closed form from a fit under the widest prior: given frames and targets the geometry is linear, and the principal axes of
+    its covariance in units of the prior are independent. The noise is no less than `least` times the noise taken.
+    """
+    mine = np.flatnonzero([parameter.sized for _, parameter in wide.parameters] & ~wide.held)
+    prior = np.array([wide.parameters[number][1].prior_std for number in mine], float)
+    left, axes = np.linalg.eigh(wide.covariance[np.ix_(mine, mine)] / np.outer(prior, prior))
+    left = np.clip(left, _ROUNDING, 1.0)
+    shift, seen = axes.T @ (parameter_values(wide.model, wide.estimate)[mine] / prior), 1.0 / left - 1.0
+    # Squares of the whitened residual were all of it zero, beside frames and targets.
+    squares = (wide.whitened(wide.residual) ** 2).sum() + ((seen + 2.0) * shift**2).sum()
+    freedom = max(wide.weights.sum() * wide.residual.shape[1] - (~wide.held).sum() + len(mine), 1.0)
+    variance = (least * _FACTORS)[:, None, None] ** 2
+    wider = ((SIZES / SIZES[-1]) ** 2)[:, None]
+    explained = ((shift / left) ** 2 * wider / (variance + seen * wider)).sum(axis=2)
+    volume = np.log1p(wider * seen / variance).sum(axis=2)
+    variance = variance[..., 0]
+    evidence = -0.5 * (freedom * np.log(variance) + (squares - explained) / variance + volume)
+    factor, size = np.unravel_index(np.argmax(evidence), evidence.shape)
+    return float(SIZES[size]), float(least * _FACTORS[factor])
+
+
+def effective_parameters(fitted: Fit) -> float:
+    """Numbers that measurements have to determine: free parameters, those with a prior by the share that the prior leaves open.
+
+    Trace of the hat matrix of a ridge regression (Hastie, Tibshirani and Friedman, Elements of Statistical Learning, 3.4.1).
+    """
+    free = ~fitted.held
+    priors = np.array([np.inf if p.prior_std is None else p.prior_std for _, p in fitted.parameters])
+    return float(free.sum() - (np.diag(fitted.covariance)[free] / priors[free] ** 2).sum())

@@ -1,0 +1,44 @@
+"""Errors of poses that a fit was not given, without fitting again: leave-one-pose-out cross-validation in closed form.
+
+In a generalized ridge regression the residual of rows that are left out is (I - H)^-1 times that of the fit, where H is their
+block of the hat matrix [1]_. Priors and noise stay those of the fit.
+
+References
+----------
+.. [1] Cook, R. D. and Weisberg, S., Residuals and Influence in Regression, section 2.2, Chapman and Hall, 1982.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from elastocal.fitting.fit_result import Fit
+    from elastocal.fitting.observations import Observations
+
+# What a pose alone determines, such as the frame of a session of one pose, is no error of it: shares below are rounding.
+_ROUNDING = 1e-9
+
+
+def left_out_squares(fitted: Fit, observations: Observations) -> np.ndarray:
+    """Mean square position error of each pose as all others predict it, m², ndarray (poses,)."""
+    white = fitted.whitened(fitted.residual)
+    found = np.empty(observations.cluster.max() + 1)
+    for seen, plain, whitened in fitted.sensitivities(observations):
+        cluster = observations.cluster[seen]
+        for pose in np.unique(cluster):
+            mine = cluster == pose
+            rows = whitened[mine].reshape(mine.sum() * whitened.shape[1], len(fitted.held))
+            gain = fitted.covariance @ rows.T
+            inverse = np.linalg.pinv(np.eye(len(rows)) - rows @ gain, rcond=_ROUNDING, hermitian=True)
+            moved = plain[mine][:, :3] @ (gain @ (inverse @ white[seen][mine].ravel()))
+            found[pose] = ((fitted.residual[seen][mine][:, :3] + moved) ** 2).sum(axis=1).mean()
+    return found
+
+
+def certain_loss(squares: np.ndarray, others: np.ndarray) -> bool:
+    """Whether mean squares exceed those of another model on the same poses by more than the difference's standard error."""
+    off = squares - others
+    return bool(off.mean() > off.std(ddof=1) / np.sqrt(len(off)))

@@ -1,0 +1,134 @@
+"""A campaign with a few bad rows: the verdict is that of the clean file, and the rows are named with their line."""
+
+import numpy as np
+import pytest
+from analysed_robots import ROBOTS, analysed
+
+from elastocal.application.calibrated import nominal_forward
+from elastocal.campaigns.writing import write_campaign
+from elastocal.loop.whole import diagnosed
+
+NOISE_M, POSES = 5e-5, 60
+HELD_OUT = [5, 9, 14, 18, 23, 27, 31, 36, 40, 44, 47, 49, 52, 54, 56, 57, 59, 60]
+# Zero offsets of a mastering that went wrong, rad; that of the last joint moves no point on its axis.
+OFFSETS = np.array([1.8, -2.1, 1.6, 2.4, -1.9, 0.0]) * 1e-3
+
+
+def lost_beam(table, row):
+    for axis in "xyz":
+        table[axis][row - 1] = 0.0
+
+
+def held_point(table, row):
+    for axis in "xyz":
+        table[axis][row - 1] = table[axis][row - 2]
+
+
+def swapped(table, row, other):
+    for axis in "xyz":
+        table[axis][[row - 1, other - 1]] = table[axis][[other - 1, row - 1]]
+
+
+def off_by(distance_m):
+    def damage(table, row):
+        table["x"][row - 1] += distance_m
+
+    return damage
+
+
+def wrong_angle(table, row):
+    table["q2"][row - 1] += 0.05
+
+
+def verdict_on(folder, damage=(), **changes):
+    """Verdict on 60 poses of a UR10, one row each, with some of them damaged: pairs of a function and its rows."""
+    robot, draws = analysed("ur10"), np.random.default_rng(33)
+    shown = draws.uniform(-2.0, 2.0, (POSES, robot.joints))
+    at = nominal_forward(robot, robot.reported_angles(robot.model_angles(shown) + OFFSETS))[0]
+    table = {"pose": np.arange(1, POSES + 1), "load": np.zeros(POSES, int), "repeat": np.zeros(POSES, int)}
+    table |= {"target": np.full(POSES, "S")} | {f"q{joint}": angle.copy() for joint, angle in enumerate(shown.T, 1)}
+    table |= dict(zip("xyz", (at + NOISE_M * draws.standard_normal(at.shape)).T.copy(), strict=True))
+    for spoil, *rows in damage:
+        spoil(table, *rows)
+    document = {
+        "campaign": "made",
+        "robot": "ur10",
+        "measured": "position",
+        "frame": "base",
+        "targets": {"S": {"point": "6DoF", "offset_m": [0, 0, 0]}},
+        "compliance": "nominal",
+        "declared": [],
+        "noise": {"position_m": NOISE_M},
+        "holdout": {"poses": HELD_OUT},
+    }
+    write_campaign(folder, document | changes, table, robot.joints, "csv")
+    return diagnosed(folder, ROBOTS, 1)
+
+
+def places(verdict):
+    return verdict["verdict"], {effect["name"]: effect["joints"] for effect in verdict["effects"]}
+
+
+def named_rows(verdict):
+    return sorted(row for entry in verdict.get("gross_errors", []) for row in entry["rows"])
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory):
+    return verdict_on(tmp_path_factory.mktemp("clean"))
+
+
+def test_the_clean_file_is_diagnosed_right_and_loses_no_row(clean):
+    assert {effect["name"] for effect in clean["effects"]} == {"joint_offset"}
+    assert named_rows(clean) == []
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [*map(off_by, (1e-3, 1e-2, 0.1, 3.0)), lost_beam, held_point, wrong_angle],
+    ids=["1 mm", "10 mm", "100 mm", "3 m", "lost beam", "held point", "wrong angle"],
+)
+def test_one_bad_row_leaves_the_verdict_and_is_named_with_its_line(tmp_path, clean, damage):
+    found = verdict_on(tmp_path, [(damage, 8)])
+    assert places(found) == places(clean)
+    assert named_rows(found) == [8]
+    (entry,) = found["gross_errors"]
+    # The header is line 1.
+    assert "line 9" in entry["detail"] and "left out" in entry["detail"]
+    assert not entry["held_out"] and entry["pose"] == 8 and entry["target"] == "S"
+    assert entry["standard_deviations"] > 5.0
+
+
+def test_the_size_that_is_named_is_that_of_the_slip(tmp_path):
+    (entry,) = verdict_on(tmp_path, [(off_by(0.1), 8)])["gross_errors"]
+    assert entry["distance_m"] == pytest.approx(0.1, abs=5e-4)
+    assert "100 mm" in entry["detail"]
+
+
+@pytest.mark.parametrize("damage", [off_by(0.1), lost_beam], ids=["100 mm", "lost beam"])
+def test_a_bad_row_that_is_held_out_is_named_and_both_errors_are_given(tmp_path, clean, damage):
+    found = verdict_on(tmp_path, [(damage, 14)])
+    assert places(found) == places(clean)
+    assert named_rows(found) == [14] and found["gross_errors"][0]["held_out"]
+    heldout = found["heldout"]
+    assert heldout["after"]["rms_m"] < 1.1 * clean["heldout"]["after"]["rms_m"]
+    assert heldout["with_gross_errors"]["after"]["rms_m"] > 100 * heldout["after"]["rms_m"]
+    assert any("line 15" in warning for warning in found["warnings"])
+
+
+def test_without_a_bad_row_there_is_no_second_figure(clean):
+    assert clean["heldout"]["with_gross_errors"] is None
+
+
+def test_two_swapped_rows_leave_the_verdict_and_are_both_named(tmp_path, clean):
+    found = verdict_on(tmp_path, [(swapped, 8, 30)])
+    assert places(found) == places(clean)
+    assert named_rows(found) == [8, 30]
+
+
+def test_three_rows_of_zeros_are_named_where_nothing_else_is_wrong(tmp_path):
+    """Offsets are declared here, and so fitted: without the three rows nothing is missing."""
+    found = verdict_on(tmp_path, [(lost_beam, row) for row in (3, 22, 50)], declared=["joint_offset"])
+    assert found["verdict"] == "adequate"
+    assert named_rows(found) == [3, 22, 50]
+    assert found["heldout"]["after"]["rms_m"] < 3.0 * NOISE_M

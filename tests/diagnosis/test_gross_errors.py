@@ -1,0 +1,141 @@
+"""Rows that no model explains: their distances are those of a fit without them, and their number is that of chance."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_folders import made_folder, made_table
+from scipy.stats import binom, chi2
+
+from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.gross_errors import _precision, _without, beyond_chance, deviations, entries_of, gross_errors
+from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.kept_rows import first_kept, fitted_to
+from elastocal.diagnosis.settings import Settings
+from elastocal.loop.whole import cases_in
+
+SETTINGS = Settings()
+NOISE_M, BAD = 6e-5, 11
+
+
+def damaged(case, shifts):
+    """A case with some of its rows shifted along x, by their places."""
+    measurements = case.campaign.measurements
+    position = measurements.position.copy()
+    for place, shift in shifts.items():
+        position[place, 0] += shift
+    campaign = replace(case.campaign, measurements=replace(measurements, position=position))
+    return replace(case, campaign=campaign).select(np.ones(len(measurements), bool))
+
+
+@pytest.fixture(scope="module")
+def cases(kuka, config_folder, tmp_path_factory):
+    """Training and held-out part of a robot whose joint 3 stands 1 mrad off, which is not declared."""
+    folder = tmp_path_factory.mktemp("rows") / "made"
+    made_folder(folder, kuka, table=made_table(kuka, "made", offset_of_joint_3=1e-3))
+    return cases_in(folder, config_folder / "robots")
+
+
+@pytest.fixture(scope="module")
+def clean(cases):
+    return diagnose(cases[0], SETTINGS, 1)
+
+
+def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
+    case, _ = cases
+    measurements = case.campaign.measurements
+    every = np.ones(len(measurements), bool)
+    whole, without = fitted_to(case, every), fitted_to(case, np.arange(len(measurements)) != BAD)
+    found = [
+        deviations(part.declared.model, part.declared.estimate, measurements, whole.noise, part.declared.covariance, part.kept)[
+            1
+        ]
+        for part in (whole, without)
+    ]
+    # Weights of the robust fit differ a little, since the model lacks something.
+    assert found[0][BAD] == pytest.approx(found[1][BAD], rel=0.1)
+
+
+def test_rows_stand_out_by_chance_as_often_as_the_settings_say():
+    rows, count, draws = 40, 3000, np.random.default_rng(0)
+    distance = np.sqrt(draws.chisquare(3, (count, rows)))
+    alarms = sum(beyond_chance(each, 3, np.ones(rows, bool), SETTINGS)[1].any() for each in distance)
+    # A rate twice that of the settings would exceed this in all but 1e-6 of such tests.
+    assert alarms <= binom.ppf(0.999, count, SETTINGS.gross_error_level)
+
+
+def test_a_model_that_does_not_fit_makes_no_row_stand_out():
+    distance = 30.0 * np.sqrt(np.random.default_rng(1).chisquare(3, 60))
+    scaled, gross = beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)
+    assert not gross.any() and np.median(scaled) == pytest.approx(np.sqrt(chi2.median(3)), rel=0.2)
+    distance[:3] *= 20.0
+    assert np.flatnonzero(beyond_chance(distance, 3, np.ones(60, bool), SETTINGS)[1]).tolist() == [0, 1, 2]
+
+
+def test_where_too_many_rows_stand_out_none_is_a_gross_error():
+    distance = np.ones(40)
+    distance[:9] = 1e3
+    assert not beyond_chance(distance, 3, np.ones(40, bool), SETTINGS)[1].any()
+
+
+def test_the_inverse_covariance_is_that_of_the_sum_and_of_its_part():
+    draws = np.random.default_rng(2)
+    loads, declared = draws.standard_normal((12, 5)), draws.standard_normal((12, 2))
+    covariance = np.eye(12) + loads @ loads.T
+    whole = covariance + declared @ declared.T
+    precision, log_det = _precision(covariance, declared)
+    np.testing.assert_allclose(precision, np.linalg.inv(whole), atol=1e-12)
+    assert log_det == pytest.approx(np.linalg.slogdet(whole)[1])
+    part = _without(precision, np.array([3, 4]))
+    kept = np.delete(np.arange(12), [3, 4])
+    np.testing.assert_allclose(part[np.ix_(kept, kept)], np.linalg.inv(whole[np.ix_(kept, kept)]), atol=1e-12)
+    assert not part[3].any() and not part[:, 4].any()
+
+
+@pytest.mark.parametrize("shifts", [{BAD: 0.02}, {BAD: 0.02, 3: -0.1}, {0: 1e3, 5: 1.0, 20: 0.03}])
+def test_rows_are_found_beside_an_effect_that_the_model_lacks(cases, shifts):
+    kept = first_kept(damaged(cases[0], shifts), SETTINGS).kept
+    # A bad repeat takes the others of its state along, until a model says which it is.
+    assert not kept[list(shifts)].any() and (~kept).sum() <= 2 * len(shifts)
+
+
+@pytest.mark.parametrize("shift", [20 * NOISE_M, 1e-2, 1.0, 1e2])
+def test_a_bad_row_is_named_and_changes_no_verdict(cases, clean, shift):
+    found = diagnose(damaged(cases[0], {BAD: shift}), SETTINGS, 1)
+    (entry,) = found.document["gross_errors"]
+    measurements = cases[0].campaign.measurements
+    assert entry["rows"] == [measurements.row[BAD]] and entry["distance_m"] == pytest.approx(shift, rel=0.2)
+    assert entry["detail"] in found.document["warnings"] and f"line {measurements.row[BAD] + 1} of" in entry["detail"]
+    assert found.document["verdict"] == clean.document["verdict"]
+    effects = [[(e["name"], e["joints"]) for e in each.document["effects"]] for each in (found, clean)]
+    assert effects[0] == effects[1] and len(found.left_out) == 1
+
+
+def test_clean_rows_are_all_kept(cases, clean):
+    assert clean.document["gross_errors"] == [] and not len(clean.left_out)
+    assert first_kept(cases[0], SETTINGS).kept.all()
+
+
+def test_a_bad_held_out_row_is_judged_by_the_same_rule_and_both_errors_are_given(cases, clean):
+    held_out = cases[1]
+    without = judge(clean, held_out, 1).document["heldout"]
+    verdict = judge(clean, damaged(held_out, {2: 0.5}), 1)
+    (entry,) = verdict.document["gross_errors"]
+    assert entry["held_out"] and entry["rows"] == [held_out.campaign.measurements.row[2]]
+    found = verdict.document["heldout"]
+    assert without["with_gross_errors"] is None
+    assert found["after"]["rms_m"] == pytest.approx(without["after"]["rms_m"], rel=0.2)
+    assert found["with_gross_errors"]["after"]["rms_m"] > 100 * found["after"]["rms_m"]
+    assert all(row["heldout_rms_all_rows_m"] > 10 * row["heldout_rms_m"] for row in verdict.rows[1:])
+    assert len(verdict.left_out) == 1 and any("with them the RMS" in line for line in verdict.document["warnings"])
+
+
+def test_sentences_say_what_a_row_reads(cases, clean):
+    case = damaged(cases[0], {})
+    position = case.campaign.measurements.position
+    position[4], position[8] = 0.0, position[7]
+    measurements, every = case.campaign.measurements, np.ones(len(position), bool)
+    errors = gross_errors(clean.final, clean.declared.noise, measurements, every, SETTINGS)
+    told = {entry["rows"][0]: entry["detail"] for entry in entries_of(errors, case.campaign, held_out=False)}
+    assert "reads 0, 0, 0" in told[measurements.row[4]]
+    assert f"the same point as line {measurements.row[7] + 1} of" in told[measurements.row[8]]

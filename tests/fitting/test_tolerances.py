@@ -1,0 +1,87 @@
+"""Declared geometry has one prior, whose size the measurements make most probable; and what priors leave of parameters."""
+
+import numpy as np
+import pytest
+from planted import planted
+
+from elastocal.fitting.least_squares import fit
+from elastocal.fitting.tolerances import (
+    SIZES,
+    declared_geometry,
+    effective_parameters,
+    fit_declared,
+    most_probable,
+    with_size,
+)
+
+JOINTS = (2, 3, 4, 5)
+
+
+def campaign_of(robot, offset, **options):
+    """A robot whose joints 2 to 5 are off by an angle or its opposite, and its model with these offsets declared."""
+    keys = [f"joint_offset@{joint}" for joint in JOINTS]
+    campaign = planted(robot, {key: [offset * (-1) ** n] for n, key in enumerate(keys)}, seed=2, **options)
+    return campaign, campaign.declared.model.with_effects([campaign.candidates[key] for key in keys])
+
+
+def wide_fit(campaign, model, share=1.0):
+    return fit(with_size(model, SIZES[-1]), campaign.observations, campaign.declared.noise.scaled(share))
+
+
+@pytest.mark.parametrize(("offset", "size"), [(1e-4, 0.1), (1e-3, 1.0), (1e-2, 10.0)])
+def test_declared_geometry_has_the_size_that_the_measurements_make_most_probable(offset, size, kuka):
+    campaign, model = campaign_of(kuka, offset)
+    # Springs of the joints have no size: they have no prior.
+    assert declared_geometry(model) == {"joint_offset"}
+    assert most_probable(wide_fit(campaign, model))[0] == pytest.approx(size, rel=0.01)
+    fitted = fit_declared(model, campaign.observations, campaign.declared.noise)
+    priors = {owner: parameter.prior_std for owner, parameter in fitted.parameters}
+    assert [priors[f"joint_offset@{joint}"] for joint in JOINTS] == pytest.approx([size * 1e-3] * 4, rel=0.01)
+    assert priors["joint_compliance"] is None
+
+
+@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
+def test_the_size_is_the_same_whatever_noise_was_taken_and_the_noise_comes_back(share, kuka):
+    """Noise that is declared far too small must not make sizes small: they would be so many standard errors, not so many mm."""
+    campaign, model = campaign_of(kuka, 1e-3)
+    size, factor = most_probable(wide_fit(campaign, model, share))
+    assert size == pytest.approx(1.0, rel=0.01)
+    assert factor == pytest.approx(1.0 / share, rel=0.15)
+
+
+def test_the_evidence_in_closed_form_is_that_of_the_measurements(kuka):
+    """Marginal likelihood of the whitened residual, normal with covariance s2 I + X D X', frames flat: by determinants."""
+    campaign, model = campaign_of(kuka, 5e-4, poses=12, fitted_frames=True)
+    wide = wide_fit(campaign, model)
+    rows = np.concatenate([white.reshape(-1, len(wide.held)) for _, _, white in wide.sensitivities(campaign.observations)])
+    mine = np.array([parameter.sized for _, parameter in wide.parameters])
+    values = np.concatenate(wide.estimate.coefficients[-len(JOINTS) :])
+    seen = wide.whitened(wide.residual).ravel() + rows[:, mine] @ values
+    basis, _ = np.linalg.qr(rows[:, ~mine & ~wide.held], mode="complete")
+    apart = basis[:, (~mine & ~wide.held).sum() :]
+    left, right = apart.T @ rows[:, mine], apart.T @ seen
+
+    def evidence(size, factor):
+        covariance = factor**2 * np.eye(len(right)) + (1e-3 * size) ** 2 * left @ left.T
+        return -0.5 * (np.linalg.slogdet(covariance)[1] + right @ np.linalg.solve(covariance, right))
+
+    size, factor = most_probable(wide)
+    best = evidence(size, factor)
+    others = [evidence(size * step, factor) for step in (10**-0.25, 10**0.25)]
+    others += [evidence(size, factor * step) for step in (0.9, 1.1) if factor * step >= 1.0]
+    assert best >= max(others) - 1e-6
+
+
+def test_effective_parameters_are_the_trace_of_the_hat_matrix(kuka):
+    campaign, model = campaign_of(kuka, 1e-4, poses=6)
+    fitted = fit(with_size(model, 0.1), campaign.observations, campaign.declared.noise.scaled(30.0))
+    rows = np.concatenate([white.reshape(-1, len(fitted.held)) for _, _, white in fitted.sensitivities(campaign.observations)])
+    assert effective_parameters(fitted) == pytest.approx(np.trace(rows @ fitted.covariance @ rows.T), rel=1e-3)
+    assert effective_parameters(fitted) < (~fitted.held).sum() - 0.5
+
+
+def test_a_model_without_geometry_is_fitted_as_it_is(kuka):
+    campaign, _ = campaign_of(kuka, 1e-4)
+    model = campaign.declared.model
+    one, other = (call(model, campaign.observations, campaign.declared.noise) for call in (fit, fit_declared))
+    np.testing.assert_array_equal(one.estimate.coefficients[0], other.estimate.coefficients[0])

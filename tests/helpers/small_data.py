@@ -1,0 +1,47 @@
+"""A few poses of an arm of seven joints on a lift, as a service robot has it: wrong zeros and lengths, drives with play."""
+
+from dataclasses import replace
+
+import numpy as np
+import yaml
+
+from elastocal.campaigns.simulation import Plan, simulated_measurements
+from elastocal.campaigns.writing import write_campaign
+from elastocal.mechanics.robot_file import robot_from_document
+
+SERVICE_ARM = {
+    "name": "service arm on a lift",
+    "chain": "Tx(l0) Tz(q1) Tx(l1) Rz(q2) Tx(l2) Rx(90deg) Rz(q3) [3DoF] Ty(l3) Rx(90deg) Rz(q4) Tx(l4) Rx(-90deg) Rz(q5)"
+    " Tx(l5) Ry(90deg) Rz(q6) Tz(l6) Ry(-90deg) Rz(q7) Rx(90deg) Rz(q8) Tz(l7) [8DoF]",
+    "lengths_m": {"l0": -0.05, "l1": 0.16, "l2": 0.125, "l3": -0.03, "l4": 0.23, "l5": -0.02, "l6": 0.24, "l7": 0.15},
+    "joint_limits_deg": [[0, 0.35], [5, 155], [-85, 60], [-200, 85], [-20, 135], [-115, 115], [-80, 80], [-120, 120]],
+    "payload_kg": 3,
+}
+# rad; of the lift m.
+_PLAY = 5e-3 * np.array([0.2, 1, 1, 1, 1, 1, 1, 1])
+
+
+def service_arm_folder(folder, seed, poses=34, noise_m=3e-4):
+    """A campaign as `elastocal init` declares it; errors of 5 mm of which a calibration can mend little."""
+    draws = np.random.default_rng((7, seed))
+    lengths = {name: value + 1e-3 * draws.standard_normal() for name, value in SERVICE_ARM["lengths_m"].items()}
+    true = replace(robot_from_document(SERVICE_ARM | {"lengths_m": lengths}), compliance=np.zeros(8))
+    plan = Plan(("8DoF",), poses, 0.0, (0,), (0.0, 0.0, 0.0), 1, 0, 1e-3, 1e-3)
+    table = simulated_measurements(true, plan, seed, "service")
+    zeros = 0.2 * _PLAY * draws.standard_normal(8)
+    for joint in range(8):
+        table[f"q{joint + 1}"] = table[f"q{joint + 1}"] + zeros[joint] + _PLAY[joint] * draws.standard_normal(poses)
+    document = {
+        "campaign": "service",
+        "robot": "robot.yaml",
+        "measured": "position",
+        "frame": "tracker",
+        "targets": {"8DoF": {"point": "8DoF", "offset_m": "unknown"}},
+        "compliance": "identify",
+        "declared": ["joint_offset", "link_geometry"],
+        "noise": {"position_m": noise_m},
+        "holdout": {"fraction": 0.3, "seed": 1},
+    }
+    write_campaign(folder, document, table, 8, "csv")
+    (folder / "robot.yaml").write_text(yaml.safe_dump(SERVICE_ARM), encoding="utf-8")
+    return folder

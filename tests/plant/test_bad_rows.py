@@ -1,0 +1,139 @@
+"""Slips that are planted in a measured table: each changes what it says, in so many rows, and states its size."""
+
+import numpy as np
+import pytest
+from analysed_robots import ROBOTS
+
+from elastocal.plant.arm import arm_from_file, turned
+from elastocal.plant.bad_rows import HELD_POINT, KINDS, LARGEST, SMALLEST, possible_kinds, with_bad_rows
+from elastocal.plant.campaigns import Design, measured_table, schedule_of
+from elastocal.plant.physical_robot import specimen
+from elastocal.plant.tracker import rotation_vector
+
+DESIGN = Design(poses=20, held_out=6, ladder=(0.0, 1.0), repeats=2, repeated_poses=3, points=("3DoF", "flange"), covariates=())
+READ = {"x", "y", "z", "rx", "ry", "rz"}
+MAY_CHANGE = {
+    "position": {"x", "y", "z"},
+    "rotation": {"rx", "ry", "rz"},
+    "joint_angle": {f"q{joint}" for joint in range(1, 7)},
+    "load": {"fx", "fy", "fz", "mx", "my", "mz"},
+    "held_point": READ,
+    "zeros": READ,
+    "swapped": READ,
+}
+
+
+@pytest.fixture(scope="module")
+def campaign():
+    arm = arm_from_file(ROBOTS / "kuka.yaml")
+    robot, schedule = specimen(arm, 4), schedule_of(arm, DESIGN, 4)
+    return measured_table(robot, DESIGN, schedule)[0], robot, schedule
+
+
+def planted(campaign, kind, seed, count=3):
+    return with_bad_rows(*campaign, kind, count, np.random.default_rng(seed))
+
+
+def changed(before, after):
+    """Columns and rows in which two tables differ."""
+    off = {name: np.flatnonzero(before[name] != after[name]) for name in before}
+    columns = {name for name, rows in off.items() if len(rows)}
+    return columns, set(np.concatenate([off[name] for name in columns]).tolist()) if columns else set()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(5))
+def test_a_slip_changes_its_columns_in_its_rows_and_no_others(campaign, kind, seed):
+    before = {name: column.copy() for name, column in campaign[0].items()}
+    after, slips = planted(campaign, kind, seed)
+    columns, rows = changed(campaign[0], after)
+    assert columns and columns <= MAY_CHANGE[kind]
+    assert rows == {row for slip in slips for row in slip.rows}
+    assert len(slips) == (2 if kind == "swapped" else 3)
+    assert len({campaign[0]["pose"][slip.rows[0]] for slip in slips}) == len(slips)
+    assert all(slip.kind == kind and len(slip.sizes) == len(slip.rows) for slip in slips)
+    # What is given is left alone.
+    assert all((before[name] == campaign[0][name]).all() for name in before)
+
+
+def test_sizes_are_even_in_the_logarithm_from_five_to_a_hundred_thousand(campaign):
+    sizes = np.log([slip.sizes[0] for seed in range(150) for slip in planted(campaign, "position", seed)[1]])
+    low, high = np.log([SMALLEST, LARGEST])
+    assert low < sizes.min() < low + 0.1 and high - 0.1 < sizes.max() < high
+    assert sizes.mean() == pytest.approx((low + high) / 2, abs=0.4)
+
+
+def test_a_position_is_off_by_its_size_in_standard_deviations_of_the_tracker(campaign):
+    after, (slip,) = planted(campaign, "position", 3, 1)
+    row = slip.rows[0]
+    away = [after[axis][row] - campaign[0][axis][row] for axis in "xyz"]
+    assert np.linalg.norm(away) == pytest.approx(slip.sizes[0] * 60e-6)
+
+
+def test_a_rotation_is_turned_by_its_size_and_half_a_turn_at_most(campaign):
+    for seed in range(20):
+        after, (slip,) = planted(campaign, "rotation", seed, 1)
+        before, then = (turned(np.array([t[f"r{a}"][slip.rows[0]] for a in "xyz"])) for t in (campaign[0], after))
+        angle = np.linalg.norm(rotation_vector(then @ before.T))
+        assert angle == pytest.approx(slip.sizes[0] * 60e-6) and angle <= np.pi + 1e-9
+
+
+def test_a_held_point_is_what_was_read_before_and_zeros_are_nothing(campaign):
+    after, slips = planted(campaign, HELD_POINT, 1)
+    for slip in slips:
+        row = slip.rows[0]
+        assert all(after[name][row] == campaign[0][name][row - 1] for name in READ)
+    after, slips = planted(campaign, "zeros", 1)
+    assert not any(after[name][slip.rows[0]] for name in READ for slip in slips)
+
+
+def test_a_wrong_angle_stays_within_the_limits_and_is_of_the_whole_pose_where_a_reader_would_refuse_it(campaign):
+    table, robot, _ = campaign
+    kinds = set()
+    for seed in range(40):
+        after, slips = planted(campaign, "joint_angle", seed, 1)
+        (name,), rows = changed(table, after)
+        off = after[name] - table[name]
+        pose = table["pose"] == table["pose"][slips[0].rows[0]]
+        whole = rows == set(np.flatnonzero(pose).tolist())
+        assert whole or np.abs(off).max() < 0.02
+        kinds.add("pose" if whole else len(rows))
+        angles = np.column_stack([after[f"q{joint}"] for joint in range(1, 7)])
+        low, high = robot.arm.limits.T
+        assert ((angles >= low - 1e-9) & (angles <= high + 1e-9)).all()
+        assert max(slips[0].sizes) > 0
+    assert kinds == {"pose", 1, 2}
+
+
+def test_the_size_of_a_wrong_angle_is_how_far_it_would_have_moved_the_point(campaign):
+    """Of joint 1, about the vertical: its angle times the distance from its axis."""
+    table = campaign[0]
+    for seed in range(100):
+        after, (slip,) = planted(campaign, "joint_angle", seed, 1)
+        (name,) = changed(table, after)[0]
+        off = (after[name] - table[name])[slip.rows[0]]
+        if name == "q1" and abs(off) < 0.3:
+            break
+    expected = [
+        max(2 * np.sin(abs(off) / 2) * np.hypot(table["x"][row], table["y"][row]), abs(off)) / 60e-6 for row in slip.rows
+    ]
+    np.testing.assert_allclose(slip.sizes, expected, rtol=0.02)
+
+
+def test_a_wrong_load_keeps_its_line_and_is_bounded(campaign):
+    table = campaign[0]
+    largest = max(np.linalg.norm([table[f"f{axis}"][row] for axis in "xyz"]) for row in range(len(table["pose"])))
+    for seed in range(20):
+        after, (slip,) = planted(campaign, "load", seed, 1)
+        row = slip.rows[0]
+        before, then = (np.array([t[f"f{axis}"][row] for axis in "xyz"]) for t in (table, after))
+        assert table["load"][row] > 0
+        assert np.linalg.norm(np.cross(before, then)) < 1e-9 * np.linalg.norm(before) * np.linalg.norm(then)
+        assert np.linalg.norm(then - before) <= 100.0001 * largest
+
+
+def test_kinds_that_a_table_cannot_have_are_not_offered(campaign):
+    table = {name: column for name, column in campaign[0].items() if not name.startswith("r") or name == "repeat"}
+    assert "rotation" not in possible_kinds(table)
+    assert "load" not in possible_kinds(table | {"load": 0 * table["load"]})
+    assert possible_kinds(campaign[0]) == KINDS

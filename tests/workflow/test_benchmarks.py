@@ -1,0 +1,49 @@
+"""Every benchmark in its small setting: that it runs, lest it rot, and not how fast, which `make bench` measures."""
+
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+
+import pytest
+from durations import HUNG_S
+from study_folder import REPOSITORY
+
+BENCHMARKS = REPOSITORY / "benchmarks"
+RUN = runpy.run_path(str(BENCHMARKS / "run.py"))
+
+
+def ended(script, *arguments):
+    command = [sys.executable, str(BENCHMARKS / script), *map(str, arguments)]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, timeout=HUNG_S)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", RUN["NAMES"])
+def test_a_small_setting_has_a_ratio_for_each_row_and_touches_no_report(name):
+    before = RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None
+    said = ended("run.py", "--small", "--only", name)
+    ratios = [float(ratio) for ratio in re.findall(rf"^  {name}\b.*: ratio (\S+), target none", said, re.MULTILINE)]
+    assert ratios and min(ratios) > 0 and max(ratios) < float("inf")
+    assert (RUN["REPORT"].read_bytes() if RUN["REPORT"].exists() else None) == before
+
+
+def test_every_module_with_rows_is_a_benchmark_that_runs():
+    modules = {path.stem for path in BENCHMARKS.glob("*.py") if "\ndef rows(" in path.read_text(encoding="utf-8")}
+    assert modules == set(RUN["NAMES"])
+
+
+def test_the_coverage_of_intervals_has_a_line_for_each_kind_and_number_of_poses():
+    lines = ended("interval_coverage.py", "--campaigns", "1").splitlines()
+    assert lines[0].startswith("| errors | poses |") and len(lines) == 2 + 4 * 3
+
+
+def test_the_cost_of_a_finished_run_is_stated(small_study, tmp_path):
+    proof = tmp_path / "proof"
+    shutil.copytree(small_study.path("results/timings"), proof / "results" / "timings")
+    (proof / "data" / "blind" / "block" / "case").mkdir(parents=True)
+    said = ended("cost.py", small_study.folder, small_study.folder, proof, "--data-sets", 12, 24)
+    cost = re.search(r"^\| blind case \| (\S+) \|", said, re.MULTILINE)
+    assert float(cost[1]) > 0 and "from 12 and 24 data sets, 1 cases" in said
