@@ -262,23 +262,16 @@ def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> 
     commands = wanted.start.copy()
     inverse = np.linalg.pinv(jacobians(robot.chain, robot.model_angles(commands), robot.chain.end_effector))
     for _ in range(_STEPS):
-        off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
+        off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
         step = (inverse @ off[..., None])[..., 0]
         commands = robot.reported_angles(robot.model_angles(commands) + step)
-    off = pose_differences(wanted.position, wanted.rotation, *_reached(certain, commands, wanted.wrench, seed))
+    off = pose_differences(wanted.position, wanted.rotation, *reached(certain, commands, wanted.wrench, seed))
     return commands, np.linalg.norm(off[:, :3], axis=1) < 1e-6
-
-
-def _reached(plant: PhysicalRobot, commands: np.ndarray, wrench: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the end effector comes to rest, in the frame that is declared as the base's."""
-    position, rotation = reached(plant, commands, wrench, seed)
-    seen = plant.tracker.seen(position[:, None], rotation[:, None], np.zeros(len(position)))
-    return seen[0][:, 0], seen[1][:, 0]
 
 
 def _moved(plant: PhysicalRobot, wanted: Wanted, commands: np.ndarray, seed: int) -> dict[str, Any]:
     """What the robot does with its commands, with chance of its own."""
-    position, rotation = _reached(plant, commands, wanted.wrench, seed + 1)
+    position, rotation = reached(plant, commands, wanted.wrench, seed + 1)
     read, _, _ = plant.tracker.read(position[:, None], rotation[:, None], stream(seed, "measured again"))
     return {
         "part": wanted.part,

@@ -143,7 +143,7 @@ def reached(
     Returns
     -------
     position : ndarray (N, 3)
-        m, base frame; without the tracker's noise.
+        m, in the frame that is declared as the base's; without the tracker's noise.
     rotation : ndarray (N, 3, 3)
 
     Raises
