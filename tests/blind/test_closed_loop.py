@@ -61,7 +61,7 @@ def test_the_tracker_adds_its_noise(table):
 
 def test_the_milling_path_is_smooth_at_one_orientation_and_pushes_against_the_feed():
     robot, plant = analysed("gp180"), hidden_robot(ROBOTS / "gp180.yaml", 3, ["payload"])[0]
-    wanted = module._wanted(robot, plant, 3)
+    wanted = module.wanted_poses(robot, plant, 3)
     path = wanted.part == "milling"
     at = wanted.position[path]
     assert np.ptp(at[:, 2]) < 1e-12

@@ -1,9 +1,16 @@
 import json
 
+import numpy as np
+import pandas as pd
 import pytest
+import yaml
+from analysed_robots import analysed
 from certified import certified_checkout
+from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from elastocal.application.accuracy import accuracy_from, accuracy_sentence
+from elastocal.application.calibrated import nominal_forward
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -80,3 +87,53 @@ def test_a_campaign_without_a_report_is_refused(run, top, tmp_path):
     finally:
         (tmp_path / "kept").rename(path)
     assert isinstance(result.exception, InputError) and "elastocal diagnose" in str(result.exception)
+
+
+def corrected_and_measured(top, folder, off_m):
+    """A campaign at targets that `correct` wrote, of a robot that misses each by so much along x."""
+    robot = analysed("kuka")
+    bent = (
+        np.random.default_rng(1).uniform(-0.3, 0.3, (20, 6)) + robot.joint_limits.mean(axis=1) + [0.0, 0.2, 0.1, 0.3, 0.7, 0.0]
+    )
+    position, rotation = nominal_forward(robot, robot.reported_angles(bent))
+    columns = ["x", "y", "z", "rx", "ry", "rz"]
+    pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
+    folder.mkdir()
+    pd.DataFrame(pose, columns=columns).to_csv(folder / "path.csv", index=False)
+    found = CliRunner().invoke(
+        app, ["correct", str(top / "made"), str(folder / "path.csv"), "--output", str(folder / "targets.csv")]
+    )
+    assert found.exit_code == 0, found.output
+    targets = pd.read_csv(folder / "targets.csv")
+    rows = targets[[f"q{joint}" for joint in range(1, 7)]].assign(load=0, repeat=0, target="T", **targets[columns[:3]])
+    rows = rows.assign(pose=1 + np.arange(20), x=rows["x"] + off_m, fx=0, fy=0, fz=0, mx=0, my=0, mz=0)
+    rows.to_csv(folder / "measurements.csv", index=False)
+    target = {"point": robot.chain.end_effector.name, "offset_m": [0, 0, 0]}
+    document = {"campaign": "after", "robot": "kuka", "measured": "position", "frame": "base", "targets": {"T": target}}
+    (folder / "campaign.yaml").write_text(yaml.safe_dump(document))
+    return found.stderr
+
+
+def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(run, top, tmp_path):
+    said = corrected_and_measured(top, tmp_path / "after", 0.0)
+    run(top / "made", "--tolerance", "0.5mm", "--output", tmp_path / "out")
+    words = accuracy_sentence(accuracy_from(json.loads((tmp_path / "out" / "certificate.json").read_text())["accuracy"]))
+    assert words in said
+
+
+@pytest.mark.parametrize(("off_m", "decision", "code"), [(3e-4, "pass", 0), (8e-4, "fail", 1)])
+def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_exits_with_1(
+    run, top, tmp_path, off_m, decision, code
+):
+    corrected_and_measured(top, tmp_path / "after", off_m)
+    result = run(top / "made", "--tolerance", "0.5mm", "--measured", tmp_path / "after", "--output", tmp_path / "out")
+    document = json.loads((tmp_path / "out" / "certificate.json").read_text())
+    assert result.exit_code == code and document["conformity"]["decision"] == decision
+    assert document["accuracy"]["kind"] == "measured" and document["predicted"]["kind"] == "predicted"
+    assert "Criterion: the measured RMS position error" in result.output
+    assert any(name.startswith("after: targets.csv") for name in document["measured_files"])
+
+
+def test_a_prediction_that_fails_exits_with_1(run, top, tmp_path):
+    result = run(top / "made", "--tolerance", "1um", "--output", tmp_path / "out")
+    assert result.exit_code == 1 and result.output.startswith("fail") and "Nobody has measured" in result.output

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_problems import made_problem, made_rows, made_unit
 
-from elastocal.diagnosis.averaging import averaged, expected_to_help, squares_explained
+from elastocal.diagnosis.averaging import averaged, expected_to_help, other_predictions, squares_explained
 from elastocal.diagnosis.evidence import Joint
 from elastocal.diagnosis.search import Model, Posterior
 
@@ -191,3 +191,18 @@ def test_squares_explained_are_those_of_the_displacements_that_each_mechanism_ma
         some[columns] = coefficients[columns]
         expected[mechanism] = some @ gram @ some
     assert squares_explained(problem, model) == pytest.approx(expected, rel=1e-6)
+
+
+def test_other_models_predict_otherwise_by_their_probability_and_unknown_causes_are_in_none_that_is_kept(made):
+    _, line = made
+    gram = line.problem.statistics.gram[0]
+    alone = posterior_of(((0,), [0.3], 0.0, 1.0))
+    assert other_predictions(line.problem, alone, alone.models[0]) == 0.0
+    found = posterior_of(((0,), [0.3], 0.0, 0.75), ((1,), [0.3], 0.0, 0.25))
+    mine = squares_explained(line.problem, found.models[0])["a"]
+    whole = other_predictions(line.problem, posterior_of(((0,), [0.3], 0.0, 1.0), ((), [], 0.0, 1.0)), found.models[0])
+    assert whole == pytest.approx(mine)
+    assert 0.0 < other_predictions(line.problem, found, found.models[0]) < mine + gram[2, 2]
+    # A smooth error of unknown cause explains something that no command has.
+    beside = posterior_of(((0, 2), [0.3, 0.3], 0.0, 1.0))
+    assert other_predictions(line.problem, beside, beside.models[0]) > 0.0

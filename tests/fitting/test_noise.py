@@ -12,7 +12,15 @@ from synthetic import made_estimate, made_measurements, made_model
 
 from elastocal.campaigns.campaign import Campaign, Target
 from elastocal.fitting import noise as noise_module
-from elastocal.fitting.noise import FEWEST, Noise, chosen_noise, declared_noise, measurement_covariances, noise_from_repeats
+from elastocal.fitting.noise import (
+    FEWEST,
+    Noise,
+    chosen_noise,
+    declared_noise,
+    hidden_repeatability,
+    measurement_covariances,
+    noise_from_repeats,
+)
 
 TARGETS = tuple(Target(name, point, (0.1, 0.05, 0.0)) for name, point in (("A", "6DoF"), ("B", "3DoF"), ("C", "2DoF")))
 SENSOR_M, SENSOR_RAD = 50e-6, 30e-6
@@ -449,3 +457,15 @@ def test_covariance_of_each_approach_is_its_jacobian_about_the_joints_and_the_se
                 expected = each[one] @ np.diag(noise.joint_rad**2) @ each[other].T + (one == other) * sensor
                 block = found[one * rows : (one + 1) * rows, other * rows : (other + 1) * rows]
                 np.testing.assert_allclose(block, expected, rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("joint_rad", [5e-6, 2e-5])
+def test_joints_that_the_sensor_hides_are_found_where_all_repeat_alike(fanuc, joint_rad):
+    """A tenth to four tenths of the sensor at 2 m: on average over six campaigns within a third."""
+    found = np.array([hidden_repeatability(*drawn(fanuc, seed, joint_rad=joint_rad)) for seed in range(6)])
+    assert np.sqrt((found[:, 0] ** 2).mean()) == pytest.approx(joint_rad, rel=0.35)
+    assert (found[:, 1] > 1.0).all()
+
+
+def test_without_repeats_nothing_is_said_of_joints(fanuc):
+    assert hidden_repeatability(*drawn(fanuc, 1, poses=2, repeats=1)) == (0.0, 0.0)

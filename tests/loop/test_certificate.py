@@ -52,7 +52,7 @@ def test_one_accuracy_stands_in_headline_budget_and_report(found, parts):
 
 
 def test_a_certificate_passes_below_and_fails_above_what_is_predicted(top, parts):
-    limits = (0.5, 2.0)
+    limits = (0.2, 2.0)
     rms = certificate(top / "made", ROBOTS, *parts, WANTED)[0]["accuracy"]["rms_m"]
     wanted = [replace(WANTED, tolerance_m=share * rms) for share in limits]
     found = [certificate(top / "made", ROBOTS, *parts, each)[0]["conformity"]["decision"] for each in wanted]

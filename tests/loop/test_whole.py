@@ -162,3 +162,16 @@ def test_a_calibration_by_few_poses_is_no_worse_than_none(tmp_path):
         heldout = judge(diagnose(training, Settings(), 1), held_out, 1).document["heldout"]
         ratios.append(heldout["after"]["rms_m"] / heldout["uncalibrated"]["rms_m"])
     assert np.exp(np.log(ratios).mean()) < 1.03
+
+
+def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp_path):
+    """One row of the held-out poses and one of the fitted ones 50 mm off: both are left out of every figure."""
+    table = made_table(kuka, "made", seed=3, plan=USUAL)
+    stated = []
+    for name in ("clean", "spoilt"):
+        if name == "spoilt":
+            table = table | {"x": table["x"] + np.where(np.isin(np.arange(len(table["x"])), [5, 60]), 0.05, 0.0)}
+        folder = made_folder(tmp_path / name, kuka, name, table=table)
+        stated.append(diagnosed(folder.as_posix(), ROBOTS.as_posix(), 1))
+    assert stated[1]["gross_errors"]
+    assert stated[1]["accuracy"]["rms_m"] == pytest.approx(stated[0]["accuracy"]["rms_m"], rel=0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from elastocal.validation.conformity import FAIL, PASS, UNDECIDED, conformity
+from elastocal.validation.conformity import FAIL, PASS, UNDECIDED, conformity, predicted_conformity
 from elastocal.validation.held_out import Errors
 
 POSES, EACH, RISK = 12, 4, 0.05
@@ -60,3 +60,24 @@ def test_the_share_of_poses_inside_is_that_of_clopper_and_pearson():
     assert binom.sf(1, 3, found.share_inside) == pytest.approx(0.05)
     every = decided(Errors(np.ones(9) + 1e-3 * np.arange(9), np.arange(9)), 2.0)
     assert every.share_inside == pytest.approx(0.05 ** (1 / 9))
+
+
+def test_noise_is_taken_off_as_squares():
+    errors = drawn(1)
+    noise = 0.8 * decided(errors, 2e-4).rms_m
+    less = conformity(errors, 2e-4, RISK, 300, np.random.default_rng(2), noise)
+    assert less.rms_m == pytest.approx(np.sqrt(decided(errors, 2e-4).rms_m ** 2 - noise**2))
+    # The same measurements, the same limit on their mean square: the same risk.
+    tolerance = float(np.sqrt(2e-4**2 - noise**2))
+    assert conformity(errors, tolerance, RISK, 300, np.random.default_rng(2), noise).risk_above == pytest.approx(
+        decided(errors, 2e-4).risk_above
+    )
+    assert conformity(errors, 2e-4, RISK, 300, np.random.default_rng(2), 1.0).rms_m == 0.0
+
+
+@pytest.mark.parametrize(("tolerance", "decision"), [(1.3e-4, PASS), (0.7e-4, FAIL), (1e-4, UNDECIDED)])
+def test_a_prediction_is_decided_by_the_robots_that_it_leaves_possible(tolerance, decision):
+    rms = 1e-4 * (1.0 + 0.1 * np.random.default_rng(1).standard_normal(4000))
+    found = predicted_conformity(rms, 30, tolerance, RISK)
+    assert found.decision == decision and found.poses == 30 and found.poses_inside is None
+    assert found.limit_m == pytest.approx(1e-4 * (1.0 + 0.1 * 1.645), rel=0.01)

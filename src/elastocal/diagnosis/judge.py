@@ -83,7 +83,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     Verdict
     """
     case, steps = diagnosis.case, diagnosis.steps
-    errors, part = _gross_errors(diagnosis, held_out)
+    errors, part = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, seed)
     every = rows
@@ -106,7 +106,7 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     return Verdict(document, rows, part, held_out.campaign.measurements.select(errors.gross))
 
 
-def _gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
+def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviations, Case]:
     """Held-out rows that the final model does not explain, by the rule of the training rows; and the case without."""
     final, count = diagnosis.final, len(held_out.campaign.measurements)
     if any(effect["family"] == "data" for effect in diagnosis.document["effects"]):

@@ -15,7 +15,7 @@ from elastocal.fitting.case import case_from, noise_from
 from elastocal.io.checksums import check_checksums
 from elastocal.io.json_files import read_json
 from elastocal.io.storage import read_table
-from elastocal.loop.diagnosis_tables import final_parameters, step_model
+from elastocal.loop.diagnosis_tables import final_parameters, rows_left_out, step_model
 from elastocal.loop.fit_columns import covariance_from
 from elastocal.loop.loading import load_campaign
 from elastocal.loop.schemas import CORRELATIONS, STEPS, measurements
@@ -42,7 +42,7 @@ class Diagnosed:
     name : str
         Of the campaign.
     case : Case
-        Of the training poses.
+        Of the training poses, without their gross errors.
     calibrated : CalibratedRobot
         By the final model.
     verdict : dict
@@ -91,8 +91,9 @@ def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str |
     same = _described(read_json(tables / DESCRIPTIONS)) == _described(descriptions)
     if not (same and all(map(_same, kept, columns))):
         raise InputError(folder, "", "changes since its diagnosis", again)
-    case = case_from(descriptions, columns[0])
     facts, steps = read_json(tables / DIAGNOSIS), read_table(tables / STEPS_TABLE, STEPS)
+    case = case_from(descriptions, columns[0])
+    case = case.select(~rows_left_out(case, facts))
     last = len(facts["steps"]) - 1
     model, estimate = step_model(case, facts, steps, last)
     covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))

@@ -86,13 +86,18 @@ def diagnosis_from(case: Case, facts: Mapping[str, Any], columns: Mapping[str, n
     -------
     Diagnosis
     """
-    measurements = case.campaign.measurements
-    left_out = np.isin(measurements.row, [row for entry in facts["document"]["gross_errors"] for row in entry["rows"]])
+    measurements, left_out = case.campaign.measurements, rows_left_out(case, facts)
     case = case.select(~left_out)
     steps = [
         Step(step["name"], step["kind"], step_fit(case, facts, columns, number)) for number, step in enumerate(facts["steps"])
     ]
     return Diagnosis(case, tuple(steps), None, facts["document"], measurements.select(left_out))
+
+
+def rows_left_out(case: Case, facts: Mapping[str, Any]) -> np.ndarray:
+    """Which measurements of the training poses a diagnosis left out as gross errors, ndarray of bool (N,)."""
+    left_out = [row for entry in facts["document"]["gross_errors"] for row in entry["rows"]]
+    return np.isin(case.campaign.measurements.row, left_out)
 
 
 def step_fit(case: Case, facts: Mapping[str, Any], columns: Mapping[str, np.ndarray], number: int) -> Fit:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge
+from elastocal.diagnosis.judge import judge, without_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.loop.loading import load_campaign
@@ -66,7 +66,7 @@ def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
     case, final = diagnosis.case, diagnosis.final
     found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
     found = with_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judged_by_held_out(found, final, case, held_out)
+    return judged_by_held_out(found, final, case, without_gross_errors(diagnosis, held_out)[1])
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:

@@ -140,15 +140,17 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
             "could not be tested says what each mechanism needs."
         ]
     if kind == "adequate":
+        error = length(heldout["after"]["rms_m"])
         return [
-            "Use the declared model with the parameters fitted here.",
+            f"Use the declared model with the parameters fitted here. {_off_by(error)}",
             "Effects too small for these measurements may still be there. More poses, larger loads or repeats would show them.",
         ]
     advice, adopted = [], any(effect["adopted"] for effect in found)
     if found and not adopted:
+        error = length(heldout["after"]["rms_m"])
         advice.append(
             "Use the declared model until more is known: what was found is too uncertain to make predictions better and is not "
-            "part of the final model."
+            f"part of the final model. {_off_by(error)}"
         )
     elif found:
         low, high = heldout["reduction_ci95"]
@@ -181,6 +183,10 @@ def what_to_do(verdict: Mapping[str, Any], experiment: Sequence[Mapping[str, Any
     if found and heldout["outside_range"]["poses"]:
         advice.append("Beyond the range of the fitted poses the errors are extrapolated; see the section on errors.")
     return advice
+
+
+def _off_by(error: str) -> str:
+    return f"At validation poses it is off by {error} RMS from what the tracker measured, its noise included."
 
 
 def held_out_sentence(verdict: Mapping[str, Any], steps: Sequence[Mapping[str, Any]]) -> str:

@@ -74,7 +74,7 @@ def loop_facts(
         "now": what_to_do(verdict, experiment),
         "warnings": [] if faulty else [_with_minus(as_sentence(in_words(warning))) for warning in verdict["warnings"]],
         "held_out_sentence": "" if faulty else held_out_sentence(verdict, steps),
-        "accuracy": "" if faulty else accuracy_sentence(accuracy_from(verdict["accuracy"])),
+        "accuracy": accuracy_sentence(accuracy_from(stated)) if (stated := verdict.get("accuracy")) else "",
         "measured": measured(table, descriptions),
         "noise": noise_rows(verdict["noise"], descriptions["campaign"]["measured"] == "pose"),
         "noise_source": NOISE_SOURCES[verdict["noise"]["source"]],
