@@ -132,11 +132,11 @@ def compare_verdicts(robot_file: str | Path, robots_folder: str | Path, seed: in
     wrong = np.isin(np.arange(len(table["pose"])), [row for slip in slips for row in slip.rows])
     away = draws.choice(np.flatnonzero(~wrong), wrong.sum(), replace=False)
     fewer = {name: np.delete(column, away) for name, column in table.items()}
-    said = {
+    stated = {
         version: _verdict_on(made, rows, robot_file, robots_folder)
         for version, rows in ((CLEAN, table), (DAMAGED, bad), (FEWER, fewer))
     }
-    return _rows(made, table, slips, said)
+    return _rows(made, table, slips, stated)
 
 
 def _drawn_design(arm: Arm, draws: np.random.Generator) -> Design:
@@ -221,9 +221,9 @@ def _verdict_on(made: MadeCampaign, table: Table, robot_file: str | Path, robots
 
 
 def _rows(
-    made: MadeCampaign, table: Table, slips: Sequence[BadReading], said: Mapping[str, Mapping[str, Any] | str]
+    made: MadeCampaign, table: Table, slips: Sequence[BadReading], stated: Mapping[str, Mapping[str, Any] | str]
 ) -> dict[str, np.ndarray]:
-    named = {version: _named_rows(verdict) for version, verdict in said.items()}
+    named = {version: _named_rows(verdict) for version, verdict in stated.items()}
     reading = list(zip(table["pose"], table["load"], table["repeat"], strict=True))
     right = {row for slip in slips for row in slip.rows}
     if slips[0].kind in (JOINT_ANGLE, LOAD):
@@ -244,7 +244,7 @@ def _rows(
         "clean_rows_lost": len(named[CLEAN]),
         "wrongly_named": len(named[DAMAGED] - right),
     }
-    for version, verdict in said.items():
+    for version, verdict in stated.items():
         head |= {f"{version}_{name}": value for name, value in _words_of(verdict).items()}
     held_out = made.design.poses - made.design.held_out
     count = len(slips)

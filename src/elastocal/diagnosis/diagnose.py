@@ -137,7 +137,7 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     known = faults(part.case.campaign, part.case.campaign.measurements)
     decisive = [fault for fault in known if fault.decisive]
     if decisive:
-        # Of measurements that mean something else no row can be told to be wrong.
+        # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
     tell(f"declared model fitted to {len(part.case.observations)} measurements")
     found, final = None, part.declared

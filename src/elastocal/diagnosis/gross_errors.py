@@ -2,8 +2,8 @@
 
 A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
 studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows
-exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is the larger of one
-standard deviation and of two robust estimates of scale, so that a model that does not fit makes no row stand out.
+exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is one standard deviation
+or, where that is more, what the rows that do not stand out scatter, so that a model that does not fit makes no row stand out.
 
 Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
 whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.stats import chi2
+from scipy.stats import f as f_distribution
 
 from elastocal.diagnosis.evidence import scale_weights
 from elastocal.diagnosis.linearize import prior_deviations
@@ -132,19 +133,28 @@ def _distances(
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
     """Distances in units of their scale, and which of them are gross errors, (N,).
 
-    ``rows`` says how many numbers a distance is of. Those not ``kept`` count as large for the scale. Where more than
+    ``rows`` says how many numbers a distance is of. Those not ``kept`` count as large for the first, robust scale; the second
+    is the root mean square of what does not stand out by the first, and the limit that of an F distribution. Where more than
     `gross_error_share` of all stand out, none does: then it is the model that is wrong.
     """
     ordered = np.sort(np.where(kept, distance, np.inf))
     usual = ordered[(np.array(_SCALE_QUANTILES) * (len(ordered) - 1)).astype(int)]
     scale = np.max(usual[np.isfinite(usual)] / np.sqrt(chi2.ppf(_SCALE_QUANTILES, rows))[np.isfinite(usual)], initial=1.0)
-    gross = distance > scale * _limit(len(distance), rows, settings)
+    inside = distance <= scale * _limit(len(distance), rows, settings)
+    if inside.mean() < 1.0 - settings.gross_error_share:
+        return distance / scale, np.zeros(len(distance), bool)
+    scale = max(1.0, float(np.sqrt((distance[inside] ** 2).mean() / rows)))
+    gross = distance > scale * _limit(len(distance), rows, settings, inside.sum() * rows)
     return distance / scale, gross if gross.mean() <= settings.gross_error_share else np.zeros(len(gross), bool)
 
 
-def _limit(count: int, rows: int, settings: Settings) -> float:
-    """Standard deviations that the largest of so many good rows exceeds with the probability of the settings."""
-    return float(np.sqrt(chi2.isf(settings.gross_error_level / count, rows)))
+def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -> float:
+    """Standard deviations that the largest of so many good rows exceeds with the probability of the settings.
+
+    ``freedom`` is that of the scale: infinite where it is known.
+    """
+    level = settings.gross_error_level / count
+    return float(np.sqrt(chi2.isf(level, rows) if np.isinf(freedom) else rows * f_distribution.isf(level, rows, freedom)))
 
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:

@@ -61,7 +61,7 @@ class Settings:
     )
     credible: float = _setting(0.95, "probability of the smallest set of hypotheses that a class lists")
     gross_error_level: float = _setting(
-        0.01,
+        0.005,
         "probability that a row of good measurements is left out as a gross error, by Bonferroni's bound; half for what is held"
         " out, so that 98 % of good campaigns lose no row",
     )
