@@ -44,7 +44,7 @@ _SETTLED = ("named", "adequate")
 def stated_accuracy(
     robot_file: str | Path, robots_folder: str | Path, effect: str, seed: int, frame: str
 ) -> list[dict[str, Any]]:
-    """One robot with one hidden defect: for each part what is predicted, bounded and decided of its error, and the ground truth."""
+    """One robot with one hidden defect: for each part what is predicted, bounded and decided of its error, and what it is."""
     plant, _ = hidden_robot(robot_file, seed, [effect])
     training, held_out = measured_cases(plant, robot_file, robots_folder, replace(CAMPAIGN, frame=frame), seed)
     found = diagnose(training, Settings(), seed)
