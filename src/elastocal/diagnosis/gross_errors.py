@@ -1,9 +1,9 @@
 """Rows that no model of the robot explains: a lost beam, a held point, a mistyped angle. They are found, named and left out.
 
 A row is judged by its deletion residual: its distance from what the other rows predict, in standard deviations (the externally
-studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows
-exceeds with a small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is one standard deviation
-or, where that is more, what the rows that do not stand out scatter, so that a model that does not fit makes no row stand out.
+studentized residual [1]_). Rows are a gross error beyond the distance that the largest of so many good rows exceeds with a
+small probability (a test of mean-shift outliers with Bonferroni's bound [2]_). The unit is one standard deviation or, where
+that is more, what the rows that do not stand out scatter: a model that does not fit makes no row stand out.
 
 Before it is known what the model lacks, the rows are predicted by everything that it might lack at once: the Gaussian process
 whose covariance is that of all candidates at their prior sizes. The worst row is taken out, the others are predicted again, and
