@@ -7,7 +7,15 @@ from made_folders import made_folder, made_table
 from scipy.stats import binom, chi2
 
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.gross_errors import _precision, _without, beyond_chance, deviations, entries_of, gross_errors
+from elastocal.diagnosis.gross_errors import (
+    _precision,
+    _without,
+    beyond_chance,
+    deviations,
+    entries_of,
+    gross_errors,
+    yardstick_of,
+)
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.kept_rows import fitted_to
 from elastocal.diagnosis.settings import Settings
@@ -35,12 +43,10 @@ def test_the_distance_of_a_row_is_that_from_a_fit_without_it(cases):
     measurements = case.campaign.measurements
     every = np.ones(len(measurements), bool)
     whole, without = fitted_to(case, every), fitted_to(case, np.arange(len(measurements)) != BAD)
-    found = [
-        deviations(part.declared.model, part.declared.estimate, measurements, whole.noise, part.declared.covariance, part.kept)[
-            1
-        ]
-        for part in (whole, without)
-    ]
+    found = []
+    for part in (whole, without):
+        yardstick = yardstick_of(part.declared, whole.noise, part.case.campaign.measurements)
+        found.append(deviations(part.declared.model, part.declared.estimate, measurements, yardstick, part.kept)[1])
     # Weights of the robust fit differ a little, since the model lacks something.
     assert found[0][BAD] == pytest.approx(found[1][BAD], rel=0.1)
 

@@ -48,6 +48,8 @@ if TYPE_CHECKING:
 _SCALE_QUANTILES = (0.5, 0.75)
 # Least share of a row's variance that is its own and not that of the parameters fitted to it.
 _LEAST_OWN = 0.01
+# Shares of the error common to a pose that a fit states.
+_POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 # Rows of which the scale is estimated at most, and of which the parameters' variance matters.
 _MOST = 20_000
 # Gross errors that have a sentence each among the warnings; the table of residuals has all.
@@ -77,23 +79,102 @@ class Deviations:
         return cls(np.zeros((count, rows)), np.zeros(count), np.zeros(count, bool))
 
 
-def deviations(
-    model: Model,
-    estimate: Estimate,
-    measurements: Measurements,
-    noise: Noise,
-    covariance: np.ndarray | None,
-    fitted: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of rows and their distances from the prediction, in standard deviations by the noise given.
+@dataclass(frozen=True)
+class Yardstick:
+    """What rows are judged by: noise of one row, and covariance (P, P) of the parameters under it, None where negligible."""
 
-    ``covariance`` is that of the parameters, None where it does not matter; ``fitted`` says which rows the parameters were
-    fitted to, (N,): their residuals are smaller by it, those of all others larger.
+    noise: Noise
+    covariance: np.ndarray | None
+
+
+def yardstick_of(fitted: Fit, noise: Noise, measurements: Measurements) -> Yardstick:
+    """What the rows that a model was fitted to say of themselves, beside the noise that was declared or repeats show.
+
+    Of the error common to a pose that the fit states the share counts that makes the generalized variance of most rows smallest
+    (an S-estimate [1]_): the rest may be that of the very errors that are looked for, or of a law that is not linear.
+
+    References
+    ----------
+    .. [1] Davies, P. L., Asymptotic behaviour of S-estimates of multivariate location parameters and dispersion matrices,
+       Annals of Statistics 15, 1987.
     """
     single = single_observations(measurements)
-    near = np.ones(len(single), bool)
-    if len(single) > _MOST:
-        covariance, near = None, spread_poses(single, _MOST)
+    some = select_states(single, spread_poses(single, _MOST))
+    free = ~fitted.held
+    negligible = len(some) < len(single) or not free.any()
+    priors = np.array([np.inf if p.prior_std is None else p.prior_std for _, p in fitted.parameters])[free]
+    sizes = np.array([p.plausible for _, p in fitted.parameters])[free]
+    parts = parts_of(some, observations_at_once(fitted.model.rows, len(free)))
+    lines = [_Line.of(fitted.model, fitted.estimate, part_at(some, *edges), noise) for edges in parts]
+    best = (np.inf, Yardstick(noise, None))
+    for share in _POSE_SHARES if fitted.noise.pose_rad else (0.0,):
+        pose_rad, covariance = share * fitted.noise.pose_rad, None
+        if not negligible:
+            information = np.diag((sizes / priors) ** 2)
+            for line in lines:
+                seen = line.white(line.sensitivities[..., free] * sizes, pose_rad).reshape(-1, len(sizes))
+                information += seen.T @ seen
+            covariance = np.zeros((len(free), len(free)))
+            covariance[np.ix_(free, free)] = np.linalg.pinv(information, hermitian=True) * np.outer(sizes, sizes)
+        distance = np.concatenate([line.distance(pose_rad, covariance, np.ones(len(line.residual), bool)) for line in lines])
+        volume = np.concatenate([line.log_volume(pose_rad) for line in lines]).mean()
+        rows = fitted.model.rows
+        # Rows do not scatter less than the noise that is known of them: a share that says so is too large.
+        spread = volume + rows * np.log(max(np.median(distance) / np.sqrt(chi2.median(rows)), 1.0))
+        best = min(best, (spread, Yardstick(replace(noise, pose_rad=pose_rad), covariance)), key=lambda each: each[0])
+    return best[1]
+
+
+@dataclass(frozen=True)
+class _Line:
+    """Rows about an estimate: residual (M, rows), sensitivities (M, rows, P), own variance (M, rows, rows), and that of a
+    radian in each joint."""
+
+    residual: np.ndarray
+    sensitivities: np.ndarray
+    own: np.ndarray
+    common: np.ndarray
+
+    @classmethod
+    def of(cls, model: Model, estimate: Estimate, some: Observations, noise: Noise) -> _Line:
+        line = linearize(model, estimate, some, conditions(model, estimate, some.states))
+        spread, jacobian = noise.spread(some), line.coordinate_jacobian[..., : model.sites.joints]
+        own = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
+        return cls(line.residual, line.sensitivities, own, jacobian @ jacobian.transpose(0, 2, 1))
+
+    def root(self, pose_rad: float) -> np.ndarray:
+        """Cholesky factor of the variance of each row."""
+        return np.linalg.cholesky(self.own + pose_rad**2 * self.common)
+
+    def white(self, values: np.ndarray, pose_rad: float) -> np.ndarray:
+        """Whitened values (M, rows, k)."""
+        return np.linalg.solve(self.root(pose_rad), values)
+
+    def log_volume(self, pose_rad: float) -> np.ndarray:
+        """Half the logarithm of the determinant of each variance, (M,)."""
+        return np.log(np.diagonal(self.root(pose_rad), axis1=1, axis2=2)).sum(axis=1)
+
+    def distance(self, pose_rad: float, covariance: np.ndarray | None, fitted: np.ndarray) -> np.ndarray:
+        """From the prediction by the other rows, in standard deviations, (M,)."""
+        white = self.white(self.residual[..., None], pose_rad)[..., 0]
+        if covariance is None:
+            return np.linalg.norm(white, axis=1)
+        seen = self.white(self.sensitivities, pose_rad)
+        share, axes = np.linalg.eigh(seen @ covariance @ seen.transpose(0, 2, 1))
+        own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
+        along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
+        return np.sqrt((along**2 / own).sum(axis=1))
+
+
+def deviations(
+    model: Model, estimate: Estimate, measurements: Measurements, yardstick: Yardstick, fitted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of rows and their distances from the prediction, in standard deviations.
+
+    ``fitted`` says which rows the parameters were fitted to, (N,): their residuals are smaller by it, those of others larger.
+    """
+    single, noise = single_observations(measurements), yardstick.noise
+    near = spread_poses(single, _MOST)
     residual, distance = np.empty((len(single), model.rows)), np.empty(len(single))
     sensor = np.repeat([noise.position_m, noise.orientation_rad], 3)[: model.rows]
     for states, seen in parts_of(single, observations_at_once(model.rows, 0)):
@@ -101,33 +182,18 @@ def deviations(
         residual[seen] = residuals(model, estimate, part, conditions(model, estimate, part.states))
         # No less than the whole distance, as the sensor is only a part of the variance.
         distance[seen] = np.linalg.norm(residual[seen] / sensor, axis=1)
-    limit = np.quantile(distance[near], _SCALE_QUANTILES[-1])
-    closely = near | (distance > limit)
+    closely = near | (distance > np.quantile(distance[near], _SCALE_QUANTILES[-1]))
     some = select_states(single, closely)
-    parts = parts_of(some, observations_at_once(model.rows, 0 if covariance is None else len(covariance)))
+    parts = parts_of(some, observations_at_once(model.rows, 0 if yardstick.covariance is None else len(yardstick.covariance)))
     distance[closely] = np.concatenate(
-        [_distances(model, estimate, part_at(some, *edges), noise, covariance, fitted[closely][edges[1]]) for edges in parts]
+        [
+            _Line.of(model, estimate, part_at(some, *edges), noise).distance(
+                noise.pose_rad, yardstick.covariance, fitted[closely][edges[1]]
+            )
+            for edges in parts
+        ]
     )
     return residual, distance
-
-
-def _distances(
-    model: Model, estimate: Estimate, some: Observations, noise: Noise, covariance: np.ndarray | None, fitted: np.ndarray
-) -> np.ndarray:
-    line = linearize(model, estimate, some, conditions(model, estimate, some.states))
-    spread = noise.spread(some)
-    jacobian = line.coordinate_jacobian[..., : model.sites.joints]
-    variance = measurement_covariances(noise, jacobian[:, None], model.rows, None if spread is None else spread[:, None])
-    variance += noise.pose_rad**2 * (jacobian @ jacobian.transpose(0, 2, 1))
-    root = np.linalg.cholesky(variance)
-    white = np.linalg.solve(root, line.residual[..., None])[..., 0]
-    if covariance is None:
-        return np.linalg.norm(white, axis=1)
-    seen = np.linalg.solve(root, line.sensitivities)
-    share, axes = np.linalg.eigh(seen @ covariance @ seen.transpose(0, 2, 1))
-    own = np.where(fitted[:, None], np.maximum(1.0 - share, _LEAST_OWN), 1.0 + share)
-    along = (axes.transpose(0, 2, 1) @ white[..., None])[..., 0]
-    return np.sqrt((along**2 / own).sum(axis=1))
 
 
 def beyond_chance(distance: np.ndarray, rows: int, kept: np.ndarray, settings: Settings) -> tuple[np.ndarray, np.ndarray]:
@@ -159,27 +225,21 @@ def _limit(count: int, rows: int, settings: Settings, freedom: float = np.inf) -
 
 def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np.ndarray, settings: Settings) -> Deviations:
     """Judge the rows of a campaign by a fit to those that are ``kept``, (N,), and the noise declared or shown by repeats."""
-    noise, covariance = _without_their_share(fitted, noise)
-    found = deviations(fitted.model, fitted.estimate, measurements, noise, covariance, kept)
+    yardstick = yardstick_of(fitted, noise, measurements.select(kept))
+    found = deviations(fitted.model, fitted.estimate, measurements, yardstick, kept)
     return Deviations(found[0], *beyond_chance(found[1], fitted.model.rows, kept, settings))
 
 
-def _without_their_share(fitted: Fit, noise: Noise) -> tuple[Noise, np.ndarray]:
-    """Noise and covariance by which rows are judged: what the fit leaves may be the very errors that are looked for."""
-    smaller = (noise.position_m / fitted.noise.position_m) ** 2
-    return replace(noise, pose_rad=fitted.noise.pose_rad), smaller * fitted.covariance
-
-
 def held_out_gross_errors(
-    fitted: Fit, there: tuple[Model, Estimate], noise: Noise, held_out: Case, settings: Settings
+    fitted: Fit, there: tuple[Model, Estimate], yardstick: Yardstick, held_out: Case, settings: Settings
 ) -> Deviations:
     """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them."""
     model, estimate = there
     measurements = held_out.campaign.measurements
-    noise, covariance = _without_their_share(fitted, noise)
-    carried = model is not fitted.model or estimate is not fitted.estimate
+    if model is not fitted.model or estimate is not fitted.estimate:
+        yardstick = replace(yardstick, covariance=None)
     unseen, every = np.zeros(len(measurements), bool), np.ones(len(measurements), bool)
-    residual, distance = deviations(model, estimate, measurements, noise, None if carried else covariance, unseen)
+    residual, distance = deviations(model, estimate, measurements, yardstick, unseen)
     return Deviations(residual, *beyond_chance(distance, model.rows, every, settings))
 
 

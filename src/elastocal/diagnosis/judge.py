@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.campaigns.columns import residual_columns
-from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of
+from elastocal.diagnosis.gross_errors import Deviations, entries_of, held_out_gross_errors, warnings_of, yardstick_of
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import noise_from
 from elastocal.fitting.displacement import conditions
@@ -113,11 +113,12 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
         return Deviations.none(count, held_out.model.rows), held_out
     part, settings = held_out, Settings()
     errors = Deviations.none(count, held_out.model.rows)
+    noise = noise_from(diagnosis.document).of_measurements
+    yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
         there, last = placed(final, diagnosis.case, part), errors.gross
-        noise = noise_from(diagnosis.document).of_measurements
-        errors = held_out_gross_errors(final, there, noise, held_out, settings)
+        errors = held_out_gross_errors(final, there, yardstick, held_out, settings)
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
             break
