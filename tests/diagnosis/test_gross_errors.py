@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from bad_rows import damaged
 from made_folders import made_folder, made_table
-from scipy.stats import binom, chi2
+from scipy.stats import binom, chi2, multivariate_normal
 
 from elastocal.diagnosis.diagnose import diagnose
 from elastocal.diagnosis.gross_errors import (
+    _log_likelihood,
     _precision,
     _without,
     beyond_chance,
@@ -78,9 +79,10 @@ def test_the_inverse_covariance_is_that_of_the_sum_and_of_its_part():
     loads, declared = draws.standard_normal((12, 5)), draws.standard_normal((12, 2))
     covariance = np.eye(12) + loads @ loads.T
     whole = covariance + declared @ declared.T
-    precision, log_det = _precision(covariance, declared)
+    precision, residual = _precision(covariance, declared), draws.standard_normal(12)
     np.testing.assert_allclose(precision, np.linalg.inv(whole), atol=1e-12)
-    assert log_det == pytest.approx(np.linalg.slogdet(whole)[1])
+    expected = multivariate_normal(cov=whole).logpdf(residual) + 6 * np.log(2 * np.pi)
+    assert _log_likelihood(covariance, declared, residual) == pytest.approx(expected)
     part = _without(precision, np.array([3, 4]))
     kept = np.delete(np.arange(12), [3, 4])
     np.testing.assert_allclose(part[np.ix_(kept, kept)], np.linalg.inv(whole[np.ix_(kept, kept)]), atol=1e-12)

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import lapack, solve_triangular
 from scipy.stats import chi2
 from scipy.stats import f as f_distribution
 
@@ -261,7 +262,7 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
     declared = (rows.declared * deviation).reshape(about.residual.size, -1)
     columns = (sizes * rows.candidates.dense()).reshape(about.residual.size, -1)
     covariance, residual = np.eye(len(columns)) + columns @ columns.T, rows.residual.ravel()
-    precision, limit = _precision(covariance, declared)[0], _limit(observed, own, settings)
+    precision, limit = _precision(covariance, declared), _limit(observed, own, settings)
     while kept.mean() > 1.0 - settings.gross_error_share:
         distance = _deletion_distances(precision, residual, kept, own)
         worst = int(np.argmax(distance))
@@ -271,7 +272,7 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
         precision = _without(precision, np.arange(worst * own, (worst + 1) * own))
     if not kept.all():
         covariance = covariance + _pose_error(problem, covariance, declared, np.repeat(kept, own))
-    whole = _precision(covariance, declared)[0]
+    whole = _precision(covariance, declared)
     while not kept.all():
         out = np.flatnonzero(np.repeat(~kept, own))
         distance = _deletion_distances(_without(whole, out), residual, kept, own)
@@ -285,13 +286,30 @@ def improbable(problem: Linearized, settings: Settings) -> np.ndarray:
     return ~kept
 
 
-def _precision(covariance: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
-    """Inverse of a covariance to which that of declared columns of unit size is added, and the logarithm of its determinant."""
-    inverse = np.linalg.inv(np.linalg.cholesky(covariance))
-    basis, triangle = np.linalg.qr(np.concatenate([inverse @ declared, np.eye(declared.shape[1])]))
-    beside = basis[: len(declared)].T @ inverse
-    log_det = 2.0 * (np.log(np.abs(np.diag(triangle))).sum() - np.log(np.diag(inverse)).sum())
-    return inverse.T @ inverse - beside.T @ beside, float(log_det)
+def _precision(covariance: np.ndarray, declared: np.ndarray) -> np.ndarray:
+    """Inverse of a covariance to which that of declared columns of unit size is added (Woodbury's identity)."""
+    root = np.linalg.cholesky(covariance)
+    basis, _ = _declared_basis(root, declared)
+    inverse = lapack.dpotri(root, lower=1)[0]
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    beside = solve_triangular(root, basis, lower=True, trans="T")
+    return inverse - beside @ beside.T
+
+
+def _log_likelihood(covariance: np.ndarray, declared: np.ndarray, residual: np.ndarray) -> float:
+    """Logarithm of the density of a residual of zero mean under that sum, but for a constant."""
+    root = np.linalg.cholesky(covariance)
+    basis, log_size = _declared_basis(root, declared)
+    white = solve_triangular(root, residual, lower=True)
+    squares = white @ white - ((basis.T @ white) ** 2).sum()
+    return float(-0.5 * squares - np.log(np.diag(root)).sum() - log_size)
+
+
+def _declared_basis(root: np.ndarray, declared: np.ndarray) -> tuple[np.ndarray, float]:
+    """Whitened declared columns beside their priors, made orthonormal, (n, P) without the latter; half the log determinant."""
+    white = solve_triangular(root, declared, lower=True)
+    basis, triangle = np.linalg.qr(np.concatenate([white, np.eye(declared.shape[1])]))
+    return basis[: len(declared)], float(np.log(np.abs(np.diag(triangle))).sum())
 
 
 def _without(precision: np.ndarray, out: np.ndarray) -> np.ndarray:
@@ -310,8 +328,8 @@ def _pose_error(problem: Linearized, covariance: np.ndarray, declared: np.ndarra
     common = (jacobian @ jacobian.T) * (pose[:, None] == pose)
     best = (-np.inf, 0.0)
     for tau in problem.problem.statistics.pose_error_rad:
-        precision, log_det = _precision((covariance + tau**2 * common)[np.ix_(known, known)], declared[known])
-        best = max(best, (-0.5 * (float(residual @ precision @ residual) + log_det), float(tau)))
+        likely = _log_likelihood((covariance + tau**2 * common)[np.ix_(known, known)], declared[known], residual)
+        best = max(best, (likely, float(tau)))
     return best[1] ** 2 * common
 
 
