@@ -95,7 +95,9 @@ def test_measurements_come_back_as_they_were(measured, covariates, kuka, config_
 def residuals_of(rows, held_out=False, **others):
     before, after = (np.arange(2.0 * rows).reshape(2, rows) + start for start in (100.0, 200.0))
     position = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    return residual_columns(two_measurements(**others), held_out, np.array([False, True]), position, before, after)
+    return residual_columns(
+        two_measurements(**others), held_out, False, np.array([False, True]), position, {"before": before, "after": after}
+    )
 
 
 def test_residuals_of_poses_stand_beside_the_measurements_in_the_positions_that_are_given():

@@ -212,7 +212,8 @@ def test_names_of_all_that_is_tested_are_unique_wherever_a_step_was_fitted(campa
         model, start = with_effect(campaign, "setup_step", 0.0)
         start.shapes[-1][:] = when
         fitted = replace(fitted, model=model, estimate=start)
-    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, around.sites, states)]
+    model = replace(fitted.model, sites=around.sites)
+    candidates = [c for c in candidates_on(around.sites).values() if not lacking(c, model, states)]
     laws = [(each, 1) for each in competitors(around)]
     tested = [(c, shapes) for c in candidates for shapes in shapes_tried(c, fitted)]
     units = units_of(tested, laws, SETTINGS)

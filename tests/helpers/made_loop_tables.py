@@ -23,6 +23,7 @@ def residual_table(poses=30, targets=2, loaded=True, timed=True, found=True, rep
         "target": np.tile(np.arange(targets), 2 * poses * repeats),
         "row": np.arange(1, count + 1),
         "held_out": pose % 3 == 0,
+        "gross_error": np.zeros(len(pose), bool),
         "outside_range": pose == 0,
         "time_s": 60.0 * np.arange(count) if timed else np.full(count, np.nan),
     }

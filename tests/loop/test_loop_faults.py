@@ -15,7 +15,7 @@ from elastocal.loop.whole import diagnosed
 PLACE, TURN = np.array([2.0, 0.6, -0.2]), np.array([0.3, -0.5, 1.2])
 WRENCH = ("fx", "fy", "fz", "mx", "my", "mz")
 POSE = {"measured": "pose", "noise": {"position_m": 6e-5, "orientation_rad": 6e-5}}
-OFFSET = [0.0, 0.0, 0.12]
+OFFSET = [0.0, 0.0, 0.008]
 
 
 def scaled(table, names, factor):
@@ -115,7 +115,7 @@ def test_the_transform_that_fits_is_told_with_a_wrong_frame(kuka, config_folder,
 
 
 def test_a_target_offset_in_millimetres_is_named(kuka, config_folder, tmp_path):
-    """Offsets of 0.12 m along z in the file of the measurements, 120 where metres are asked for."""
+    """Offsets of 8 mm along z in the file of the measurements, 8 where metres are asked for: more is refused at the door."""
     table = made_table(kuka, "made")
     vectors = np.column_stack([table[f"r{axis}"] for axis in "xyz"])
     moved = Rotation.from_rotvec(vectors).apply(OFFSET)
@@ -170,4 +170,4 @@ def test_a_robot_in_millimetres_is_refused_in_one_line(kuka, config_folder, tmp_
     with pytest.raises(InputError) as caught:
         diagnosed(folder.as_posix(), Path(config_folder / "robots").as_posix(), 1)
     (line,) = str(caught.value).splitlines()
-    assert "mine.yaml: lengths_m: " in line and "3656 m" in line and "metres (not millimetres)" in line
+    assert "mine.yaml: line 4, lengths_m.l1: found 675" in line and "metres, not millimetres" in line

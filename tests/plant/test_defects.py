@@ -39,7 +39,8 @@ COMPARABLE = {
 
 
 def test_every_effect_of_the_catalogue_can_be_a_defect():
-    assert set(NAMED) == set(effects())
+    # A base that stands elsewhere than declared is none of the robot: the tracker of a setting sees it there.
+    assert {*NAMED, "base_placement"} == set(effects())
 
 
 def test_no_kind_outside_of_the_catalogue_bears_a_name_of_it():

@@ -164,6 +164,7 @@ EDITS = {
         {"simulate", "measure"},
     ),
     "a fault": (
+        "src/elastocal/data_checks/loads.py",
         {"diagnose_campaign", "judge_campaign"},
         {"read_campaign"},
     ),

@@ -50,8 +50,7 @@ def residual_columns(
     gross_errors: bool,
     outside: np.ndarray,
     position: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
+    stages: Mapping[str, np.ndarray],
 ) -> dict[str, np.ndarray]:
     """Columns of the residuals table.
 
@@ -63,8 +62,8 @@ def residual_columns(
         Whether each lies outside of the range of the poses fitted.
     position : ndarray (N, 3)
         m, base axes.
-    before, after : ndarray (N, rows)
-        Residuals of the declared and of the found model, m and rad.
+    stages : dict of str to ndarray (N, rows)
+        Residuals "before", of the declared model, and "after", of the found one, m and rad.
 
     Returns
     -------
@@ -77,7 +76,7 @@ def residual_columns(
     columns |= {f"q{j + 1}": measurements.joint_angles[:, j] for j in range(joints)}
     columns |= dict(zip(WRENCH_NAMES, measurements.wrench.T, strict=True))
     columns |= dict(zip("xyz", position.T, strict=True))
-    for stage, residual in (("before", before), ("after", after)):
+    for stage, residual in stages.items():
         whole = np.full((count, 6), np.nan)
         whole[:, : residual.shape[1]] = residual
         columns |= {f"{stage}_{name}": whole[:, k] for k, name in enumerate(COMPONENT_NAMES)}

@@ -240,9 +240,12 @@ def residual_blocks(diagnosis: Diagnosis, verdict: Verdict) -> Iterator[dict[str
             if not len(some):
                 continue
             observations = single_observations(some)
-            off = [residuals(*each, observations, conditions(*each, observations.states)) for each in there]
+            off = {
+                stage: residuals(*each, observations, conditions(*each, observations.states))
+                for stage, each in zip(("before", "after"), there, strict=True)
+            }
             position = measured_in_base(there[-1][1], observations)[0]
-            yield residual_columns(some, unseen, some is left_out, beyond, position, *off)
+            yield residual_columns(some, unseen, some is left_out, beyond, position, off)
 
 
 def _with_gross_errors(heldout: Mapping[str, Any], count: int) -> str:
