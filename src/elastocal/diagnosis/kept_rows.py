@@ -50,13 +50,15 @@ def first_kept(case: Case, settings: Settings) -> Kept:
         last, part = part, fitted_to(case, ~errors.gross, part)
         if part is last:
             break
-    observations, apart = case.observations, measured_in(case.observations, measurements, ~part.kept)
-    few = spread_poses(observations, settings.gross_start_numbers // case.model.rows)
+    observations, most = case.observations, settings.gross_start_numbers // case.model.rows
+    few = spread_poses(observations, most)
     if part is whole and not few.all():
         # Nothing stands apart, and there are too many to look more closely.
         return whole
-    few[observations.state[apart]] = True
+    apart = np.unique(observations.state[measured_in(observations, measurements, ~part.kept)])
+    few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
     taken = improbable(linearized(about, some, candidates, settings), settings)
-    return fitted_to(case, ~measured_in(measurements, some, taken), whole)
+    looked_at = measured_in(measurements, some, np.ones(len(some), bool))
+    return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), whole)
