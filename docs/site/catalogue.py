@@ -58,6 +58,7 @@ NEEDS = {
     "approach": "the sense of approach of each joint",
     "time": "the time of each measurement",
     "temperature": "the temperature",
+    "declared base": "a base whose place is declared (``frame: base``)",
 }
 
 
