@@ -1,11 +1,13 @@
 """Which rows are fitted, before anything is known of what the model lacks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bad_rows import damaged
 from made_folders import made_folder, made_table
 
-from elastocal.diagnosis.kept_rows import first_kept, fitted_to
+from elastocal.diagnosis.kept_rows import extreme_loads, first_kept, fitted_to
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in
 
@@ -37,3 +39,18 @@ def test_the_same_rows_are_fitted_once(case):
     assert fitted_to(case, every.copy(), part) is part
     fewer = np.arange(len(every)) != 3
     assert len(fitted_to(case, fewer, part).case.campaign.measurements) == len(every) - 1
+
+
+@pytest.mark.parametrize("times", [-4.0, 30.0, 300.0])
+def test_loads_that_pull_the_fit_to_themselves_are_found_together(case, times):
+    measurements = case.campaign.measurements
+    bad = np.flatnonzero(measurements.wrench.any(axis=1))[[1, 6, 9]]
+    wrench = measurements.wrench.copy()
+    wrench[bad] *= times
+    campaign = replace(case.campaign, measurements=replace(measurements, wrench=wrench))
+    kept = first_kept(replace(case, campaign=campaign).select(np.ones(len(wrench), bool)), SETTINGS).kept
+    assert not kept[bad].any()
+
+
+def test_a_ladder_of_loads_has_no_extreme_one(case):
+    assert not extreme_loads(case.campaign.measurements, SETTINGS).any()

@@ -15,6 +15,7 @@ from elastocal.fitting.observations import measured_in, select_states, spread_po
 from elastocal.fitting.tolerances import fit_declared
 
 if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.settings import Settings
     from elastocal.fitting.case import Case
     from elastocal.fitting.fit_result import Fit
@@ -42,9 +43,14 @@ def fitted_to(case: Case, kept: np.ndarray, last: Kept | None = None) -> Kept:
 
 
 def first_kept(case: Case, settings: Settings) -> Kept:
-    """The part of a case that its declared model, or all candidates together, might explain."""
+    """The part of a case that its declared model, or all candidates together, might explain.
+
+    Rows under far larger loads than most are judged by the others alone: they would pull any fit to themselves (bad leverage
+    points; Rousseeuw and Leroy, Robust Regression and Outlier Detection, 1987).
+    """
     measurements, candidates = case.campaign.measurements, list(case.candidates.values())
-    whole = part = fitted_to(case, np.ones(len(measurements), bool))
+    pulling = extreme_loads(measurements, settings)
+    whole = part = fitted_to(case, ~pulling)
     for _ in range(settings.gross_error_rounds):
         errors = gross_errors(part.declared, part.noise, measurements, part.kept, settings)
         last, part = part, fitted_to(case, ~errors.gross, part)
@@ -57,8 +63,18 @@ def first_kept(case: Case, settings: Settings) -> Kept:
         return whole
     apart = np.unique(observations.state[measured_in(observations, measurements, ~part.kept)])
     few[apart[np.linspace(0, len(apart) - 1, min(len(apart), most)).astype(int)]] = True
+    few[observations.state[measured_in(observations, measurements, pulling)]] = False
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
     taken = improbable(linearized(about, some, candidates, settings), settings)
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
     return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), whole)
+
+
+def extreme_loads(measurements: Measurements, settings: Settings) -> np.ndarray:
+    """Which rows are under a force far beyond that of most loaded ones, if these are few, ndarray of bool (N,)."""
+    force = np.linalg.norm(measurements.wrench[:, :3], axis=1)
+    if not force.any():
+        return np.zeros(len(force), bool)
+    far = force > settings.extreme_load * np.quantile(force[force > 0], 0.75)
+    return far if far.mean() <= settings.gross_error_share else np.zeros(len(far), bool)

@@ -73,6 +73,11 @@ class Settings:
         "numbers that are judged by all candidates at once before the search; of more, those that stand out beside the declared"
         " model and a sample of the others: one that does not stand out there hardly moves what a search finds",
     )
+    extreme_load: float = _setting(
+        3.0,
+        "times the upper quartile of forces beyond which a few rows are first judged by the others: ladders of loads stay"
+        " within, and honest rows beyond it come back as soon as the others predict them",
+    )
     gross_error_rounds: int = _setting(
         4, "times that a model is searched for at most, each without the rows that the one before does not explain"
     )
