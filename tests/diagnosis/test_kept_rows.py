@@ -54,3 +54,10 @@ def test_loads_that_pull_the_fit_to_themselves_are_found_together(case, times):
 
 def test_a_ladder_of_loads_has_no_extreme_one(case):
     assert not extreme_loads(case.campaign.measurements, SETTINGS).any()
+
+
+def test_a_repeat_that_is_in_no_average_stays_out(case):
+    measurements = case.campaign.measurements
+    state = list(zip(measurements.pose, measurements.load, measurements.target, strict=True))
+    repeated = [place for place, key in enumerate(state) if state.count(key) > 2][:1]
+    assert not first_kept(damaged(case, dict.fromkeys(repeated, 2.0)), SETTINGS).kept[repeated].any()

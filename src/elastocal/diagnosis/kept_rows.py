@@ -11,7 +11,7 @@ from elastocal.diagnosis.gross_errors import gross_errors, improbable
 from elastocal.diagnosis.linearize import linearized
 from elastocal.fitting.least_squares import evaluated
 from elastocal.fitting.noise_estimation import estimated_noise
-from elastocal.fitting.observations import measured_in, select_states, spread_poses
+from elastocal.fitting.observations import measured_in, select_states, spread_poses, without_outlying_repeats
 from elastocal.fitting.tolerances import fit_declared
 
 if TYPE_CHECKING:
@@ -67,7 +67,9 @@ def first_kept(case: Case, settings: Settings) -> Kept:
     some = select_states(observations, few)
     about = evaluated(part.declared.model, some, part.noise, part.declared.estimate)
     taken = improbable(linearized(about, some, candidates, settings), settings)
+    # A repeat far from its others is in no average, and stays what the declared model says of it.
     looked_at = measured_in(measurements, some, np.ones(len(some), bool))
+    looked_at &= np.isin(measurements.row, without_outlying_repeats(measurements).row)
     return fitted_to(case, ~np.where(looked_at, measured_in(measurements, some, taken), ~part.kept), whole)
 
 
