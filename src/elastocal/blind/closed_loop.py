@@ -22,6 +22,7 @@ from elastocal.application.inverse_kinematics import SOLVED_M, beyond_limits, re
 from elastocal.blind.folders import write_blind_campaign
 from elastocal.blind.rehearsal import ERRORS_OF_GEOMETRY, hidden_robot, reached
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.effects.catalogue import declared_candidates
 from elastocal.effects.catalogue import effects as catalogue
@@ -140,7 +141,7 @@ def closed_loop(
     models = {
         GEOMETRY: calibrated_from(_geometry(training, found), replace(robot, masses=())),
         DECLARED: calibrated_from(found.declared, robot),
-        FOUND: calibrated_by(found, held_out),
+        FOUND: calibrated_by(found, without_gross_errors(found, held_out)[1]),
     }
     for name in MODELS:
         if name == UNCORRECTED:

@@ -20,6 +20,7 @@ from elastocal.application.compensation import corrected
 from elastocal.blind.closed_loop import CAMPAIGN, LOADED, MILLING, UNLOADED, measured_cases, wanted_poses
 from elastocal.blind.rehearsal import hidden_robot, reached
 from elastocal.diagnosis.diagnose import diagnose
+from elastocal.diagnosis.judge import without_gross_errors
 from elastocal.diagnosis.settings import Settings
 from elastocal.exchange.target_path import OK
 from elastocal.loop.whole import calibrated_by
@@ -48,7 +49,7 @@ def stated_accuracy(
     plant, _ = hidden_robot(robot_file, seed, [effect])
     training, held_out = measured_cases(plant, robot_file, robots_folder, replace(CAMPAIGN, frame=frame), seed)
     found = diagnose(training, Settings(), seed)
-    calibrated = calibrated_by(found, held_out)
+    calibrated = calibrated_by(found, without_gross_errors(found, held_out)[1])
     wanted = wanted_poses(training.campaign.robot, plant, seed)
     operating = OperatingConditions(wanted.wrench)
     targets = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Measurements
     from elastocal.diagnosis.diagnose import Diagnosis, Step
     from elastocal.fitting.case import Case
+    from elastocal.fitting.model import Estimate, Model
     from elastocal.validation.held_out import Errors
 
 _REPLICATES = 1000
@@ -86,14 +87,14 @@ def judge(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     errors, part = without_gross_errors(diagnosis, held_out)
     left_out = entries_of(errors, held_out.campaign, held_out=True)
     rows, heldout, warnings = heldout_errors(steps, case, part, seed)
-    every = rows
+    of_all = [row["heldout_rms_m"] for row in rows]
+    heldout["with_gross_errors"] = None
     if left_out:
-        every, whole, _ = heldout_errors(steps, case, held_out, seed)
-        heldout["with_gross_errors"] = {"before": whole["before"], "after": whole["after"]}
+        whole = [_summary(error) for error in _errors(steps, case, held_out)[1]]
+        of_all = [error["rms_m"] for error in whole]
+        heldout["with_gross_errors"] = {"before": whole[_declared(steps)], "after": whole[-1]}
         warnings.append(_with_gross_errors(heldout, len(left_out)))
-    else:
-        heldout["with_gross_errors"] = None
-    rows = [row | {"heldout_rms_all_rows_m": other["heldout_rms_m"]} for row, other in zip(rows, every, strict=True)]
+    rows = [row | {"heldout_rms_all_rows_m": rms} for row, rms in zip(rows, of_all, strict=True)]
     gains = _gains(rows)
     effects = [entry | {"heldout_gain": gains.get(entry["name"])} for entry in diagnosis.document["effects"]]
     document = diagnosis.document | {
@@ -172,10 +173,8 @@ def heldout_errors(
         As in verdict.json.
     warnings : list of str
     """
-    there = [placed(step.fitted, case, held_out) for step in steps]
-    errors = [position_errors(model, estimate, held_out.observations) for model, estimate in there]
-    before = next(number for number, step in enumerate(steps) if step.kind == "declared")
-    after = len(steps) - 1
+    there, errors = _errors(steps, case, held_out)
+    before, after = _declared(steps), len(steps) - 1
     draws = stream(seed, case.campaign.name, "held-out poses", 0)
     limits, reductions = intervals(errors, _REPLICATES, draws, before)
     of_calibration = intervals([errors[0], errors[after]], _REPLICATES, draws)[1][1]
@@ -191,7 +190,7 @@ def heldout_errors(
             row |= {f"heldout_{name}_low": limit[name][0], f"heldout_{name}_high": limit[name][1]}
         row |= {f"heldout_{name.removesuffix('_m')}_over_floor": tested[name] / floor for name in METRICS}
         rows.append(row)
-    ends = [{name: float(value) for name, value in summary(errors[number].distance).items()} for number in (0, before, after)]
+    ends = [_summary(errors[number]) for number in (0, before, after)]
     outside = outside_poses(steps[after].fitted, case, held_out)
     by_range = errors_by_range({"before": errors[before], "after": errors[after]}, outside)
     heldout = {
@@ -207,6 +206,20 @@ def heldout_errors(
     }
     again = repeat_warnings(case.observations.states, held_out.observations.states)
     return rows, heldout, _warnings(steps, rows, errors, before, after) + _range_warnings(by_range, len(outside)) + again
+
+
+def _errors(steps: Sequence[Step], case: Case, held_out: Case) -> tuple[list[tuple[Model, Estimate]], list[Errors]]:
+    """Models of all steps, placed where held-out measurements were made, and their errors there."""
+    there = [placed(step.fitted, case, held_out) for step in steps]
+    return there, [position_errors(model, estimate, held_out.observations) for model, estimate in there]
+
+
+def _declared(steps: Sequence[Step]) -> int:
+    return next(number for number, step in enumerate(steps) if step.kind == "declared")
+
+
+def _summary(errors: Errors) -> dict[str, float]:
+    return {name: float(value) for name, value in summary(errors.distance).items()}
 
 
 def split_table(diagnosis: Diagnosis, held_out: Case, seed: int) -> list[dict[str, Any]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from elastocal.application.scope import calibrated_on, campaign_accuracy, judged_by_held_out, with_form
 from elastocal.campaigns.columns import columns_of
 from elastocal.diagnosis.diagnose import diagnose
-from elastocal.diagnosis.judge import judge, without_gross_errors
+from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.case import Case, case_from
 from elastocal.loop.loading import load_campaign
@@ -62,11 +62,11 @@ def diagnosed(folder: str | Path, robots_folder: str | Path, seed: int, settings
 
 
 def calibrated_by(diagnosis: Diagnosis, held_out: Case) -> CalibratedRobot:
-    """The robot that a diagnosis found, with all that is known of its errors."""
+    """The robot that a diagnosis found, with all that is known of its errors: held-out rows without gross ones judge it."""
     case, final = diagnosis.case, diagnosis.final
     found = calibrated_on(case, final.model, final.estimate, final.covariance, final.noise)
     found = with_form(found, diagnosis.document["other_models_m"] or 0.0)
-    return judged_by_held_out(found, final, case, without_gross_errors(diagnosis, held_out)[1])
+    return judged_by_held_out(found, final, case, held_out)
 
 
 def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
@@ -77,5 +77,5 @@ def judged(diagnosis: Diagnosis, held_out: Case, seed: int) -> Verdict:
     verdict, case = judge(diagnosis, held_out, seed), diagnosis.case
     accuracy = None
     if not any(effect["family"] == "data" for effect in verdict.document["effects"]):
-        accuracy = campaign_accuracy(calibrated_by(diagnosis, held_out), case.observations.states).document()
+        accuracy = campaign_accuracy(calibrated_by(diagnosis, verdict.held_out), case.observations.states).document()
     return replace(verdict, document=verdict.document | {"accuracy": accuracy})
