@@ -48,6 +48,22 @@ def test_a_held_out_pose_that_was_fitted_is_found(run):
     assert "no pose is fitted and held out" in failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell"))
 
 
+def test_a_held_out_pose_that_repeats_a_configuration_fitted_is_found(run):
+    """A pose of its own number, with the joint angles of one that was fitted, in a campaign whose poses are drawn."""
+    (run.folder / FOLDER / "campaign.json").write_text(
+        json.dumps({"campaign": {"holdout": {"fraction": 0.4}}, "held_out": None})
+    )
+    for name in ("training", "held_out"):
+        frame = pd.read_parquet(run.folder / FOLDER / f"{name}.parquet")
+        frame["q1"] = frame["pose"].astype(float)
+        frame.to_parquet(run.folder / FOLDER / f"{name}.parquet")
+    assert failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell")) == []
+    run.table.cache_clear()
+    frame.assign(q1=[5.0, 1.01, 7.0]).to_parquet(run.folder / FOLDER / "held_out.parquet")
+    found = failed(campaigns.measurements(run, f"{FOLDER}/training.parquet", "cell"))
+    assert found == ["no configuration is fitted and held out"]
+
+
 def test_a_pose_of_another_campaign_may_have_the_same_number_but_not_the_same_measurement(run):
     (run.folder / FOLDER / "campaign.json").write_text(json.dumps({"held_out": "other"}))
     frame = pd.read_parquet(run.folder / FOLDER / "held_out.parquet")

@@ -132,13 +132,13 @@ def test_a_session_is_held_out_where_five_poses_of_others_are_left(cell, poses, 
         training, held_out = split(cell.read())
         assert poses_of(held_out) == {(1, 0), (1, 1)} and len(poses_of(training)) == 5
     else:
-        with refused(cell.source, "holdout", "4 poses to fit and 2 held out"):
+        with refused(cell.source, "holdout", "4 configurations to fit and 2 held out"):
             cell.read()
 
 
 def test_as_many_blocks_as_poses_are_blocks_of_one_pose_of_which_one_is_too_few(cell):
     cell.document["holdout"] = {"blocks": POSES}
-    with refused(cell.source, "holdout", f"{POSES - 1} poses to fit and 1 held out"):
+    with refused(cell.source, "holdout", f"{POSES - 1} configurations to fit and 1 held out"):
         cell.read()
 
 
@@ -200,23 +200,45 @@ def test_other_campaign_that_is_not_there_is_refused(cell):
         ({"holdout": {"poses": [[0, 1, 2]]}}, "holdout.poses[0]", ["2 or fewer"]),
         ({"holdout": {"poses": [3, 12]}}, "holdout.poses", ["found 12", "0..9"]),
         ({"holdout": {"poses": [3, [1, 4]]}}, "holdout.poses", ["[1, 4]", "0..9"]),
-        ({"holdout": {"poses": [3]}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
-        ({"holdout": {"poses": [1, 2, 3, 4, 5, 6]}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
-        ({"holdout": {"fraction": 0.6}}, "holdout", ["4 poses to fit and 6 held out", "at least 5 to fit"]),
+        ({"holdout": {"poses": [3]}}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
+        (
+            {"holdout": {"poses": [1, 2, 3, 4, 5, 6]}},
+            "holdout",
+            ["4 configurations to fit and 6 held out", "at least 5 to fit"],
+        ),
+        ({"holdout": {"fraction": 0.6}}, "holdout", ["4 configurations to fit and 6 held out", "at least 5 to fit"]),
         ({"holdout": {"fraction": 0.3, "blocks": 3}}, "holdout", ["fraction, blocks together", "{blocks, seed}"]),
         ({"holdout": {"session": 0, "seed": 1}}, "holdout", ["session, seed together", "{session}"]),
         ({"holdout": {"blocks": 1}}, "holdout.blocks", ["found 1", "2 or more"]),
         ({"holdout": {"blocks": 2.5}}, "holdout.blocks", ["2.5", "integer"]),
-        ({"holdout": {"blocks": 11}}, "holdout.blocks", ["11", "at most as many as poses, 10"]),
+        ({"holdout": {"blocks": 11}}, "holdout.blocks", ["11", "at most as many as configurations, 10"]),
         ({"holdout": {"blocks": 9}}, "holdout", ["1 held out", "2 held out"]),
         ({"holdout": {"session": 3}}, "holdout.session", ["found 3", "sessions that were measured: 0"]),
         ({"holdout": {"session": [0, "x"]}}, "holdout.session[1]", ["'x'", "integer"]),
         ({"holdout": {"session": []}}, "holdout.session", ["session"]),
-        ({"holdout": {"session": 0}}, "holdout", ["0 poses to fit and 10 held out"]),
-        ({"holdout": {"fraction": 0.1}}, "holdout", ["9 poses to fit and 1 held out", "2 held out"]),
+        ({"holdout": {"session": 0}}, "holdout", ["0 configurations to fit and 10 held out"]),
+        ({"holdout": {"fraction": 0.1}}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),
     ],
 )
 def test_faulty_holdout_is_refused_in_one_line(cell, changes, key, words):
     cell.document |= changes
     with refused(f"{cell.source}: ", f" {key}", *words):
+        cell.read()
+
+
+@pytest.mark.parametrize("holdout", [{"fraction": 0.3, "seed": 2}, {"blocks": 3, "seed": 1}])
+def test_poses_of_one_configuration_are_fitted_or_held_out_together(cell, holdout):
+    """Every configuration is measured again under a pose number of its own: the draw is that of the configurations."""
+    cell.document["holdout"] = holdout
+    once = poses_of(split(cell.read())[1])
+    again = {name: list(column) for name, column in cell.table.items()}
+    again["pose"] = [pose + POSES for pose in again["pose"]]
+    cell.table = {name: [*column, *again[name]] for name, column in cell.table.items()}
+    assert poses_of(split(cell.read())[1]) == once | {(session, pose + POSES) for session, pose in once}
+
+
+def test_thirty_poses_of_one_configuration_are_refused(cell):
+    for name in [name for name in cell.table if name.startswith("q")]:
+        cell.table[name] = [cell.table[name][0]] * len(cell.table[name])
+    with refused(cell.source, "holdout", "1 configurations to fit and 0 held out", "at least 5 to fit"):
         cell.read()

@@ -1,10 +1,12 @@
 """Joint space: blocks of neighbours that any order of the poses gives, and ranges that chance does not leave."""
 
 import numpy as np
+import pandas as pd
 import pytest
+from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.optimize import brentq
 
-from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, repeated
+from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, configurations, repeated
 
 
 @pytest.mark.parametrize(("poses", "count"), [(20, 4), (21, 4), (9, 4), (30, 7), (5, 5), (6, 1)])
@@ -110,3 +112,16 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     assert repeated(fitted, almost).all() and not repeated(fitted, elsewhere).any()
     # Each joint at the angle that it had in another pose is a pose of its own.
     assert not repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
+
+
+def test_poses_are_of_one_configuration_as_single_linkage_has_it():
+    """Pairs, a chain, and poses a little farther apart than one may be; scipy's hierarchical clustering has the last word."""
+    rng = np.random.default_rng(5)
+    apart = rng.uniform(-2, 2, (12, 6))
+    chain = apart[0] + 0.9 * SAME_POSE_RAD * np.arange(1, 5)[:, None] * np.eye(6)[2]
+    near = apart[5] + 1.1 * SAME_POSE_RAD * np.eye(6)[:3]
+    angles = np.concatenate([apart, chain, near, apart[8:10] + 1e-4])[rng.permutation(21)]
+    found = configurations(np.repeat(angles, 2, axis=0), np.repeat(np.arange(21), 2))
+    expected = pd.factorize(fcluster(linkage(angles, "single", "chebyshev"), SAME_POSE_RAD, "distance"))[0]
+    np.testing.assert_array_equal(found, expected)
+    assert found.max() + 1 == 15

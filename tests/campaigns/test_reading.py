@@ -137,7 +137,7 @@ def test_five_poses_are_the_fewest_that_another_campaign_may_test(cell, tmp_path
     other_campaign(cell, tmp_path)
     cell.table = some_poses(cell.table, poses)
     if poses < 5:
-        with refused(cell.source, "holdout", "4 poses to fit", "5 or more poses"):
+        with refused(cell.source, "holdout", "4 configurations to fit", "at least 5 to fit"):
             cell.read()
     else:
         training, held_out = split(cell.read())

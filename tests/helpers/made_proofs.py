@@ -216,7 +216,8 @@ def _league(folder):
     folds = dealt(measured, LEAGUE["folds"], stream(SEED, "one", "league folds", 0))
     write_table(folder / "results/league/one/folds.parquet", FOLDS, [folds], _ORIGIN)
     # Of the measurements an audit looks at which there are.
-    made[["session", "pose", "load", "target"]].to_parquet(folder / "results/league/one/measurements.parquet")
+    angles = {f"q{joint + 1}": measured.joint_angles[:, joint] for joint in range(measured.joint_angles.shape[1])}
+    made[["session", "pose", "load", "target"]].assign(**angles).to_parquet(folder / "results/league/one/measurements.parquet")
     results = []
     for method, size, std in (("geometry", 2e-4, None), ("half", 1e-4, None), ("process", 1.2e-4, 1.2e-4)):
         entries = made_entries(size, 40, len(method), std).assign(fold=folds["random"][made["pose"]])

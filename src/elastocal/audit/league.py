@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from scipy import stats
+from scipy.cluster.hierarchy import fcluster, linkage
 
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
 from elastocal.audit.streams import numbers
+from elastocal.campaigns.joint_space import SAME_POSE_RAD
 
 if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
@@ -22,7 +24,7 @@ _BY = "numpy's Philox stream, jackknife"
 
 
 def folds(run: Audited, file: str, data: str) -> list[Finding]:
-    """Random folds of the poses from their stream; blocks of joint space by their sizes.
+    """Random folds of the configurations from their stream; blocks of joint space by their sizes.
 
     Parameters
     ----------
@@ -34,14 +36,17 @@ def folds(run: Audited, file: str, data: str) -> list[Finding]:
     list of Finding
     """
     frame = run.table(file)
-    measured = run.table(f"results/league/{data}/measurements.parquet")[["session", "pose"]].drop_duplicates()
-    expected = measured.sort_values(["session", "pose"]).to_numpy()
+    poses = run.table(f"results/league/{data}/measurements.parquet").groupby(["session", "pose"]).mean(numeric_only=True)
+    expected = poses.index.to_frame().to_numpy()
     found = [compared(file, "every measured pose once", "counting", frame[["session", "pose"]], expected, 0.0)]
     count = int(frame["random"].max())
-    dealt = numbers(run.seed, data, "league folds", 0).permutation(len(expected)) % count + 1
-    found.append(compared(file, "random folds", "numpy's Philox stream", frame["random"], dealt, 0.0))
-    sizes = frame["blocks"].value_counts()
-    even = len(sizes) == count and sizes.max() - sizes.min() <= 1
+    joined = linkage(poses.filter(regex=r"^q\d+$").to_numpy(), "single", "chebyshev")
+    configuration, names = pd.factorize(fcluster(joined, SAME_POSE_RAD, "distance"))
+    dealt = numbers(run.seed, data, "league folds", 0).permutation(len(names))[configuration] % count + 1
+    found.append(compared(file, "random folds", "numpy's Philox stream, scipy's single linkage", frame["random"], dealt, 0.0))
+    blocks = frame["blocks"].groupby(configuration)
+    sizes = blocks.first().value_counts()
+    even = len(sizes) == count and sizes.max() - sizes.min() <= 1 and (blocks.max() == blocks.min()).all()
     return [*found, held(file, "blocks of like size", "counting", bool(even), f"{sorted(sizes)}", len(sizes))]
 
 

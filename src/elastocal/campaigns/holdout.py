@@ -8,7 +8,7 @@ import numpy as np
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.groups import groups_of
-from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.campaigns.places import is_file_in
 from elastocal.errors import InputError
 
@@ -108,38 +108,23 @@ def other_folder(named: str, folder: Path, source: str) -> Path:
 
 
 def held_out_mask(holdout: Mapping[str, Any], measurements: Measurements, source: str) -> np.ndarray:
-    """Which measurements are held out.
+    """Which measurements are held out, ndarray of bool (N,).
 
-    Parameters
-    ----------
-    holdout : dict
-        As from `holdout_from`.
-    measurements : Measurements
-    source : str
-        Named in errors.
-
-    Returns
-    -------
-    ndarray of bool (N,)
-
-    Raises
-    ------
-    InputError
-        Too few poses, or poses that are not there.
+    Where poses are drawn it is by configuration, with all poses that share its joint angles: a repeat of what was fitted tests
+    nothing. `InputError`, which names ``source``: too few configurations, or poses that are not there.
     """
     pairs, index = measured_poses(measurements)
-    total = len(pairs)
-    if "campaign" in holdout:
-        if total < FEWEST_TRAINING_POSES:
-            raise InputError(source, "holdout", f"{total} poses to fit", f"{FEWEST_TRAINING_POSES} or more poses")
-        return np.zeros(len(index), bool)
-    chosen = _chosen_poses(holdout, measurements, pairs, index, source)
-    held_out = int(chosen.sum())
-    if total - held_out < FEWEST_TRAINING_POSES or held_out < FEWEST_HELD_OUT_POSES:
-        found = f"{total - held_out} poses to fit and {held_out} held out"
-        raise InputError(
-            source, "holdout", found, f"at least {FEWEST_TRAINING_POSES} to fit and {FEWEST_HELD_OUT_POSES} held out"
-        )
+    configuration = configurations(measurements.joint_angles, index)
+    chosen = np.zeros(len(pairs), bool)
+    if "campaign" not in holdout:
+        chosen = _chosen_poses(holdout, measurements, pairs, configuration, index, source)
+    fitted, tested = (len(np.unique(configuration[part])) for part in (~chosen, chosen))
+    fewest = 0 if "campaign" in holdout else FEWEST_HELD_OUT_POSES
+    if fitted < FEWEST_TRAINING_POSES or tested < fewest:
+        found = f"{fitted} configurations to fit and {tested} held out"
+        least = f"at least {FEWEST_TRAINING_POSES} to fit" + (f" and {fewest} held out" if fewest else "")
+        allowed = f"{least}; poses with the same joint angles are one"
+        raise InputError(source, "holdout", found, allowed)
     return chosen[index]
 
 
@@ -163,10 +148,15 @@ def measured_poses(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _chosen_poses(
-    holdout: Mapping[str, Any], measurements: Measurements, pairs: np.ndarray, index: np.ndarray, source: str
+    holdout: Mapping[str, Any],
+    measurements: Measurements,
+    pairs: np.ndarray,
+    configuration: np.ndarray,
+    index: np.ndarray,
+    source: str,
 ) -> np.ndarray:
     """Mask (P,) of the poses that are held out; `pairs` and `index` as of `measured_poses`."""
-    total, chosen = len(pairs), np.zeros(len(pairs), bool)
+    count, chosen = configuration.max() + 1, np.zeros(len(pairs), bool)
     if "poses" in holdout:
         for entry in holdout["poses"]:
             match = (pairs == entry).all(axis=1) if isinstance(entry, list | tuple) else pairs[:, 1] == entry
@@ -186,8 +176,7 @@ def _chosen_poses(
         return np.isin(pairs[:, 0], wanted)
     draws = np.random.Generator(np.random.PCG64(holdout["seed"]))
     if "blocks" in holdout:
-        if holdout["blocks"] > total:
-            raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as poses, {total}")
+        if holdout["blocks"] > count:
+            raise InputError(source, "holdout.blocks", str(holdout["blocks"]), f"at most as many as configurations, {count}")
         return blocks_of_poses(measurements.joint_angles, index, holdout["blocks"]) == draws.integers(holdout["blocks"])
-    chosen[draws.permutation(total)[: round(holdout["fraction"] * total)]] = True
-    return chosen
+    return np.isin(configuration, draws.permutation(count)[: round(holdout["fraction"] * count)])

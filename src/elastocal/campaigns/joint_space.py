@@ -1,6 +1,8 @@
 """Where poses lie in joint space: blocks of neighbours, and what lies beyond the range of others."""
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 # Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
@@ -63,25 +65,30 @@ def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
     return found
 
 
-def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:
-    """The same where poses were measured more than once: a block for each by the means of its angles.
+def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """The configuration of each pose, ndarray of int (P,), from angles (N, n) and pose, 0 .. P-1, of measurements or states.
 
-    Parameters
-    ----------
-    joint_angles : ndarray (N, n)
-        Of each measurement or state, rad.
-    pose : ndarray of int (N,)
-        0 .. P-1.
-    count : int
-        Of blocks.
-
-    Returns
-    -------
-    ndarray of int (P,)
+    Poses share a configuration where poses link them each of which lies within what a controller's servo error can differ
+    from the next: single linkage, so that no two configurations have poses that repeat each other. Numbered in the order of
+    the poses.
     """
-    mean = np.zeros((pose.max() + 1, joint_angles.shape[1]))
-    np.add.at(mean, pose, joint_angles)
-    return blocks(mean / np.bincount(pose)[:, None], count)
+    mean = _means(joint_angles, pose)
+    pairs = cKDTree(mean).query_pairs(SAME_POSE_RAD, p=np.inf, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(mean), len(mean)))
+    first, index = np.unique(connected_components(links, directed=False)[1], return_index=True, return_inverse=True)[1:]
+    return np.argsort(np.argsort(first))[index]
+
+
+def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:
+    """`blocks` of poses, ndarray of int (P,), by the means of their configurations; other arguments as of `configurations`."""
+    configuration = configurations(joint_angles, pose)
+    return blocks(_means(_means(joint_angles, pose), configuration), count)[configuration]
+
+
+def _means(joint_angles: np.ndarray, group: np.ndarray) -> np.ndarray:
+    mean = np.zeros((group.max() + 1, joint_angles.shape[1]))
+    np.add.at(mean, group, joint_angles)
+    return mean / np.bincount(group)[:, None]
 
 
 def beyond_range(fitted_angles: np.ndarray, joint_angles: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.holdout import measured_poses
-from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -21,7 +21,7 @@ SPLITS = (*WITHIN, SESSION)
 
 
 def dealt(measurements: Measurements, count: int, draws: np.random.Generator) -> dict[str, np.ndarray]:
-    """Deal poses into folds, at random and by blocks of joint space.
+    """Deal poses into folds, those of a configuration into one, at random and by blocks of joint space.
 
     Random folds have neighbours among the poses fitted, so they ask how well a method interpolates; blocks of joint space ask
     how well it extrapolates [1]_.
@@ -44,10 +44,11 @@ def dealt(measurements: Measurements, count: int, draws: np.random.Generator) ->
        structure, Ecography 40, 2017.
     """
     pairs, index = measured_poses(measurements)
+    configuration = configurations(measurements.joint_angles, index)
     return {
         "session": pairs[:, 0],
         "pose": pairs[:, 1],
-        RANDOM: draws.permutation(len(pairs)) % count + 1,
+        RANDOM: draws.permutation(configuration.max() + 1)[configuration] % count + 1,
         BLOCKS: blocks_of_poses(measurements.joint_angles, index, count) + 1,
     }
 

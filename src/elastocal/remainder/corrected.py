@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit_frames
 from elastocal.fitting.observations import sample_of, state_clusters
 from elastocal.remainder.catalogue import regressions
@@ -132,11 +132,12 @@ def _inner_parts(plan: Plan, fitted: Fit, observations: Observations, elsewhere:
     """Training poses in folds, the model fitted anew from nothing without each."""
     states, model = observations.states, fitted.model
     pose = state_clusters(states)
-    count = min(_INNER_FOLDS, pose.max() + 1)
+    configuration = configurations(states.joint_angles, pose)
+    count = min(_INNER_FOLDS, configuration.max() + 1)
     if plan.blocks:
         fold = blocks_of_poses(states.joint_angles, pose, count)
     else:
-        fold = np.random.default_rng(plan.seed).permutation(pose.max() + 1) % count
+        fold = np.random.default_rng(plan.seed).permutation(configuration.max() + 1)[configuration] % count
     for refit in refits(fitted, observations, fold[pose]):
         yield Part(
             inputs_of(model, refit.estimate, refit.rest, elsewhere),

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
-from elastocal.campaigns.joint_space import blocks_of_poses
+from elastocal.campaigns.joint_space import blocks_of_poses, configurations
 from elastocal.fitting.least_squares import fit
 from elastocal.fitting.observations import select_states, state_clusters
 from elastocal.fitting.registration import registered
@@ -65,16 +65,16 @@ def splits_of(states: States) -> list[Split]:
     Returns
     -------
     list of Split
-        Without those that leave too few poses to fit.
+        Without those that leave too few configurations to fit.
     """
     pose = state_clusters(states)
-    poses = pose.max() + 1
+    configuration = configurations(states.joint_angles, pose)[pose]
     sessions, session = np.unique(states.session, return_inverse=True)
     found = [Split("session", tuple(sessions.tolist()), session.ravel())] if len(sessions) > 1 else []
-    if poses >= JOINT_SPACE_BLOCKS:
+    if configuration.max() + 1 >= JOINT_SPACE_BLOCKS:
         labels = tuple(range(1, JOINT_SPACE_BLOCKS + 1))
         found.insert(0, Split("joint space", labels, blocks_of_poses(states.joint_angles, pose, JOINT_SPACE_BLOCKS)[pose]))
-    return [split for split in found if _fewest_left(split, pose) >= FEWEST_TRAINING_POSES]
+    return [split for split in found if _fewest_left(split, configuration) >= FEWEST_TRAINING_POSES]
 
 
 @dataclass(frozen=True)
@@ -210,9 +210,8 @@ def error_row(
     return row | {"reduction_std_error": change.std_error}
 
 
-def _fewest_left(split: Split, pose: np.ndarray) -> int:
-    poses = pose.max() + 1
-    return poses - max(len(np.unique(pose[split.part == number])) for number in range(len(split.labels)))
+def _fewest_left(split: Split, configuration: np.ndarray) -> int:
+    return min(len(np.unique(configuration[split.part != number])) for number in range(len(split.labels)))
 
 
 def _part(errors: Errors, mask: np.ndarray) -> Errors:
