@@ -12,14 +12,13 @@ from scipy.stats import f
 from elastocal.data_checks.protocol import Fault
 from elastocal.diagnosis import diagnose as module
 from elastocal.diagnosis import kept_rows
-from elastocal.diagnosis.diagnose import _effect_steps, _noise_warnings, _pose_error_warnings, diagnose
+from elastocal.diagnosis.diagnose import _effect_steps, diagnose
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.linearize import linearized
 from elastocal.diagnosis.refit import fit_with_sizes, selected
 from elastocal.diagnosis.search import posterior
 from elastocal.diagnosis.settings import Settings
 from elastocal.fitting.displacement import joint_compliances
-from elastocal.fitting.noise import Noise
 from elastocal.loop.whole import cases_in
 
 OFFSET = 1e-3
@@ -192,26 +191,6 @@ def test_a_fit_that_does_not_converge_is_a_warning(case, monkeypatch):
         "the fit of the declared model",
         "the fit of the final model",
     ]
-
-
-@pytest.mark.parametrize(
-    ("factor", "source", "words"),
-    [
-        (1.49, "repeats", None),
-        (2.04, "repeats", "2.0 times as much as their repeats about each other"),
-        (11.6, "declared", "12 times as much as the noise that is declared for them"),
-    ],
-)
-def test_noise_that_is_much_larger_than_it_was_taken_is_a_warning_from_one_and_a_half_times_on(factor, source, words):
-    taken = Noise(source, 6e-5, 6e-5, np.zeros(6))
-    found = _noise_warnings(taken, taken.scaled(factor), Settings())
-    assert found == ([f"measurements scatter about the model {words}"] if words else [])
-
-
-def test_a_pose_error_is_a_warning_from_the_size_that_repeats_of_a_pose_could_show():
-    noise, line = Noise("declared", 6e-5, 6e-5, np.zeros(6)), SimpleNamespace(pose_std_error_rad=2e-5)
-    below, above = (_pose_error_warnings(replace(noise, pose_rad=size), line) for size in (1.9e-5, 3.4e-5))
-    assert below == [] and len(above) == 1 and "every joint were 34 µrad off" in above[0]
 
 
 @pytest.mark.parametrize(

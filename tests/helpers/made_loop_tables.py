@@ -247,6 +247,7 @@ def verdict_document(
         },
         "misfit": None if faulty else {"before": 5.2, "after": 1.02},
         "remainder": remainder,
+        "contradictions": [],
         "kept": "effect" if adopted else "declared",
         "heldout": {
             "uncalibrated": {name: value / 0.7 for name, value in errors.items()} | {"reduction_ci95": [0.55, 0.75]},
@@ -256,6 +257,8 @@ def verdict_document(
             "reduction_ci95": list(reduction) if adopted else [0.0, 0.0],
             "reduction_std_error": 0.04 if adopted else 0.0,
             "poses": 10,
+            "configurations": 9,
+            "joint_ranges": [{"low": -85.0, "high": 60.4, "unit": "deg"}, {"low": 0.0, "high": 1.5, "unit": "m"}],
             "share_below_max": 0.74,
             "outside_range": {
                 "poses": outside,

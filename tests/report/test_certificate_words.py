@@ -88,3 +88,9 @@ def test_facts_are_json_and_every_line_of_the_budget_has_a_name():
     json.dumps(certificate_facts(made_document(comparison=made_comparison())), allow_nan=False)
     assert share_name("link_weight") == "gravity sag" and share_name("repeatability") == "repeatability"
     assert certificate_facts(made_document())["budget"][-1][1] == "hidden by the tracker's noise"
+
+
+def test_poses_that_say_too_little_of_the_use_are_the_reason_for_no_pass():
+    text = decision_sentences(made_document("undecided", risk_above=0.01, shortfalls=["too few: 1 configurations judge"]))
+    assert "the poses say too little of the robot's use to pass: too few: 1 configurations judge" in text
+    assert "too much to pass" not in text

@@ -41,7 +41,8 @@ def test_errors_of_blocks_stand_beside_those_of_held_out_poses():
 def test_poses_outside_the_fitted_range_are_told_apart():
     within, outside = (plainly(range_sentence(CAMPAIGNS[name]["heldout"])) for name in ("named", "poses outside the range"))
     assert within.startswith(
-        "All 10 validation poses lie within the range of the fitted poses. With 95 % confidence at least 74 %"
+        "All 10 validation poses lie within the range of the fitted poses. They are of 9 configurations: joint 1 −85 to 60°, "
+        "joint 2 0.00 to 1.50 m. With 95 % confidence at least 74 %"
     )
     assert outside.startswith("3 of 10 validation poses lie outside the range")
     assert "120 µm before and 84.0 µm after outside that range" in outside

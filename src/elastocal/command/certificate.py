@@ -29,6 +29,13 @@ def certificate(
             "pose k is row k of it. Without, the certificate states what is predicted."
         ),
     ] = None,
+    use: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of the poses and loads that the robot is used at, as for `elastocal correct`: they are judged then, and "
+            "must lie within what was fitted. Without, the poses of the campaign."
+        ),
+    ] = None,
     compare: Annotated[Path | None, typer.Option(help="Earlier diagnosed campaign of the same robot.")] = None,
     serial: Annotated[str | None, typer.Option(help="Serial number of the robot; the campaign's without.")] = None,
     date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
@@ -44,7 +51,9 @@ def certificate(
 
     import pandas as pd
 
+    from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions
+    from elastocal.exchange.target_path import read_target_path
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save
     from elastocal.io.json_files import read_json, write_json
@@ -63,6 +72,9 @@ def certificate(
     other = None if compare is None else diagnosed_campaign(compare)
     robots = pipeline() / "config" / "robots"
     after = None if measured is None else measured_errors(measured, robots, found)
+    used = None
+    if use is not None:
+        used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
     reports = workplace() / "reports" / "loop" / found.name
     needed = [reports / name for name in ("verdict.json", "before_after.csv")]
     for path in needed:
@@ -74,7 +86,7 @@ def certificate(
     steps = pd.read_csv(needed[1])
     wanted = Wanted(limit, risk, number, day, seed)
     with console.status("working"):
-        document, maps = certified(folder, robots, found, verdict, steps, wanted, other, after)
+        document, maps = certified(folder, robots, found, verdict, steps, wanted, other, after, used)
         facts = certificate_facts(document)
         place = output or reports
         place.mkdir(parents=True, exist_ok=True)

@@ -12,12 +12,13 @@ from elastocal.data_checks.compliance_check import fitted_compliance_warnings
 from elastocal.diagnosis import findings
 from elastocal.diagnosis.alarm import Alarm, alarm_of
 from elastocal.diagnosis.averaging import Averaged, averaged, expected_to_help, other_predictions, squares_explained
+from elastocal.diagnosis.contradictions import contradictions, pose_error_warnings, scatter_warnings
 from elastocal.diagnosis.gross_errors import Deviations, entries_of, gross_errors, warnings_of
 from elastocal.diagnosis.kept_rows import first_kept, fitted_to
 from elastocal.diagnosis.linearize import linearized, searched_part, shapes_looked_at_closely
 from elastocal.diagnosis.refit import fit_with_sizes, mean_square, mean_square_left, remaining_noise, selected, with_shapes_of
 from elastocal.diagnosis.search import initial_screening, posterior
-from elastocal.diagnosis.verdict import NAMED, SEVERAL, concluded
+from elastocal.diagnosis.verdict import ADEQUATE, NAMED, SEVERAL, UNEXPLAINED, concluded
 from elastocal.fitting.displacement import joint_compliances
 from elastocal.fitting.least_squares import ON_THE_WAY, fit
 from elastocal.fitting.tolerances import effective_parameters
@@ -145,14 +146,21 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
         found, final = _explained(part.case, part.declared, settings, seed, tell)
-        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
-        # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
-        good |= ~part.kept & ~errors.gross
-        without = fitted_to(case, ~errors.gross | good, part)
-        if without is part or number + 1 == settings.gross_error_rounds:
+        agreed, about = part, final
+        # The model that was found and the rows agree before a search is made again.
+        for _ in range(settings.gross_error_rounds):
+            errors = gross_errors(about, agreed.noise, case.campaign.measurements, agreed.kept, settings)
+            # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
+            good |= ~agreed.kept & ~errors.gross
+            without = fitted_to(case, ~errors.gross | good, agreed)
+            if without is agreed or number + 1 == settings.gross_error_rounds:
+                break
+            agreed = without
+            about = fit(about.model, agreed.case.observations, about.noise, about.estimate, reweighted=True)
+        if (agreed.kept == part.kept).all():
             break
-        tell(f"{(~without.kept).sum()} of {len(good)} rows are gross errors: once more without them")
-        part = without
+        tell(f"{(~agreed.kept).sum()} of {len(good)} rows are gross errors: once more without them")
+        part = agreed
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
@@ -168,7 +176,14 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         elif lost and lost[0]:
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
-    document = _document(case, noise, steps, final, found, known, settings, [*part.warnings, *filter(None, lost)])
+    contradicting: list[str] = []
+    if found and found.conclusion.verdict in (ADEQUATE, UNEXPLAINED):
+        contradicting = contradictions(final, noise, settings)
+        verdict = UNEXPLAINED if contradicting else found.conclusion.verdict
+        found = replace(found, conclusion=replace(found.conclusion, verdict=verdict))
+    warnings = [*contradicting, *part.warnings, *filter(None, lost)]
+    document = _document(case, noise, steps, final, found, known, settings, warnings)
+    document |= {"contradictions": contradicting}
     left_out = entries_of(errors, whole, held_out=False)
     document |= {"gross_errors": left_out, "warnings": [*document["warnings"], *warnings_of(left_out)]}
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
@@ -287,8 +302,8 @@ def _document(
         kept = found.posterior.models[conclusion.best.model] if found.adopted else found.posterior.nothing
         numbers = found.linearized.products.freedom
         other_m = float(np.sqrt(3.0 * other_predictions(problem, found.posterior, kept) / numbers)) * noise.position_m
-        remarks += _pose_error_warnings(final.noise, found.linearized)
-    remarks += fitted_compliance_warnings(final) + _noise_warnings(noise, final.noise, settings)
+        remarks += pose_error_warnings(final.noise, found.linearized.pose_std_error_rad)
+    remarks += fitted_compliance_warnings(final) + scatter_warnings(final.noise, noise, settings.relinearize_noise)
     for name, fitted in (("declared", declared), ("final", final)):
         if not fitted.converged:
             remarks.append(f"the fit of the {name} model did not converge: its parameters are not to be relied on")
@@ -309,7 +324,7 @@ def _document(
         "candidates_tested": len(tested),
         "untestable": untestable,
         "converged": {"declared": declared.converged, "final": final.converged},
-        "warnings": remarks,
+        "warnings": list(dict.fromkeys(remarks)),
         "settings": settings.document(),
     }
 
@@ -337,23 +352,6 @@ def _noise_facts(measured: Noise, left: Noise) -> dict[str, Any]:
         "usual_m": measured.usual_m,
         "factor": left.position_m / measured.position_m,
     }
-
-
-def _noise_warnings(measured: Noise, left: Noise, settings: Settings) -> list[str]:
-    factor = left.position_m / measured.position_m
-    if factor < settings.relinearize_noise:
-        return []
-    reference = "their repeats about each other" if measured.source == "repeats" else "the noise that is declared for them"
-    return [f"measurements scatter about the model {factor:.{0 if factor > 10 else 1}f} times as much as {reference}"]
-
-
-def _pose_error_warnings(left: Noise, linearized: Linearized) -> list[str]:
-    if left.pose_rad < linearized.pose_std_error_rad:
-        return []
-    return [
-        f"measurements of a pose err together as if every joint were {1e6 * left.pose_rad:.0f} µrad off, which repeats of a"
-        " pose do not show: new poses will err as much"
-    ]
 
 
 def _averages(declared: Fit, found: Evidence, best: Hypothesis | None) -> Averaged:

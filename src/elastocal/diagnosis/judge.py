@@ -29,6 +29,7 @@ from elastocal.validation.held_out import (
     summary,
 )
 from elastocal.validation.placing import placed
+from elastocal.validation.span import count_configurations, joint_ranges
 from elastocal.validation.splits import error_row, split_rows
 
 if TYPE_CHECKING:
@@ -201,6 +202,8 @@ def heldout_errors(
         "reduction_ci95": [reductions[after].low, reductions[after].high],
         "reduction_std_error": reductions[after].std_error,
         "poses": errors[0].poses,
+        "configurations": count_configurations(held_out.observations.states),
+        "joint_ranges": joint_ranges(held_out.observations.states, held_out.campaign.robot),
         "share_below_max": share_below_largest(errors[0].poses),
         "outside_range": by_range,
     }

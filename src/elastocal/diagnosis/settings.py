@@ -93,6 +93,17 @@ class Settings:
         "times the noise taken that a model leaves, above which the problem is whitened again by that: sizes of effects and of"
         " errors are in units of the noise taken, so that plausible sizes mean nothing where it is far off",
     )
+    largest_scatter: float = _setting(
+        5.0,
+        "times the noise of repeats beyond which no model that leaves it is adequate: trackers err from one hour to the next by"
+        " up to three times what they repeat to at once (measured FANUC)",
+    )
+    largest_pose_error_rad: float = _setting(
+        5e-4, "error of a joint common to the measurements of a pose beyond which no model is adequate: gears err by half of it"
+    )
+    negative_compliance: float = _setting(
+        3.0, "standard errors by which an identified compliance is negative, which none is, beyond which no model is adequate"
+    )
     searched_observations: int = _setting(
         20_000,
         "averaged measurements, at poses spread over the campaign, that the search looks at; so many show a thirtieth of the"

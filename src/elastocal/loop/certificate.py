@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,13 +19,15 @@ from elastocal.application.certificate.workspace import drawn_angles, workspace_
 from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
 from elastocal.random_streams import stream
-from elastocal.validation.conformity import conformity, predicted_conformity
+from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
+from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
 
+    from elastocal.application.certificate.use import Use
     from elastocal.application.certificate.workspace import WorkspaceErrors
     from elastocal.loop.calibrated_files import Diagnosed
     from elastocal.loop.measured import MeasuredErrors
@@ -36,6 +38,7 @@ _POSES = 6000
 _COMPARED, _DRAWS = 200, 2000
 _REPLICATES = 2000
 _LIBRARIES = ("elastocal", "numpy", "scipy")
+USE = "the poses and loads of its use"
 _MODELS = {"frames": "uncorrected", "declared": "declared", "effect": "corrected"}
 
 
@@ -66,6 +69,7 @@ def certificate(
     wanted: Wanted,
     other: Diagnosed | None = None,
     measured: MeasuredErrors | None = None,
+    use: Use | None = None,
 ) -> tuple[dict[str, Any], list[WorkspaceErrors]]:
     """Contents of a certificate.
 
@@ -84,6 +88,8 @@ def certificate(
         An earlier campaign of the same robot.
     measured : MeasuredErrors, optional
         Of the corrected robot; without, what is stated of it is predicted.
+    use : Use, optional
+        Where the robot is used; without, at the poses and loads of the campaign.
 
     Returns
     -------
@@ -98,13 +104,17 @@ def certificate(
     def draws(purpose: str) -> np.random.Generator:
         return stream(wanted.seed, found.name, f"certificate: {purpose}", 0)
 
-    poses = campaign_poses(calibrated, states)
+    poses = campaign_poses(calibrated, states) if use is None else (use.reported_angles, use.operating)
     prediction = predicted(calibrated, *poses)
-    accuracy = prediction.accuracy(REGION)
+    accuracy = prediction.accuracy(REGION if use is None else USE)
     decision = predicted_conformity(prediction.rms_m, accuracy.poses, wanted.tolerance_m, wanted.accepted_risk)
     if measured is not None:
         terms = wanted.tolerance_m, wanted.accepted_risk, _REPLICATES
         decision = conformity(measured.errors, *terms, draws("conformity"), measured.noise_m)
+    judged = verdict["heldout"]["configurations"] if measured is None else measured.configurations
+    missing = shortfalls(judged, states, robot, None if use is None else use.outside)
+    if missing and decision.decision == PASS:
+        decision = replace(decision, decision=UNDECIDED)
     angles = drawn_angles(calibrated, _POSES, draws("workspace"))
     largest = float(np.linalg.norm(states.wrench[:, :3], axis=1).max())
     forces = [0.0, largest] if largest > 0.0 else [0.0]
@@ -127,7 +137,8 @@ def certificate(
         "noise_floor_rms_m": verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
         "predicted": accuracy.document(),
-        "conformity": asdict(decision),
+        "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
+        "joint_ranges": joint_ranges(states, robot),
         "measured": None if measured is None else measured.document(),
         "iso_9283": {
             "repeatability": None if repeats is None else asdict(repeats),

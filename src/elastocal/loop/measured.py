@@ -19,6 +19,7 @@ from elastocal.errors import InputError
 from elastocal.exchange.target_path import OK, read_corrected_targets
 from elastocal.validation.bootstrap_t import drawn_poses, log_ratio_interval
 from elastocal.validation.held_out import Errors
+from elastocal.validation.span import count_configurations
 
 if TYPE_CHECKING:
     from elastocal.campaigns.campaign import Campaign, Measurements, Target
@@ -47,6 +48,7 @@ class MeasuredErrors:
     noise_m : float
         Root mean square length of the tracker's noise in them.
     accuracy : Accuracy
+    configurations : int
     files : dict of str to str
         Of the campaign, by their names as a certificate lists them.
     """
@@ -54,6 +56,7 @@ class MeasuredErrors:
     errors: Errors
     noise_m: float
     accuracy: Accuracy
+    configurations: int
     files: dict[str, str]
 
     def document(self) -> dict[str, Any]:
@@ -113,7 +116,7 @@ def measured_errors(folder: str | Path, robots_folder: str | Path, found: Diagno
     accuracy = _accuracy(errors, noise, sensor, campaign, campaign.targets[mine[0]])
     read = [*campaign_files(folder, robots_folder), (folder / TARGETS).as_posix()]
     files = {f"{campaign.name}: {Path(file).name}": file for file in read}
-    return MeasuredErrors(errors, float(np.sqrt(noise)), accuracy, files)
+    return MeasuredErrors(errors, float(np.sqrt(noise)), accuracy, count_configurations(seen), files)
 
 
 def _require_commanded(source: Path, seen: Measurements, campaign: Campaign, wanted: CorrectedTargets) -> None:

@@ -8,7 +8,7 @@ from elastocal.application.accuracy import MEASURED, PREDICTED, accuracy_from, a
 from elastocal.diagnosis.words import candidate_words, listed, parameter_words, physical_name
 from elastocal.effects.protocol import effect_of
 from elastocal.report.first_page import TITLES
-from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled
+from elastocal.report.wording import MICRO, capital, counted, length, percent, plain, scaled, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -62,6 +62,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             ["serial number", document["serial"] or "not stated"],
             ["campaign", document["campaign"]],
             ["date of this certificate", document["date"]],
+            ["fitted poses span", span_words(document["joint_ranges"])],
             ["software", ", ".join(f"{name} {version}" for name, version in document["versions"].items())],
         ],
         "decision": conformity["decision"],
@@ -99,11 +100,14 @@ def decision_sentences(document: Mapping[str, Any]) -> str:
     )
     risk = f"The risk that the RMS error is larger than the tolerance is {_percent(found['risk_above'])}"
     accepted = _percent(found["accepted_risk"])
+    missing = found["shortfalls"]
     text = {
         "pass": f"{risk}; {accepted} are accepted.",
         "fail": f"{risk}; to fail wrongly {accepted} are accepted.",
         "undecided": f"{risk}: too much to pass and too little to fail, with {accepted} accepted.",
     }[found["decision"]]
+    if missing and found["risk_above"] <= found["accepted_risk"]:
+        text = f"{risk}, but the poses say too little of the robot's use to pass: {'; '.join(missing)}."
     more = []
     if found["poses_needed"] is not None:
         more.append(f"About {counted(found['poses_needed'], 'measured pose')} would decide.")

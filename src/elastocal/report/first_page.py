@@ -84,6 +84,12 @@ def sentences(verdict: Mapping[str, Any]) -> list[str]:
             f"of such campaigns speak as much for a missing mechanism as this one; {level}."
         ]
     alarm = f"If nothing were missing, {chance} of such campaigns would speak as much for a missing mechanism; {level}."
+    if verdict["contradictions"]:
+        return [
+            f"No mechanism of the catalogue is needed, and yet the declared model cannot be right: "
+            f"{'; '.join(verdict['contradictions'])}.",
+            alarm,
+        ]
     if kind == "unexplained":
         return [
             "The residual of the declared model is more than noise, and a smooth error of unknown cause explains it better "

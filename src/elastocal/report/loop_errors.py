@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from elastocal.diagnosis.words import in_words, listed
-from elastocal.report.wording import MICRO, MILLI, counted, length, minus, percent
+from elastocal.report.wording import MICRO, MILLI, counted, length, minus, percent, span_words
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -104,9 +104,10 @@ def range_sentence(heldout: Mapping[str, Any]) -> str:
         f"With 95 % confidence at least {percent(heldout['share_below_max'])} of all poses drawn like the validation poses "
         "have smaller errors than the largest found."
     )
+    span = f"They are of {counted(heldout['configurations'], 'configuration')}: {span_words(heldout['joint_ranges'])}."
     count = by_range["poses"]
     if not count:
-        return f"All {poses} lie within the range of the fitted poses. {share}"
+        return f"All {poses} lie within the range of the fitted poses. {span} {share}"
     ends = [(where, by_range[key]) for where, key in (("within", "inside"), ("outside", "outside")) if by_range[key]]
     each = []
     for where, errors in ends:
@@ -114,7 +115,7 @@ def range_sentence(heldout: Mapping[str, Any]) -> str:
         each.append(f"{_before_and_after(*stages)} {where}")
     return (
         f"{count} of {poses} {'lies' if count == 1 else 'lie'} outside the range of the fitted poses: errors there are "
-        f"extrapolated. The RMS error is {listed(each)} that range. {share}"
+        f"extrapolated. The RMS error is {listed(each)} that range. {span} {share}"
     )
 
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from elastocal.diagnosis.words import at_joints, detail_words
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping, Sequence
 
 MICRO, MILLI = 1e6, 1e3
 # A blank at which no line ends.
@@ -38,6 +38,15 @@ def as_sentence(text: str) -> str:
 def minus(text: str) -> str:
     """A number with a true minus sign."""
     return text.replace("-", "−")
+
+
+def span_words(joint_ranges: Sequence[Mapping[str, Any]]) -> str:
+    """Where the joints stood, as of `validation.span.joint_ranges`."""
+    each = []
+    for joint, ends in enumerate(joint_ranges, 1):
+        unit, digits = ("°", 0) if ends["unit"] == "deg" else (" m", 2)
+        each.append(minus(f"joint {joint} {ends['low']:.{digits}f} to {ends['high']:.{digits}f}{unit}"))
+    return ", ".join(each)
 
 
 def counted(number: int, one: str, many: str | None = None) -> str:

@@ -1,0 +1,57 @@
+"""What poses must span before their errors say anything of a robot's use."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.campaigns.joint_space import configurations
+from elastocal.fitting.observations import state_clusters
+
+if TYPE_CHECKING:
+    from elastocal.campaigns.campaign import Measurements
+    from elastocal.fitting.observations import States
+    from elastocal.mechanics.robot import Robot
+
+# With so many configurations the largest error bounds 69 % of all others at 95 % confidence; fewer show little more than half.
+FEWEST_CONFIGURATIONS = 8
+# Over this turn an error that goes with the sine of a joint's angle changes by half of its amplitude: over less it can hardly
+# be told from a constant.
+LEAST_TURN_RAD = 2.0 * np.arcsin(0.25)
+# The same of a rail, as a share of its travel.
+LEAST_TRAVEL = 0.1
+
+
+def count_configurations(states: States | Measurements) -> int:
+    """How many configurations states or measurements are of."""
+    return int(configurations(states.joint_angles, state_clusters(states)).max()) + 1
+
+
+def joint_ranges(states: States, robot: Robot) -> list[dict[str, Any]]:
+    """Smallest and largest angle of each joint with its unit, degrees or of a rail m, JSON-serialisable."""
+    ends = zip(states.joint_angles.min(axis=0), states.joint_angles.max(axis=0), robot.chain.prismatic, strict=True)
+    units = [(np.array([low, high]), "m") if rail else (np.rad2deg([low, high]), "deg") for low, high, rail in ends]
+    return [{"low": float(low), "high": float(high), "unit": unit} for (low, high), unit in units]
+
+
+def shortfalls(judged: int, fitted: States, robot: Robot, outside_use: np.ndarray | None) -> list[str]:
+    """Why errors at some configurations say too little of a robot: these are too few, too close, or not where it is used.
+
+    ``outside_use`` says of each pose of the use whether it lies beyond the fitted poses and loads; where no use is stated,
+    every joint has to have moved.
+    """
+    found = []
+    if judged < FEWEST_CONFIGURATIONS:
+        found.append(f"too few: {judged} configurations judge, and {FEWEST_CONFIGURATIONS} are needed")
+    if outside_use is not None:
+        if outside_use.any():
+            found.append(f"outside: {outside_use.sum():,} of {len(outside_use):,} poses of the use lie beyond what was fitted")
+        return found
+    moved = np.ptp(fitted.joint_angles, axis=0)
+    rails = np.array(robot.chain.prismatic)
+    least = np.where(rails, LEAST_TRAVEL * np.ptp(robot.joint_limits, axis=1), LEAST_TURN_RAD)
+    for joint in np.flatnonzero(moved < least):
+        sizes = [f"{size:.3g} m" if rails[joint] else f"{np.rad2deg(size):.0f}°" for size in (moved[joint], least[joint])]
+        found.append(f"too close: joint {joint + 1} moved by {sizes[0]}, and {sizes[1]} are needed")
+    return found
