@@ -141,26 +141,29 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         # Where all measurements mean something else, no single row is wrong.
         part = fitted_to(case, np.ones(len(case.campaign.measurements), bool))
     tell(f"declared model fitted to {len(part.case.observations)} measurements")
-    found, final = None, part.declared
+    found, final, near = None, part.declared, None
     errors = Deviations.none(len(part.kept), case.model.rows)
     good = np.zeros(len(part.kept), bool)
     for number in range(0 if decisive else settings.gross_error_rounds):
-        found, final = _explained(part.case, part.declared, settings, seed, tell)
-        agreed, about = part, final
-        # The model that was found and the rows agree before a search is made again.
-        for _ in range(settings.gross_error_rounds):
-            errors = gross_errors(about, agreed.noise, case.campaign.measurements, agreed.kept, settings)
-            # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
-            good |= ~agreed.kept & ~errors.gross
-            without = fitted_to(case, ~errors.gross | good, agreed)
-            if without is agreed or number + 1 == settings.gross_error_rounds:
-                break
-            agreed = without
-            about = fit(about.model, agreed.case.observations, about.noise, about.estimate, reweighted=True)
-        if (agreed.kept == part.kept).all():
+        found, final = _explained(part.case, part.declared, settings, seed, tell, near)
+        errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
+        # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
+        good |= ~part.kept & ~errors.gross
+        kept = ~errors.gross | good
+        if (kept == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
-        tell(f"{(~agreed.kept).sum()} of {len(good)} rows are gross errors: once more without them")
-        part = agreed
+        # The model found looks at all rows once more, without these, before another search is made.
+        some = case.select(kept)
+        about = fit(final.model, some.observations, final.noise, final.estimate, True, ON_THE_WAY)
+        errors = gross_errors(about, part.noise, case.campaign.measurements, kept, settings)
+        good |= ~kept & ~errors.gross
+        last, part = part, fitted_to(case, ~errors.gross | good, part)
+        if part is last:
+            break
+        tell(f"{(~part.kept).sum()} of {len(good)} rows are gross errors: once more without them")
+        # What was linearised about a model found is so again: from the declared one the way is the same and twice as long.
+        relinearized = len(found.linearized.about.model.effects) > len(part.declared.model.effects)
+        near = (about, found.conclusion.best.named) if relinearized else None
     errors = replace(errors, gross=~part.kept)
     case, noise, declared = part.case, part.noise, part.declared
     bare = fit(replace(case.model, effects=()), case.observations, noise, settled=ON_THE_WAY)
@@ -210,12 +213,25 @@ def _losses(bare: Fit, models: Sequence[Fit], observations: Observations, settin
     return found if found[-1] else []
 
 
-def _explained(case: Case, declared: Fit, settings: Settings, seed: int, tell: Callable[[str], None]) -> tuple[Evidence, Fit]:
-    """Evidence about the declared model, and again about the model found where that, or its noise, is far from it."""
+def _explained(
+    case: Case,
+    declared: Fit,
+    settings: Settings,
+    seed: int,
+    tell: Callable[[str], None],
+    near: tuple[Fit, tuple[str, ...]] | None,
+) -> tuple[Evidence, Fit]:
+    """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
+
+    At once about a model, with the mechanisms that it has beyond the declared one, that is known to be ``near``.
+    """
     candidates = list(case.candidates.values())
     about, searched = searched_part(declared, case.observations, settings)
     before = None
-    for round_number in range(settings.linearizations):
+    if near:
+        found_before, before = near
+        about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
+    for round_number in range(1 if near else 0, settings.linearizations):
         problem = linearized(about, searched, candidates, settings)
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)

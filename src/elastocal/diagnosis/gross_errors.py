@@ -51,8 +51,8 @@ _SCALE_QUANTILES = (0.5, 0.75)
 _LEAST_OWN = 0.01
 # Shares of the error common to a pose that a fit states.
 _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
-# Rows of which the scale is estimated at most, and of which the parameters' variance matters.
-_MOST = 20_000
+# Rows of which the scale is estimated at most, to a percent; more determine the parameters so well that one hardly counts.
+_MOST = 4_000
 # Gross errors that have a sentence each among the warnings; the table of residuals has all.
 _MOST_NAMED = 10
 
