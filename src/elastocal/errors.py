@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import unicodedata
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -38,18 +40,38 @@ class InputError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A text on one line, control characters as their escapes: what a file holds must not steer a terminal.
+    """A text on one line, `escaped`."""
+    return escaped(" ".join(text.split()))
 
-    Parameters
-    ----------
-    text : str
 
-    Returns
-    -------
-    str
-    """
-    line = " ".join(text.split())
-    return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+def escaped(text: str) -> str:
+    """A text with what `steering` finds as escapes: what a file holds must not steer a terminal."""
+    return text if text.isprintable() else "".join(ascii(c)[1:-1] if steering(c) else c for c in text)
+
+
+def steering(text: str) -> str:
+    """The first control character of a text, or mark that turns the order of letters or is not seen; empty where none is."""
+    return "" if text.isprintable() else next((c for c in text if not (c.isprintable() or unicodedata.category(c) == "Zs")), "")
+
+
+_SPACE = "a place with space where this user may write"
+_REMEDIES = {
+    **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS), _SPACE),
+    errno.EEXIST: "a name that nothing else has",
+    errno.ENOENT: "a file or folder that is there",
+    errno.ENOTDIR: "a folder where the path has something else",
+    errno.EISDIR: "a file",
+    errno.ENAMETOOLONG: "a shorter name",
+    errno.ELOOP: "a path without links in a circle",
+}
+
+
+def fault_of_machine(error: OSError | MemoryError, place: str = "disk") -> InputError:
+    """A full disk, a folder that cannot be written to, memory that is used up and the like; at `place` where it has no name."""
+    if isinstance(error, MemoryError):
+        return InputError("memory", "", "none left", "a smaller file, more memory, or fewer jobs at a time (-j1)")
+    found, allowed = error.strerror or str(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
+    return InputError(str(error.filename or place), "", found, allowed)
 
 
 def _shortened(text: str, longest: int) -> str:

@@ -74,7 +74,7 @@ def run(tmp_path):
     (tmp_path / REPORTS / "verdict.json").write_text(json.dumps(verdict))
     steps = pd.DataFrame({"step": [1], "owner": ["joint_compliance"], "value": [5e-7]})
     steps.to_parquet(tmp_path / FOLDER / "steps.parquet")
-    rows = {"step": ["declared", "+ payload"], "heldout_rms_m": [before["rms"], after["rms"]]}
+    rows = {"step": ["declared", "with payload"], "heldout_rms_m": [before["rms"], after["rms"]]}
     table = pd.DataFrame(rows).assign(heldout_rms_over_floor=lambda each: each["heldout_rms_m"] / 1e-4)
     table.to_csv(tmp_path / REPORTS / "before_after.csv", index=False)
     (before, after), ends, fallen = figures(errors, "splits")

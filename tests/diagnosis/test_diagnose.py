@@ -217,7 +217,7 @@ def test_effects_are_added_one_at_a_time_that_which_explains_most_first_or_of_ma
         patch.setattr("elastocal.diagnosis.diagnose._MOST_STEPS", most)
         case = SimpleNamespace(observations=campaign.observations)
         made = _effect_steps(case, campaign.declared, final, found)
-    assert [step.name for step in made] == [f"+ {name}" for name in steps] and made[-1].fitted is final
+    assert [step.name for step in made] == [f"with {name}" for name in steps] and made[-1].fitted is final
     known = len(campaign.declared.model.effects)
     counts = [len(step.fitted.model.effects) - known for step in made]
     assert counts == ([1, 2, 3] if len(steps) == 3 else [1, 3])

@@ -36,13 +36,13 @@ def steps_of(case, *keys):
     return (
         Step("frames and targets", "frames", bare),
         Step("declared model", "declared", declared),
-        Step(f"+ {name}", "effect", final),
+        Step(f"with {name}", "effect", final),
     )
 
 
 def diagnosis_of(case, steps):
     """A diagnosis whose document has what `judge` adds to and one thing that it must leave alone."""
-    names = [step.name.removeprefix("+ ") for step in steps if step.kind == "effect"]
+    names = [step.name.removeprefix("with ") for step in steps if step.kind == "effect"]
     effects = [{"name": name, "family": "geometry", "heldout_gain": None} for name in names]
     document = {"verdict": "named", "effects": effects, "heldout": None, "warnings": ["as it was"], "gross_errors": []}
     document["noise"] = noise_facts(NOISE)
@@ -205,22 +205,22 @@ def spoilt(fitted, offset):
 def test_a_maximum_that_grows_is_a_warning(made):
     case, held_out, steps = made
     wrong = spoilt(fitted_of(steps, "effect"), -2 * OFFSET)
-    found = judged([*steps[:2], Step("+ joint_offset", "effect", wrong)], case, held_out)
+    found = judged([*steps[:2], Step("with joint_offset", "effect", wrong)], case, held_out)
     assert found.document["heldout"]["after"]["max_m"] > found.document["heldout"]["before"]["max_m"]
     grown = [
         warning for warning in found.document["warnings"] if warning.startswith("the largest error of the validation poses ")
     ]
     figures = [1e3 * found.document["heldout"][stage]["max_m"] for stage in ("before", "after")]
     assert grown == [f"the largest error of the validation poses grew from {figures[0]:.3f} to {figures[1]:.3f} mm"]
-    assert "the step '+ joint_offset' raised the RMS error of the validation poses" in found.document["warnings"]
+    assert "the step 'with joint_offset' raised the RMS error of the validation poses" in found.document["warnings"]
 
 
 def test_one_step_of_several_that_harms_is_named(made):
     case, held_out, steps = made
-    worse = Step("+ other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))
+    worse = Step("with other", "effect", spoilt(steps[2].fitted, 0.5 * OFFSET))
     found = judged([*steps[:3], worse], case, held_out)
-    assert "the step '+ other' raised the RMS error of the validation poses" in found.document["warnings"]
-    assert not any("'+ joint_offset'" in warning for warning in found.document["warnings"])
+    assert "the step 'with other' raised the RMS error of the validation poses" in found.document["warnings"]
+    assert not any("'with joint_offset'" in warning for warning in found.document["warnings"])
 
 
 def test_nothing_found_has_nothing_to_warn_of(made):

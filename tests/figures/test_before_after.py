@@ -26,7 +26,7 @@ def test_no_line_where_the_noise_is_not_known():
 
 
 def test_long_names_of_models_wrap():
-    name = "+ " + ", ".join(f"transmission_harmonic@{joint}[orders 31-36]" for joint in range(1, 7))
+    name = "with " + ", ".join(f"transmission_harmonic@{joint}[orders 31-36]" for joint in range(1, 7))
     assert max(map(len, step_name(name).splitlines())) <= 26
     assert "and 3 more" in step_name(name).replace("\n", " ")
 
@@ -57,7 +57,7 @@ def test_errors_on_fitted_poses_are_diamonds_in_the_row_of_their_model():
 
 def test_models_stand_from_top_to_bottom_in_the_order_of_the_table():
     axis = before_after(step_rows()).axes[0]
-    assert row_labels(axis) == ["frames and targets", "declared model", "+ lost motion (backlash)"]
+    assert row_labels(axis) == ["frames and targets", "declared model", "with lost motion (backlash)"]
     assert axis.get_yticks().tolist() == sorted(axis.get_yticks()) and axis.get_ylim()[0] > axis.get_ylim()[1]
 
 

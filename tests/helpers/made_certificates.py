@@ -9,7 +9,7 @@ def step(model, rms, open_above=False):
     values |= {f"{metric}_low": 0.8 * values[metric] for metric in metrics[:3]} | {"max_m_low": None, "max_m_high": None}
     values |= {f"{metric}_high": 1.3 * values[metric] for metric in metrics[:2]}
     values["p95_m_high"] = None if open_above else 2.0 * rms
-    return {"model": model, "step": {"corrected": "+ lost_motion"}.get(model, model)} | values
+    return {"model": model, "step": {"corrected": "with lost_motion"}.get(model, model)} | values
 
 
 def line(name, rms, known=True):

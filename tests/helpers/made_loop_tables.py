@@ -94,7 +94,7 @@ def probabilities(sets=None, alarm_p_value=0.002):
 def step_rows(effects=("lost_motion",), largest_m=3e-4):
     """Rows of before_after.csv, each model better than the one before."""
     named = [("frames and targets", "frames"), ("declared model", "declared")]
-    named += [(f"+ {name}", "effect") for name in effects]
+    named += [(f"with {name}", "effect") for name in effects]
     rows = []
     for number, (name, kind) in enumerate(named):
         size = largest_m * 0.7**number

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from import_log import write_log
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, fault_of_machine
 from elastocal.io.checksums import check_checksums, record_checksums
 from elastocal.io.job_records import JobRecord, write_job_record
 from elastocal.io.origin import Origin
@@ -51,7 +51,8 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
         write_log(log, f"{error}\n")
         sys.exit(str(error))
     except (OSError, MemoryError) as error:
-        line = fault_of_machine(error, next(iter(snakemake.output), "disk"))
+        # What pyarrow writes comes without a name.
+        line = f"{fault_of_machine(error, next(iter(snakemake.output), 'disk'))}; the same command goes on then"
         write_log(log, f"{traceback.format_exc()}{line}\n")
         sys.exit(line)
     except BaseException:
@@ -63,15 +64,6 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
 def origin_of(job: Job) -> Origin:
     """Commit, configuration and seed of the run that this job belongs to."""
     return Origin(**job.config["origin"])
-
-
-def fault_of_machine(error: OSError | MemoryError, output: str) -> str:
-    """One line on a full disk, a folder that cannot be written to, memory that is used up and the like."""
-    if isinstance(error, MemoryError):
-        return str(InputError("memory", "", "none left", "more memory, or fewer jobs at a time (snakemake -j1)"))
-    # What pyarrow writes comes without a name.
-    place, found = str(error.filename or output), error.strerror or str(error)
-    return str(InputError(place, "", found, "a disk with space where this user may write; the same command goes on then"))
 
 
 @contextmanager

@@ -152,7 +152,7 @@ def _gains(run: Audited, file: str, campaign: str, stated: dict[str, Any]) -> Fi
     """Share by which each effect lowers the RMS, from the rows of the table of models."""
     rows = run.table(f"reports/loop/{campaign}/before_after.csv").set_index("step")["heldout_rms_m"]
     gains = {effect["name"]: effect["heldout_gain"] for effect in stated["effects"] if effect["heldout_gain"] is not None}
-    places = [list(rows.index).index(f"+ {name}") for name in gains]
+    places = [list(rows.index).index(f"with {name}") for name in gains]
     expected = [1 - rows.iloc[place] / rows.iloc[place - 1] for place in places]
     return compared(file, "gain of each effect", "pandas", list(gains.values()), expected, absolute=_DIGITS)
 

@@ -25,6 +25,8 @@ class Bound:
         return f"{self.least:g} to {self.largest:g} {self.reason}"
 
 
+# A turn and a half, of a rotation vector; nor does a joint of a serial arm report more, unless its limits say so.
+FARTHEST_RAD = 3.0 * np.pi
 # Generous: whatever lies beyond is in another unit, or no reading of an instrument beside a robot.
 _FORCE = Bound(-1e6, 1e6, "N, the weight of a hundred tonnes")
 _MOMENT = Bound(-1e7, 1e7, "N m, a hundred tonnes on a lever of ten metres")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from elastocal.campaigns.column_bounds import FARTHEST_RAD
 from elastocal.campaigns.groups import groups_of
 from elastocal.campaigns.holdout import measured_poses
 from elastocal.campaigns.joint_space import SAME_POSE_RAD
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from elastocal.campaigns.measurements import MeasurementFile
     from elastocal.mechanics.robot import Robot
 
-# No joint of a serial arm reports more than one and a half turns unless its limits say so.
-_FARTHEST_RAD = 3.0 * np.pi
 # From pose to pose, in an order that has nothing to do with the time, it falls as often as not: in more than this share of at
 # least so many steps with a probability of one in 700 at most.
 _BACKWARDS, _FEWEST_IN_ORDER = 0.875, 5
@@ -50,7 +49,7 @@ def check_angles(reported: np.ndarray, table: MeasurementFile, robot: Robot) -> 
         The first such angle.
     """
     low, high = robot.joint_limits.T
-    farthest = max(_FARTHEST_RAD, np.abs(robot.joint_limits).max())
+    farthest = max(FARTHEST_RAD, np.abs(robot.joint_limits).max())
 
     def inside(reported: np.ndarray, margin: float = 0.0) -> np.ndarray:
         angles = robot.model_angles(reported)
@@ -184,8 +183,8 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
             )
     if measurements.rotation_vector is not None:
         angle = np.linalg.norm(measurements.rotation_vector, axis=1)
-        if angle.max() > _FARTHEST_RAD:
+        if angle.max() > FARTHEST_RAD:
             turned = int(np.argmax(angle))
             raise table.cell_fault(
-                turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", "a rotation vector in rad, not degrees"
+                turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
             )

@@ -14,7 +14,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from elastocal.campaigns.column_bounds import BOUNDS, beyond
-from elastocal.errors import InputError
+from elastocal.errors import InputError, steering
 from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
 from elastocal.mechanics.components import WRENCH
@@ -180,6 +180,8 @@ def _lines(file: TextIO, path: str) -> Iterator[str]:
             raise InputError(path, f"line {number}", f"{_LONGEST_LINE} characters or more", "one measurement in a line")
         if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
             raise InputError(path, f"line {number}", "text that is not UTF-8", "a UTF-8 file")
+        if character := steering(line.rstrip("\r\n").replace("\t", " ")):
+            raise InputError(path, f"line {number}", f"the character {ascii(character)}", "printable characters")
         yield line
 
 

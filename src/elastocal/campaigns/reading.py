@@ -7,6 +7,7 @@ wrong is left for the diagnosis to trace.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +20,7 @@ from elastocal.campaigns.measurements import CSV, PARQUET, closest_first, read_m
 from elastocal.campaigns.places import is_file, is_file_in
 from elastocal.errors import InputError
 from elastocal.io.documents import check_document, read_document
+from elastocal.io.texts import kind_of
 from elastocal.mechanics.robot_file import robot_from_document
 
 if TYPE_CHECKING:
@@ -60,8 +62,7 @@ def read_campaign(folder: str | Path, robots_folder: str | Path, effects: Collec
     for index, name in enumerate(document.get("declared", ())):
         if effects is not None and name not in set(effects):
             raise InputError(source, f"declared[{index}]", repr(name), closest_first(name, sorted(effects)))
-    for path in _tables(folder):
-        _check_place(path, folder)
+    _tables(folder)
     table = read_measurements(folder, robot.joints, document["measured"])
     measurements = _measurements(table, robot, targets)
     check_measurements(measurements, table, robot, targets, source)
@@ -125,8 +126,11 @@ def campaign_files(folder: str | Path, robots_folder: str | Path) -> list[str]:
 
 
 def _tables(folder: Path) -> list[Path]:
-    """Files of measurements in a folder."""
-    return [path for kind in (CSV, PARQUET) if (path := folder / kind).is_file()]
+    """Files of measurements in a folder; a link out of it, a pipe and the like are refused."""
+    there = [path for kind in (CSV, PARQUET) if os.path.lexists(path := folder / kind)]
+    for path in there:
+        _check_place(path, folder)
+    return there
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -253,6 +257,8 @@ def _robot_path(name: str, folder: Path, robots_folder: str | Path, source: str)
 def _check_place(path: Path, folder: str | Path) -> None:
     if is_file(path) and not is_file_in(path, folder):
         raise InputError(path, "", "a link out of the campaign's folder", "the file itself")
+    if os.path.lexists(path) and not is_file(path):
+        raise InputError(path, "", f"{kind_of(os.lstat(path).st_mode)} that leads to no file", "the file itself")
 
 
 def _measurements(table: MeasurementFile, robot: Robot, targets: Sequence[Target]) -> Measurements:

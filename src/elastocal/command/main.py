@@ -14,7 +14,7 @@ from elastocal.command.export import export
 from elastocal.command.importing import importing
 from elastocal.command.init import init
 from elastocal.command.plan import plan
-from elastocal.errors import InputError
+from elastocal.errors import InputError, fault_of_machine
 
 # Without the boxes of rich the last line says what is wrong with an option.
 app = typer.Typer(
@@ -41,8 +41,5 @@ def main() -> None:
         app()
     except InputError as error:
         sys.exit(str(error))
-    except OSError as error:
-        allowed = "a place with space where this user may write"
-        sys.exit(str(InputError(str(error.filename or "disk"), "", error.strerror or str(error), allowed)))
-    except MemoryError:
-        sys.exit(str(InputError("memory", "", "none left", "a smaller file, or more memory")))
+    except (OSError, MemoryError) as error:
+        sys.exit(str(fault_of_machine(error)))

@@ -270,12 +270,12 @@ def _effect_steps(case: Case, declared: Fit, final: Fit, found: Evidence) -> lis
     names = sorted(found.conclusion.best.named, key=lambda name: -explained[name])
     alone = names[:-1] if len(names) <= _MOST_STEPS else names[:1]
     rest = names[len(alone) :]
-    steps = [Step(f"+ {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
+    steps = [Step(f"with {rest[0] if len(rest) == 1 else f'{len(rest)} further effects'}", "effect", final)]
     for number in range(len(alone), 0, -1):
         some = replace(chosen, effects=tuple(entry for entry in chosen.effects if entry[0].effect in alone[:number]))
         # Only its errors are shown, which a tenth of a standard error in a parameter hardly moves.
         fitted = fit_with_sizes(declared, case.observations, final.noise, some, steps[0].fitted, settled=ON_THE_WAY)
-        steps.insert(0, Step(f"+ {alone[number - 1]}", "effect", fitted))
+        steps.insert(0, Step(f"with {alone[number - 1]}", "effect", fitted))
     return steps
 
 

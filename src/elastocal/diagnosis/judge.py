@@ -147,7 +147,7 @@ def _gains(rows: Iterable[Mapping[str, Any]]) -> dict[str, float]:
     last = None
     for row in rows:
         if row["kind"] == "effect":
-            gains[row["step"].removeprefix("+ ")] = float(1 - row["heldout_rms_m"] / last)
+            gains[row["step"].removeprefix("with ")] = float(1 - row["heldout_rms_m"] / last)
         if row["kind"] in ("declared", "effect"):
             last = row["heldout_rms_m"]
     return gains

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, steering
 from elastocal.io.texts import decoded, read_bytes
 
 if TYPE_CHECKING:
@@ -127,9 +127,13 @@ def read_text_table(
     return TextTable(source, Dialect(separator, decimal, header), columns, tuple(number for number, _ in rows))
 
 
-def lines_of(text: str) -> list[str]:
-    """Lines of a text as editors count them; other characters that Python takes for ends of lines stay in their line."""
+def lines_of(text: str, path: str | Path) -> list[str]:
+    """Lines of a file's text as editors count them; control characters and marks that turn the order of letters are refused."""
     lines = _ENDS.split(text)
+    for number, line in enumerate(lines, 1):
+        if character := steering(line.replace("\t", " ")):
+            allowed = "printable characters, in UTF-8, or in UTF-16 with a byte order mark"
+            raise InputError(path, f"line {number}", f"the character {ascii(character)}", allowed)
     return lines[:-1] if lines[-1] == "" else lines
 
 
@@ -137,12 +141,7 @@ def _lines(path: str | Path) -> list[str]:
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
     encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
     text = decoded(content, path, encoding)
-    if (null := text.find("\0")) >= 0:
-        line = text.count("\n", 0, null) + 1
-        raise InputError(
-            path, f"line {line}", "the control character '\\x00'", "text in UTF-8, or in UTF-16 with a byte order mark"
-        )
-    lines = lines_of(text)
+    lines = lines_of(text, path)
     if len(lines) > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
         raise InputError(path, "", f"{len(lines)} lines", allowed)

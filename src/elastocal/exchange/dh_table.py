@@ -29,7 +29,7 @@ from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import cells_of, lines_of
 from elastocal.io.documents import LARGEST_BYTES, read_document
-from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_text
+from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number, read_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -132,7 +132,7 @@ class _Meaning:
 
 
 def _csv_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
-    text = enumerate(lines_of(read_text(path, LARGEST_BYTES)), 1)
+    text = enumerate(lines_of(read_text(path, LARGEST_BYTES), path), 1)
     lines = [(number, line) for number, line in text if line.strip() and not line.startswith(_COMMENT)]
     if not lines:
         raise InputError(source, "", "an empty file", "a header and one row for each joint")
@@ -198,7 +198,7 @@ def _row(where: str, cells: Mapping[str, Any], meanings: Mapping[str, _Meaning],
         value = _number(text(name), turns and meaning.angle == "rad")
         largest = MOST_TURNS * (2.0 * math.pi if meaning.angle == "rad" else 360.0) if turns else LARGEST_NUMBER
         if value is None or abs(value) > largest:
-            allowed = f"a number{f', {MOST_TURNS} turns at most' if turns else ''}"
+            allowed = f"a number, {MOST_TURNS} turns at most" if turns else A_NUMBER
             raise InputError(source, f"{where}, {column}", repr(text(name)), allowed)
         if name in _PLAIN:
             if not value > 0:

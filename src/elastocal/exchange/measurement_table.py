@@ -41,7 +41,7 @@ from elastocal.exchange.rotations import (
     is_rotation,
     rotation_vectors,
 )
-from elastocal.io.texts import plain_number
+from elastocal.io.texts import A_NUMBER, plain_number, text_fault
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ class _Reader:
         cells = self.cells(name)
         values = np.array([np.nan if (value := plain_number(cell)) is None else value for cell in cells])
         if not np.isfinite(values).all():
-            raise self.fault(int(np.argmin(np.isfinite(values))), name, "a number such as -0.25 or 2.5e-3")
+            raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
         unit = self.units.get(name)
         values = values if unit is None else values * (unit_scale(name, unit) or 1.0)
         if (index := beyond(name, values)) is not None:
@@ -315,11 +315,16 @@ def _vectors(read: _Reader, rotation: str, names: Sequence[str]) -> np.ndarray:
 
 def _targets(read: _Reader, name: str | None) -> np.ndarray:
     if "target" in read.columns:
-        return np.array(read.cells("target"))
+        names = read.cells("target")
+        if fault := next((fault for each in set(names) if (fault := text_fault(each))), None):
+            raise InputError(read.text.path, f"column {read.columns['target']}", *fault)
+        return np.array(names)
     if name is None:
         raise InputError(
             read.text.path, "header", "no column target", "--target NAME, the target of all rows, or --column target=NAME"
         )
+    if fault := text_fault(name):
+        raise InputError("--target", "", *fault)
     return np.full(len(read.kept), name)
 
 

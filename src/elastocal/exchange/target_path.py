@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from elastocal.campaigns.column_bounds import BOUNDS, beyond
+from elastocal.campaigns.column_bounds import BOUNDS, FARTHEST_RAD, beyond
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
 from elastocal.exchange.csv_dialect import read_text_table
-from elastocal.io.texts import plain_number
+from elastocal.io.texts import A_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH
 
 if TYPE_CHECKING:
@@ -104,16 +104,10 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
             raise InputError(path, header, f"{', '.join(there)} without {', '.join(missing)}", "all of them or none")
         return np.column_stack([_numbers(read, name) for name in names])
 
-    pose = np.column_stack([_numbers(read, name) for name in _POSE])
-    far = np.abs(pose[:, :3]).max(axis=1) > _FARTHEST_M
-    if far.any():
-        row = int(np.argmax(far))
-        allowed = f"metres, {_FARTHEST_M:g} at most"
-        raise InputError(path, f"line {read.lines[row]}", f"a position of {np.abs(pose[row, :3]).max():g}", allowed)
     single = [group((name,)) for name in ("time_s", "temperature_c")]
     time, temperature = (None if column is None else column[:, 0] for column in single)
-    rotation = Rotation.from_rotvec(pose[:, 3:]).as_matrix()
-    return TargetPath(pose[:, :3], rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
+    position, rotation = _poses(read)
+    return TargetPath(position, rotation, group(angles), group(_WRENCH), group(approach), time, temperature, read.lines)
 
 
 @dataclass(frozen=True)
@@ -139,9 +133,22 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
     for name in (*_POSE, *angles, STATUS):
         if name not in read.columns:
             raise InputError(path, f"line {read.dialect.header}", f"no column {name!r}", "a file of elastocal correct")
-    pose, commands = (np.column_stack([_numbers(read, name) for name in names]) for names in (_POSE, angles))
+    commands = np.column_stack([_numbers(read, name) for name in angles])
     status = np.array([cell.strip() for cell in read.columns[STATUS]])
-    return CorrectedTargets(pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix(), commands, status)
+    return CorrectedTargets(*_poses(read), commands, status)
+
+
+def _poses(read: TextTable) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3) and rotations (N, 3, 3)."""
+    pose = np.column_stack([_numbers(read, name) for name in _POSE])
+    for size, what, largest, allowed in (
+        (np.abs(pose[:, :3]).max(axis=1), "position", _FARTHEST_M, "metres"),
+        (np.linalg.norm(pose[:, 3:], axis=1), "turn", FARTHEST_RAD, "a rotation vector in rad, not degrees"),
+    ):
+        row = int(np.argmax(size))
+        if size[row] > largest:
+            raise InputError(read.path, f"line {read.lines[row]}", f"a {what} of {size[row]:g}", f"{allowed}, {largest:.3g} at most")
+    return pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix()
 
 
 def _numbers(read: TextTable, name: str) -> np.ndarray:
@@ -150,9 +157,7 @@ def _numbers(read: TextTable, name: str) -> np.ndarray:
     for index, cell in enumerate(read.columns[name]):
         value = plain_number(cell)
         if value is None:
-            raise InputError(
-                read.path, f"line {read.lines[index]}, column {name}", repr(cell), "a number such as -0.25 or 2.5e-3"
-            )
+            raise InputError(read.path, f"line {read.lines[index]}, column {name}", repr(cell), A_NUMBER)
         values[index] = value
     if (place := beyond(name, values)) is not None:
         found = repr(read.columns[name][place])

@@ -1,46 +1,95 @@
-"""Files that appear whole or not at all."""
+"""The one way to write: files that appear whole or not at all, and never where a link, a pipe or a device stands."""
 
 from __future__ import annotations
 
 import os
+import secrets
+import shutil
+import stat
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from elastocal.errors import InputError
+from elastocal.io.texts import kind_of
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+    from collections.abc import Iterable, Iterator
+
+def check_places(*paths: str | Path) -> None:
+    """Refuse a file to be written whose name something else has, which is never replaced or written through."""
+    for path in paths:
+        try:
+            mode = os.lstat(path).st_mode
+        except FileNotFoundError:
+            continue
+        except ValueError as error:
+            raise InputError(path, "", str(error), "a place for a file") from None
+        if not stat.S_ISREG(mode):
+            raise InputError(path, "", kind_of(mode), "a place for a file: a new name, or that of a file")
+
+
+def check_folder(folder: str | Path) -> None:
+    """Refuse a folder that holds links, pipes or devices, however deep: what is written there would go elsewhere, or nowhere."""
+    for entry in os.scandir(folder):
+        if entry.is_dir(follow_symlinks=False):
+            check_folder(entry.path)
+        elif not entry.is_file(follow_symlinks=False):
+            check_places(entry.path)
 
 
 @contextmanager
-def atomic_write(path: str | Path) -> Iterator[str]:
-    """Write beside a file, then rename.
+def atomic_write(path: str | Path, empty: bool = False) -> Iterator[str]:
+    """Write to a name beside a file that nobody can foresee, then rename; if the block raises, nothing is left behind.
 
-    Parameters
-    ----------
-    path : str
-        Where the file shall be once it is complete.
-
-    Yields
-    ------
-    str
-        Where to write it. If the block raises, nothing is left behind.
+    Raises an OSError where the block wrote nothing, unless the file may be `empty`.
     """
-    partial = f"{path}.partial"
+    check_places(path)
+    partial = _beside(path)
+    os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
     try:
         yield partial
+        if not empty and not os.path.getsize(partial):
+            raise FileNotFoundError(2, "nothing that was written", str(path))
         os.replace(partial, path)
     finally:
         with suppress(FileNotFoundError):
             os.remove(partial)
 
 
-def write_text(path: str | Path, text: str) -> None:
-    """Write a text; the file appears whole or not at all.
+@contextmanager
+def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
+    """Write files that belong together to the folder that is given to the block, each with one of these names.
 
-    Parameters
-    ----------
-    path : str
-    text : str
+    A new folder appears with all of them. In one that is there they replace those of these names, in this order, after all of
+    the old ones are gone: a run that is killed leaves no old file beside a new one.
     """
-    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
+    folder, names = Path(os.path.abspath(folder)), [*names]
+    check_places(*(folder / name for name in names))
+    new = not os.path.lexists(folder)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = Path(_beside(folder if new else folder / names[0]))
+    partial.mkdir()
+    try:
+        yield partial
+        if new:
+            partial.rename(folder)
+            return
+        check_places(*(folder / name for name in names))
+        for name in names:
+            (folder / name).unlink(missing_ok=True)
+        for name in names:
+            with suppress(FileNotFoundError):
+                (partial / name).rename(folder / name)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8; the file appears whole or not at all."""
+    with atomic_write(path, empty=not text) as partial, open(partial, "w", encoding="utf-8") as file:
         file.write(text)
+
+
+def _beside(path: str | Path) -> str:
+    return f"{path}.{secrets.token_hex(8)}.partial"

@@ -16,10 +16,10 @@ import jsonschema
 import yaml
 
 from elastocal.errors import InputError
-from elastocal.io.texts import read_text
+from elastocal.io.texts import read_text, text_fault
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
     from typing import Any, Protocol
 
     class _Violation(Protocol):
@@ -159,12 +159,18 @@ def parsed(text: str, source: str | Path) -> Any:
         _check_events(text)
         return yaml.load(text, Loader=_Loader)
     except yaml.YAMLError as error:
-        line = getattr(getattr(error, "problem_mark", None), "line", None)
-        found = (getattr(error, "problem", None) or str(error)).removeprefix("but ").removeprefix("found ")
+        mark, allowed = getattr(error, "problem_mark", None), getattr(error, "allowed", "YAML")
+        line, found = getattr(mark, "line", None), (getattr(error, "problem", None) or str(error))
         if isinstance(error, yaml.reader.ReaderError):
             line, found = text.count("\n", 0, error.position), f"the control character {chr(error.character)!r}"
+        elif mark and not isinstance(error, _UnclearError):
+            here = "".join(text.splitlines()[line:][:1])[mark.column :][:40].strip()
+            problem, _, wanted = found.partition("did not find expected ")
+            shown = repr(here) if here else "the end of the line" if text.splitlines()[line + 1 :] else "the end of the text"
+            found = shown if wanted else f"{shown} ({problem.removeprefix('but ').removeprefix('found ')})"
+            allowed = wanted or allowed
         where = "" if line is None else f"line {line + 1}"
-        raise InputError(source, where, found, getattr(error, "allowed", "YAML")) from None
+        raise InputError(source, where, found, allowed) from None
 
 
 def _check_events(text: str) -> None:
@@ -238,25 +244,40 @@ def check_document(document: Any, schema: str, source: str) -> None:
     InputError
         Names the first key at fault, what was found and what is allowed.
     """
+    for path, text in _texts(document):
+        # White space between the transforms of a chain is free; headers of another table are nobody's names.
+        if fault := None if path[0] == "columns" else text_fault(" ".join(text.split()) if path == ("chain",) else text):
+            key, line = _key_of(path), _line_of(source, path)
+            raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
     errors = sorted(
         islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
     )
     if errors:
         key, found, allowed = _explained(errors[0])
-        line = _line_of(source, errors[0])
+        path = [*errors[0].absolute_path]
+        if errors[0].validator == "additionalProperties":
+            path.append(next(name for name in errors[0].instance if name not in errors[0].schema.get("properties", {})))
+        line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
 
 
-def _line_of(source: str, error: _Violation) -> str:
+def _texts(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], str]]:
+    """All texts of a document, keys among them, and where each stands."""
+    if isinstance(value, str):
+        yield path, value
+    for key, each in value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ():
+        if isinstance(key, str):
+            yield (*path, key), key
+        yield from _texts(each, (*path, key))
+
+
+def _line_of(source: str, path: Sequence[str | int]) -> str:
     """Line of the file at which a key stands, or what it should stand in; empty where there is no such file any more."""
     try:
         node = yaml.compose(read_text(source, LARGEST_BYTES), Loader=_Loader)
     except (InputError, yaml.YAMLError):
         return ""
-    path = [*error.absolute_path]
-    if error.validator == "additionalProperties":
-        path.append(next(name for name in error.instance if name not in error.schema.get("properties", {})))
     mark = node.start_mark if node else None
     for part in path:
         if isinstance(node, yaml.SequenceNode) and isinstance(part, int) and part < len(node.value):
@@ -272,9 +293,21 @@ def _line_of(source: str, error: _Violation) -> str:
     return f"line {mark.line + 1}" if mark and path else ""
 
 
+_BOUNDS = {
+    "minimum": "{} or more",
+    "exclusiveMinimum": "more than {}",
+    "maximum": "{} or less",
+    "exclusiveMaximum": "less than {}",
+}
+
+
+def _key_of(path: Iterable[str | int]) -> str:
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
+
+
 def _explained(error: _Violation) -> tuple[str, str, str]:
     """Key, what was found and what is allowed, of one violation."""
-    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in error.absolute_path).lstrip(".")
+    key = _key_of(error.absolute_path)
     rule, value = error.validator, error.validator_value
     if rule == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
@@ -284,26 +317,42 @@ def _explained(error: _Violation) -> tuple[str, str, str]:
         return f"{key}.{unknown}".lstrip("."), "an unknown key", f"{hint} ({', '.join(known)})".strip()
     if rule == "required":
         missing = next(name for name in value if name not in error.instance)
-        return f"{key}.{missing}".lstrip("."), "nothing", error.schema["properties"][missing].get("description", "a value")
+        wanted = error.schema["properties"][missing]
+        kind, meaning = wanted.get("type"), wanted.get("description", "")
+        words = [_of_type(kind, None) if kind else "", *_bounds(wanted)]
+        return f"{key}.{missing}".lstrip("."), "nothing", _meant(" and ".join(filter(None, words)) or "a value", meaning)
     meaning = error.schema.get("description", "")
     allowed = {
         "enum": lambda: " | ".join(map(str, value)),
         "type": lambda: _of_type(value, error.instance),
-        "minimum": lambda: f"{value} or more",
-        "maximum": lambda: f"{value} or less",
-        "exclusiveMinimum": lambda: f"more than {value}",
-        "exclusiveMaximum": lambda: f"less than {value}",
         "minLength": lambda: f"{value} or more characters",
         "maxLength": lambda: f"{value} or fewer characters",
-        "minItems": lambda: f"{value} or more entries",
-        "maxItems": lambda: f"{value} or fewer entries",
+        "minItems": lambda: _count(error.schema),
+        "maxItems": lambda: _count(error.schema),
         "minProperties": lambda: f"{value} or more keys",
         "uniqueItems": lambda: "each entry once",
         "pattern": lambda: f"text that matches {value}",
         "format": lambda: f"a {value} such as {error.schema['examples'][0]}",
-    }.get(rule, lambda: error.message)()
+    }.get(rule, lambda: " and ".join(_bounds(error.schema)) if rule in _BOUNDS else error.message)()
     found = "nothing" if error.instance is None else repr(error.instance)
-    return key, found, f"{allowed} ({meaning})" if meaning else allowed
+    return key, found, _meant(allowed, meaning)
+
+
+def _meant(allowed: str, meaning: str) -> str:
+    return f"{allowed} ({meaning})" if meaning else allowed
+
+
+def _bounds(schema: Mapping[str, Any]) -> list[str]:
+    """What a number may be: of two bounds on the same side the one that holds."""
+    inner = {"exclusiveMinimum": "minimum", "exclusiveMaximum": "maximum"}
+    return [words.format(schema[name]) for name, words in _BOUNDS.items() if name in schema and inner.get(name) not in schema]
+
+
+def _count(schema: Mapping[str, Any]) -> str:
+    least, most = schema.get("minItems", 0), schema.get("maxItems")
+    if least == most:
+        return f"{least} entries"
+    return f"{least} or more entries" if most is None else f"{least} to {most} entries"
 
 
 def _of_type(allowed: str | list[str], instance: Any) -> str:
@@ -311,7 +360,7 @@ def _of_type(allowed: str | list[str], instance: Any) -> str:
     written = _WITHOUT_POINT.fullmatch(instance) if isinstance(instance, str) else None
     if written and ("number" in allowed):
         return f"number, which YAML has as {written[1]}.{written[2] or 0}e{written[3] or '+'}{written[4]}"
-    words = {"object": "keys with values, such as name: value", "null": "nothing"}
+    words = {"number": "a finite number", "object": "keys with values, such as name: value", "null": "nothing"}
     return " or ".join(words.get(name, name) for name in ([allowed] if isinstance(allowed, str) else allowed))
 
 

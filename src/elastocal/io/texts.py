@@ -8,13 +8,22 @@ import re
 import stat
 from pathlib import Path
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, steering
 
 # Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 # No length, angle, force, mass or time of a robot is larger in any unit; squares and products of such numbers are finite.
 LARGEST_NUMBER = 1e12
+A_NUMBER = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
 _LONGEST_NUMBER = 100
+# Tables hold names, and spreadsheets open tables; those of some countries take the wide signs too.
+_FORMULA = tuple("=+-@＝＋－＠")  # noqa: RUF001
+
+
+def kind_of(mode: int) -> str:
+    """What has a name that is no file, by the mode of its status."""
+    kinds = {stat.S_IFLNK: "a link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    return kinds.get(stat.S_IFMT(mode), "a device")
 
 
 def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:
@@ -40,8 +49,7 @@ def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") ->
     try:
         status = os.stat(path)
         if not stat.S_ISREG(status.st_mode):
-            found = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
-            raise InputError(path, "", found, kind)
+            raise InputError(path, "", kind_of(status.st_mode), kind)
         if status.st_size <= largest:
             with open(path, "rb") as file:
                 content = file.read(largest + 1)
@@ -121,3 +129,12 @@ def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
     """
     value = float(text) if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) else math.inf
     return value if abs(value) <= largest else None
+
+
+def text_fault(text: str) -> tuple[str, str] | None:
+    """What is wrong with a name or text that reports, tables and terminals show, and what is allowed; None where nothing is."""
+    if character := steering(text):
+        return f"the character {ascii(character)} in {text!r}", "printable characters on one line"
+    if text.startswith(_FORMULA):
+        return repr(text), f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula"
+    return None

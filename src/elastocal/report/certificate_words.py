@@ -75,7 +75,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             [
                 _STEPS[step["model"]]
                 if step["model"] != "corrected"
-                else f"with {physical_name(step['step'].removeprefix('+ '))}",
+                else f"with {physical_name(step['step'].removeprefix('with '))}",
                 *(_with_interval(step, metric) for metric in ("mean_m", "rms_m", "p95_m", "max_m")),
             ]
             for step in steps

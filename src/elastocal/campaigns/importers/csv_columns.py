@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-_DECIMAL_WORDS = {",": "a number with a decimal comma", ".": "a number"}
+_DECIMAL_WORDS = {",": "a finite number with a decimal comma", ".": "a finite number"}
 
 
 def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: str) -> dict[str, tuple[str, ...]]:
