@@ -197,7 +197,7 @@ def test_other_campaign_that_is_not_there_is_refused(cell):
         ({"holdout": {"fraction": 1.0}}, "holdout.fraction", ["1.0", "between 0 and 1"]),
         ({"holdout": {"fraction": 0.3, "seed": 1.5}}, "holdout.seed", ["1.5", "integer"]),
         ({"holdout": {"poses": ["1"]}}, "holdout.poses[0]", ["'1'", "integer"]),
-        ({"holdout": {"poses": [[0, 1, 2]]}}, "holdout.poses[0]", ["2 or fewer"]),
+        ({"holdout": {"poses": [[0, 1, 2]]}}, "holdout.poses[0]", ["allowed: 2 entries"]),
         ({"holdout": {"poses": [3, 12]}}, "holdout.poses", ["found 12", "0..9"]),
         ({"holdout": {"poses": [3, [1, 4]]}}, "holdout.poses", ["[1, 4]", "0..9"]),
         ({"holdout": {"poses": [3]}}, "holdout", ["9 configurations to fit and 1 held out", "2 held out"]),

@@ -203,7 +203,7 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"targets": {}}, "targets", ["what is tracked"]),
         ({"targets": {"A": {"point": "elbow"}}}, "targets.A.offset_m", ["nothing", "unknown: fitted"]),
         ({"targets": {"A": {"point": "elbow", "offset_m": "unkown"}}}, "targets.A.offset_m", ["'unkown'", "allowed: unknown"]),
-        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0]}}}, "targets.A.offset_m", ["3 or more entries"]),
+        ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0]}}}, "targets.A.offset_m", ["allowed: 3 entries"]),
         ({"targets": {"A": {"point": "elbow", "offset_m": [0, 0, "1"]}}}, "targets.A.offset_m[2]", ["'1'", "number"]),
         ({"targets": {"A": {"point": "elbw", "offset_m": "unknown"}}}, "targets.A.point", ["'elbw'", "'elbow'? (elbow, hand)"]),
         ({"targets": {1: {"point": "elbow", "offset_m": "unknown"}}}, "targets", ["the name 1", "in quotes"]),
@@ -220,8 +220,8 @@ def test_other_campaign_of_another_chain_is_refused(cell, tmp_path):
         ({"noise": {"orientation_rad": 1e-4}}, "noise", ["no position_m", "u95_m"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": [1e-5]}}, "noise.joint_rad", ["1 numbers", "or 3"]),
         ({"noise": {"position_m": 1e-4, "joint_rad": -1.0}}, "noise.joint_rad", ["-1"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": 2.0}}, "noise.joint_rad", ["2.0", "0.1 or less"]),
-        ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0.1 or less"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": 2.0}}, "noise.joint_rad", ["2.0", "0 to 0.1"]),
+        ({"noise": {"position_m": 1e-4, "joint_rad": [0, 2.0, 0]}}, "noise.joint_rad[1]", ["2.0", "0 to 0.1"]),
         *(
             ({"noise": {"position_m": value}}, "noise.position_m", ["laser", "0.1"])
             for value in (60, 0.2, 6e-12, 1e-300, -1e-4)
@@ -298,7 +298,7 @@ def test_without_loads_joints_of_unknown_compliance_are_rigid_and_masses_turn_no
     assert cell.read().robot.masses and cell.read().robot.compliance_known
 
 
-@pytest.mark.parametrize("name", ["/etc/passwd", "../secret", "../../etc/passwd", "a\0b", "x" * 5000, "link.yaml"])
+@pytest.mark.parametrize("name", ["/etc/passwd", "../secret", "../../etc/passwd", "x" * 5000, "link.yaml"])
 def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name):
     """The folder of robots is not outside."""
     cell.write()

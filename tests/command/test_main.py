@@ -22,7 +22,7 @@ def test_bad_input_ends_in_one_line_and_exit_code_one(monkeypatch):
 @pytest.mark.parametrize(
     ("fault", "line"),
     [
-        (FileExistsError(17, "File exists", "cell"), "cell: found File exists; allowed: a place with space where"),
+        (FileExistsError(17, "File exists", "cell"), "cell: found File exists; allowed: a name that nothing else has"),
         (OSError(28, "No space left on device"), "disk: found No space left on device; allowed: a place with space"),
         (MemoryError(), "memory: found none left; allowed: "),
     ],

@@ -21,8 +21,8 @@ def test_what_might_never_end_is_not_opened(tmp_path):
     (tmp_path / "zero").symlink_to("/dev/zero")
     (tmp_path / "loop").symlink_to("loop")
     for name, words in (
-        ("pipe", "no regular file"),
-        ("zero", "no regular file"),
+        ("pipe", "a pipe"),
+        ("zero", "a device"),
         ("loop", "Too many levels"),
         ("", "a folder"),
     ):

@@ -13,7 +13,6 @@ from elastocal.campaigns.measurements import CSV, write_measurements
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.campaigns.simulation import Plan, simulated_measurements
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import atomic_write
 
 LADDER = (0.0, 1.0, 0.5, -0.5, -1.0)
 
@@ -27,8 +26,7 @@ def measure(folder: Path, robot_file: Path, seed: int) -> None:
     names = {target.point: target.name for target in targets}
     table["target"] = [names[point] for point in table["target"]]
     path = folder / CSV
-    with atomic_write(path) as partial:
-        write_measurements(partial, table, robot.joints)
+    write_measurements(path, table, robot.joints)
     print(f"{len(table['pose'])} measurements in {path}")
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import IO
 
 from elastocal.errors import InputError
+from elastocal.io.atomic_writes import check_folder
 
 # Of each run under way, and of each job (workflow/scripts/job.py); the system gives them back whatever ends the process.
 RUNS, JOBS = "runs.lock", "jobs.lock"
@@ -31,7 +32,7 @@ def begin(snakemake_folder: Path, written: list[str]) -> IO[str]:
     Raises
     ------
     InputError
-        A folder that cannot be written to, or a full disk.
+        A folder that cannot be written to or that holds something else than files and folders, or a full disk.
     """
     for folder in (*written, snakemake_folder.as_posix()):
         try:
@@ -41,6 +42,7 @@ def begin(snakemake_folder: Path, written: list[str]) -> IO[str]:
         except OSError as error:
             allowed = "a folder with space where this user may write; the same command goes on then"
             raise InputError(folder, "", error.strerror or str(error), allowed) from None
+        check_folder(folder)
     run = open(snakemake_folder / RUNS, "a")  # noqa: SIM115
     if _alone(run):
         with open(snakemake_folder / JOBS, "a") as jobs:

@@ -6,11 +6,14 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from elastocal.errors import InputError
+from elastocal.io.atomic_writes import write_text
+
 
 def write_log(log: str | Path, text: str) -> None:
     """Write a log; the terminal has the text too, so a log that cannot be written is no fault of its own."""
-    with suppress(OSError):
-        Path(log).write_text(text, encoding="utf-8")
+    with suppress(OSError, InputError):
+        write_text(log, text)
 
 
 def _log_and_say(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

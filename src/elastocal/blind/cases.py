@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.blind.folders import write_blind_campaign, write_truth
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_text
 from elastocal.plant.arm import Arm, LinkMass, arm_from_file
 from elastocal.plant.bad_rows import possible_kinds, with_bad_rows
 from elastocal.plant.campaigns import FLANGE, Design, schedule_of
@@ -606,8 +606,7 @@ def write_manifest(path: str | Path, digests: Mapping[str, str]) -> None:
     digests : dict of str to str
         By the name of the case.
     """
-    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
-        file.writelines(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items()))
+    write_text(path, "".join(f"{digest}  {name}.json\n" for name, digest in sorted(digests.items())))
 
 
 def _drawn_pair(seed: int, robot: str, level: float | str, number: int) -> tuple[str, str]:

@@ -14,7 +14,7 @@ import numpy as np
 import yaml
 
 from elastocal.campaigns.writing import write_campaign
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_text
 from elastocal.plant.campaigns import Design, measured_table
 from elastocal.plant.dynamic import DYNAMIC, dynamic_table
 
@@ -171,8 +171,7 @@ def write_robot(folder: str | Path, robot_file: str | Path, robot: PhysicalRobot
     """Write the campaign's own robot file; see `robot_document`."""
     nominal = yaml.safe_load(Path(robot_file).read_text(encoding="utf-8"))
     document = robot_document(nominal, robot.arm, declared, robot.structure.gravity_m_s2)
-    with atomic_write(Path(folder) / ROBOT_FILE) as partial, open(partial, "w", encoding="utf-8") as file:
-        yaml.safe_dump(document, file, sort_keys=False, default_flow_style=None, width=120)
+    write_text(Path(folder) / ROBOT_FILE, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
 
 
 def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str | Path) -> str:
@@ -199,6 +198,5 @@ def write_truth(path: str | Path, truth: Mapping[str, Any], campaign_folder: str
         raise ValueError(f"{path}: the ground truth must not lie in the campaign's folder {folder}")
     text = json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n"
     path.parent.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as partial, open(partial, "w", encoding="utf-8") as file:
-        file.write(text)
+    write_text(path, text)
     return hashlib.sha256(text.encode()).hexdigest()

@@ -186,5 +186,8 @@ def _check_units(measurements: Measurements, table: MeasurementFile, robot: Robo
         if angle.max() > FARTHEST_RAD:
             turned = int(np.argmax(angle))
             raise table.cell_fault(
-                turned, "rx, ry, rz", f"a turn of {angle[turned]:.4g}", f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most"
+                turned,
+                "rx, ry, rz",
+                f"a turn of {angle[turned]:.4g}",
+                f"a rotation vector in rad, not degrees, {FARTHEST_RAD:.3g} at most",
             )

@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 
 from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.errors import InputError, steering
+from elastocal.io.atomic_writes import atomic_write
 from elastocal.io.storage import Column
 from elastocal.io.texts import LARGEST_NUMBER
 from elastocal.mechanics.components import WRENCH
@@ -124,19 +125,20 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
             raise InputError(path, "header", f"the unknown column {name!r}", closest_first(name, missing) + of)
 
 
-def write_measurements(path: str, table: Mapping[str, Sequence[Any] | np.ndarray], joints: int) -> None:
+def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.ndarray], joints: int) -> None:
     """Write the measurements of a campaign.
 
     Parameters
     ----------
-    path : str
-        Holds CSV where the name of the file that it stands for begins with that of `CSV`, else Parquet.
+    path : str or Path
+        Holds CSV where its name is `CSV`, else Parquet.
     table : dict of str to sequence
         Columns of one length, named as in `file_columns`.
     joints : int
     """
     columns = [column for name, column in file_columns(joints).items() if name in table]
-    (_write_csv if Path(path).name.startswith(CSV) else _write_parquet)(path, columns, table)
+    with atomic_write(path) as partial:
+        (_write_csv if Path(path).name == CSV else _write_parquet)(partial, columns, table)
 
 
 def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
@@ -181,7 +183,7 @@ def _lines(file: TextIO, path: str) -> Iterator[str]:
         if not line.isascii() and any("\ud800" <= character <= "\udfff" for character in line):
             raise InputError(path, f"line {number}", "text that is not UTF-8", "a UTF-8 file")
         if character := steering(line.rstrip("\r\n").replace("\t", " ")):
-            raise InputError(path, f"line {number}", f"the character {ascii(character)}", "printable characters")
+            raise InputError(path, f"line {number}", f"the character {character!a}", "printable characters")
         yield line
 
 

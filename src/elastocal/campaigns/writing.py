@@ -9,7 +9,7 @@ import yaml
 
 from elastocal.campaigns.campaign import DOCUMENT
 from elastocal.campaigns.measurements import CSV, PARQUET, check_column_names, write_measurements
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import write_text, write_together
 from elastocal.io.documents import check_document
 
 if TYPE_CHECKING:
@@ -48,11 +48,8 @@ def write_campaign(
     check_document(document, "campaign", (folder / DOCUMENT).as_posix())
     path = folder / (PARQUET if kind == "parquet" else CSV)
     check_column_names(table, joints, path.as_posix())
-    folder.mkdir(parents=True, exist_ok=True)
-    with atomic_write(path) as partial:
-        write_measurements(partial, table, joints)
-        # From here to its document the folder is no campaign; nor may it hold measurements of both kinds.
-        for name in (DOCUMENT, CSV, PARQUET):
-            (folder / name).unlink(missing_ok=True)
-    with atomic_write(folder / DOCUMENT) as partial, open(partial, "w", encoding="utf-8") as file:
-        yaml.safe_dump(document, file, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+    # Until its document is there the folder is no campaign; nor may it hold measurements of both kinds.
+    with write_together(folder, (CSV, PARQUET, DOCUMENT)) as partial:
+        write_measurements(partial / path.name, table, joints)
+        text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True, default_flow_style=None, width=120)
+        write_text(partial / DOCUMENT, text)

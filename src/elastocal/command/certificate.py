@@ -11,7 +11,7 @@ from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign, report_file
 from elastocal.command.pipeline import pipeline, workplace
-from elastocal.command.printed import iso_date, printed
+from elastocal.command.printed import iso_date, print_lines, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
 from elastocal.errors import InputError
 
@@ -56,6 +56,7 @@ def certificate(
     from elastocal.exchange.target_path import read_target_path
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save
+    from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.json_files import read_json, write_json
     from elastocal.loop.certificate import Wanted
     from elastocal.loop.certificate import certificate as certified
@@ -69,13 +70,15 @@ def certificate(
     number = stated if serial is None else printed("--serial", serial)
     day = calendar.today().isoformat() if date is None else iso_date("--date", date)
     found = diagnosed_campaign(folder)
+    reports = workplace() / "reports" / "loop" / found.name
+    place = output or reports
+    check_places(place / PAGES, place / DOCUMENT, top=output or workplace() / "reports")
     other = None if compare is None else diagnosed_campaign(compare)
     robots = pipeline() / "config" / "robots"
     after = None if measured is None else measured_errors(measured, robots, found)
     used = None
     if use is not None:
         used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
-    reports = workplace() / "reports" / "loop" / found.name
     needed = [reports / name for name in ("verdict.json", "before_after.csv")]
     for path in needed:
         if report_file(found.name, path.name) is None:
@@ -88,9 +91,7 @@ def certificate(
     with console.status("working"):
         document, maps = certified(folder, robots, found, verdict, steps, wanted, other, after, used)
         facts = certificate_facts(document)
-        place = output or reports
-        place.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory() as scratch:
+        with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             forces = [each["force_N"] for each in document["workspace"]]
             drawn = {
                 "workspace": workspace_map(maps, forces),
@@ -98,12 +99,8 @@ def certificate(
             }
             for name, figure in drawn.items():
                 save(figure, f"{scratch}/{name}.pdf", f"{scratch}/{name}.png")
-            write_certificate(place / PAGES, facts, [f"{scratch}/{name}.pdf" for name in drawn])
-        write_json(place / DOCUMENT, document)
-    for line in (
-        f"{facts['decision']}: {facts['decision_sentences']}",
-        facts["now"],
-        f"    {place / PAGES}, {place / DOCUMENT}",
-    ):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+            write_certificate(partial / PAGES, facts, [f"{scratch}/{name}.pdf" for name in drawn])
+            write_json(partial / DOCUMENT, document)
+    lines = [f"{facts['decision']}: {facts['decision_sentences']}", facts["now"], f"    {place / PAGES}, {place / DOCUMENT}"]
+    print_lines(lines, console)
     raise typer.Exit(0 if facts["decision"] == "pass" else 1)

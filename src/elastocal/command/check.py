@@ -12,6 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from elastocal.command.pipeline import pipeline
+from elastocal.errors import escaped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,7 +49,7 @@ def show(facts: Mapping[str, Any], console: Console) -> None:
     table.add_column(style="bold", no_wrap=True)
     table.add_column(overflow="fold")
     for name, words in lines(facts):
-        table.add_row(name, words)
+        table.add_row(name, escaped(words))
     console.print(table)
 
 

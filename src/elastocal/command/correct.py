@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.printed import print_lines
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -42,16 +43,19 @@ def correct(
     from elastocal.application.compensation import corrected
     from elastocal.application.scope import campaign_accuracy
     from elastocal.exchange.target_path import OK, read_target_path
+    from elastocal.io.atomic_writes import check_places
     from elastocal.io.data_frames import write_csv
     from elastocal.validation.fitted_range import beyond_campaign
 
     console = Console(stderr=True)
+    check_places(output)
+    if not output.parent.is_dir():
+        raise InputError(output, "", "no such folder", "a file in a folder that is there")
     campaign = diagnosed_campaign(folder)
     calibrated = campaign.calibrated
     wanted = read_target_path(path, calibrated.robot.joints)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
-    for line in assumptions(calibrated, operating):
-        console.print(f"assumed: {line}", markup=False, highlight=False, soft_wrap=True)
+    print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task("correcting", total=len(wanted))
         found = corrected(
@@ -75,8 +79,7 @@ def correct(
     write_csv(output, joint_targets(wanted, found, before, errors, beyond))
     if beyond.any():
         share = f"{beyond.sum():,} of {len(beyond):,} targets"
-        line = f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        print_lines([f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"], console)
     good = found.status == OK
     lines = [f"{good.sum():,} of {len(good):,} targets corrected"]
     if good.any():
@@ -85,9 +88,7 @@ def correct(
         lines[0] += f"; uncorrected they would be missed by {millimetres(rms)} RMS (predicted, in the same frame)"
         lines.append(accuracy_sentence(reachable.accuracy("the targets")))
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
-    for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(f"    {output}", markup=False, highlight=False, soft_wrap=True)
+    print_lines([*lines, f"    {output}"], console)
 
 
 def joint_targets(

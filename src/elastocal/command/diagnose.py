@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from elastocal.command.pipeline import pipeline, workplace
+from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_JOBS
 
 if TYPE_CHECKING:
@@ -55,4 +56,4 @@ def follow(lines: Iterable[str], console: Console) -> None:
             if job and console.is_terminal:
                 progress.update(bar, completed=int(job[1]) - 1, total=int(job[2]), description=job[3])
             elif not (_JOBS.fullmatch(line) and console.is_terminal):
-                console.print(line, markup=False, highlight=False, soft_wrap=True)
+                print_lines([line], console)

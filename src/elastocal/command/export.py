@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
 
@@ -20,7 +21,8 @@ ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
 TABLE = "table.csv"
 # Of the angles of the table.
 _SEED = 1
-DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", "dh_frames"
+DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", ("dh_frames.pdf", "dh_frames.png")
+_NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES, TABLE)
 
 
 def export(
@@ -47,26 +49,26 @@ def export(
     from elastocal.application.scope import campaign_accuracy
     from elastocal.application.sidecar import left_out_m, sidecar
     from elastocal.exchange.urdf_writing import urdf_of
-    from elastocal.io.atomic_writes import write_text
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
     from elastocal.mechanics.robot_file import document_of
 
     console = Console(stderr=True)
+    check_places(*(output / name for name in _NAMES))
     found = diagnosed_campaign(folder)
     calibrated = found.calibrated
     robot = folded(calibrated).robot
     stated = f"Calibrated by elastocal from the campaign {found.name}."
-    output.mkdir(parents=True, exist_ok=True)
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
-    write_text(output / ROBOT, f"# {stated}\n{text}")
-    write_text(output / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
     accuracy = campaign_accuracy(calibrated, found.case.observations.states)
     document = sidecar(calibrated, found.name, date or calendar.today().isoformat(), accuracy)
-    write_json(output / SIDECAR, document)
     lines = [accuracy_sentence(accuracy), *(f"    {output / name}" for name in (ROBOT, URDF, SIDECAR))]
-    lines += _denavit_hartenberg(calibrated.robot, robot, output)
-    if table:
-        lines += _table(calibrated, table, force, output)
+    with write_together(output, _NAMES) as partial:
+        write_text(partial / ROBOT, f"# {stated}\n{text}")
+        write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
+        write_json(partial / SIDECAR, document)
+        lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
+        lines += _table(calibrated, table, force, partial, output) if table else []
     if document["effects"]:
         states = found.case.observations.states
         angles = calibrated.robot.reported_angles(states.joint_angles)
@@ -74,12 +76,11 @@ def export(
         names = ", ".join(entry["key"] for entry in document["effects"])
         largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
         lines.insert(0, f"only in {SIDECAR}: {names}; up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
-    for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    print_lines(lines, console)
 
 
-def _table(calibrated: CalibratedRobot, rows: int, force: float, output: Path) -> list[str]:
-    """Write the table of errors; how well one interpolates in it."""
+def _table(calibrated: CalibratedRobot, rows: int, force: float, partial: Path, output: Path) -> list[str]:
+    """Write the table of errors to a folder that becomes `output`; how well one interpolates in it."""
     import numpy as np
 
     from elastocal.application.calibrated import OperatingConditions
@@ -89,12 +90,12 @@ def _table(calibrated: CalibratedRobot, rows: int, force: float, output: Path) -
     hanging = OperatingConditions(np.array([[0.0, 0.0, -force, 0.0, 0.0, 0.0]]))
     found = forward_table(calibrated, rows, hanging, _SEED)
     left, whole = interpolation_error_m(calibrated, found, hanging, _SEED + 1)
-    write_csv(output / TABLE, found)
+    write_csv(partial / TABLE, found)
     line = f"    {output / TABLE}: {len(found)} rows; interpolated, {1e3 * left:.3f} mm of {1e3 * whole:.3f} mm RMS remain"
     return [line]
 
 
-def _denavit_hartenberg(nominal: Robot, robot: Robot, output: Path) -> list[str]:
+def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Path) -> list[str]:
     """Write the DH parameters, by how much they differ from the nominal ones, and their frames; lines to print."""
     from elastocal.exchange.dh_writing import dh_deltas, dh_frames, dh_table
     from elastocal.figures.dh_frames import dh_frames_picture
@@ -105,8 +106,8 @@ def _denavit_hartenberg(nominal: Robot, robot: Robot, output: Path) -> list[str]
         frames = dh_frames(nominal)
     except InputError as error:
         return [f"no DH parameters: {error}"]
-    write_csv(output / DH, dh_table(robot, nominal), digits=12)
-    write_csv(output / DELTAS, dh_deltas(nominal, robot))
+    write_csv(partial / DH, dh_table(robot, nominal), digits=12)
+    write_csv(partial / DELTAS, dh_deltas(nominal, robot))
     names = [str(number) for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
-    save(dh_frames_picture(frames, nominal.name, names), f"{output / FRAMES}.pdf", f"{output / FRAMES}.png")
-    return [f"    {output / name}" for name in (DH, DELTAS, f"{FRAMES}.png")]
+    save(dh_frames_picture(frames, nominal.name, names), *(str(partial / name) for name in FRAMES))
+    return [f"    {output / name}" for name in (DH, DELTAS, FRAMES[1])]

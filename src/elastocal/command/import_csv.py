@@ -66,8 +66,9 @@ def csv(
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.exchange.import_options import IMPORT, import_options_text, read_import_options
     from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
-    from elastocal.io.atomic_writes import atomic_write, write_text
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
 
+    check_places(folder / CSV, folder / PARQUET, folder / IMPORT)
     if (folder / PARQUET).exists() or ((folder / CSV).exists() and not force and _is_filled(folder / CSV)):
         raise InputError(
             folder, "", "measurements that are there already", "another folder, or --force to replace measurements.csv"
@@ -88,10 +89,9 @@ def csv(
         skip_empty=skip_empty or earlier.skip_empty,
     )
     found = read_measurement_table(file, chosen)
-    folder.mkdir(parents=True, exist_ok=True)
-    with atomic_write(folder / CSV) as partial:
-        write_measurements(partial, found.table, found.joints)
-    write_text(folder / IMPORT, import_options_text(found.options, file))
+    with write_together(folder, (CSV, IMPORT)) as partial:
+        write_measurements(partial / CSV, found.table, found.joints)
+        write_text(partial / IMPORT, import_options_text(found.options, file))
     lines = [*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
     typer.echo("\n".join(map(printable, lines)))
 

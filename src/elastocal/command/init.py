@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, escaped
 
 
 def init(
@@ -19,11 +19,12 @@ def init(
     from elastocal.campaigns.measurements import CSV, PARQUET
     from elastocal.campaigns.reading import read_robot
     from elastocal.campaigns.template import campaign_template, robot_template, sheet_template
-    from elastocal.io.atomic_writes import write_text
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.documents import LARGEST_BYTES
     from elastocal.io.texts import read_text
 
     place = folder / "robot.yaml"
+    check_places(place, *(folder / name for name in (DOCUMENT, CSV, PARQUET)))
     if (folder / DOCUMENT).exists():
         raise InputError(folder / DOCUMENT, "", "a campaign that is there already", "a folder without campaign.yaml")
     if robot is not None and place.exists():
@@ -31,15 +32,15 @@ def init(
     text = robot_template() if robot is None else read_text(robot, LARGEST_BYTES)
     source = place if place.exists() else robot
     arm = None if source is None else read_robot(source)
-    folder.mkdir(parents=True, exist_ok=True)
-    if not place.exists():
-        write_text(place, text)
-    arm = arm or read_robot(place)
-    written = [place.name, DOCUMENT]
-    if not (folder / CSV).exists() and not (folder / PARQUET).exists():
-        write_text(folder / CSV, sheet_template(arm.joints))
-        written.append(CSV)
-    write_text(folder / DOCUMENT, campaign_template(folder.resolve().name, arm))
-    typer.echo(f"{folder.as_posix()}: {', '.join(written)}")
+    there = [name for name in (place.name, CSV, PARQUET) if (folder / name).exists()]
+    written = [name for name in (place.name, CSV, DOCUMENT) if name not in there and (name != CSV or PARQUET not in there)]
+    with write_together(folder, written) as partial:
+        if place.name in written:
+            write_text(partial / place.name, text)
+        arm = arm or read_robot(partial / place.name)
+        if CSV in written:
+            write_text(partial / CSV, sheet_template(arm.joints))
+        write_text(partial / DOCUMENT, campaign_template(folder.resolve().name, arm))
+    typer.echo(escaped(f"{folder.as_posix()}: {', '.join(written)}"))
     if source is None:
         typer.echo("robot.yaml is a template: put your robot's chain and lengths there, or elastocal import urdf|dh")

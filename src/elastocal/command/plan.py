@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
+from elastocal.command.printed import print_lines
 from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, length_m, numbers
 from elastocal.errors import InputError
 
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
+
+ROBOT = "robot.yaml"
 
 
 def plan(
@@ -55,9 +59,12 @@ def plan(
     from elastocal.application.planning.plan import Loads, allowed_candidates, fewest_poses, planned, poses_needed
     from elastocal.application.planning.sheet import sheet
     from elastocal.application.planning.survey import Survey
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.measurements import CSV
     from elastocal.campaigns.reading import read_robot
     from elastocal.figures.plan import plan_picture
     from elastocal.figures.style import save
+    from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.data_frames import write_csv
 
     console = Console(stderr=True)
@@ -67,8 +74,13 @@ def plan(
             raise InputError(f"--{name}", "", repr(value), ", ".join(known))
     if output is None and folder is None:
         raise InputError("plan", "", "neither --output nor --folder", "where the plan shall go")
-    if folder is not None and folder.exists():
-        raise InputError(folder, "", "a folder that is there", "a new one")
+    if folder is not None and os.path.lexists(folder):
+        raise InputError(folder, "", "a name that is taken", "a new one")
+    names = [(output or Path("plan.csv")).with_suffix(suffix).name for suffix in (".csv", ".pdf", ".png")]
+    if output is not None:
+        if output.name != names[0]:
+            raise InputError("--output", "", repr(output.name), "a name that ends in .csv; pictures go beside it")
+        check_places(*(output.with_name(name) for name in names))
     loads = Loads(force, pull)
     targets = _targets(target or [arm.chain.end_effector.name], arm.chain)
     deviation = length_m("--noise", noise)
@@ -91,12 +103,22 @@ def plan(
                 raise InputError("--accuracy", "", best, "more poses, or an accuracy that they reach")
             found = planned(survey, some, max(enough, fewest_poses(survey)), held_out, criterion, seed)
     table = sheet(survey, found)
+    stated = table.assign(expected_accuracy_m=float(found.accuracy_m[-1]))
+    picture = plan_picture(arm, cell, found)
+
+    def write_plan(place: Path) -> None:
+        write_csv(place / names[0], stated)
+        save(picture, *(str(place / name) for name in names[1:]))
+
     if folder is not None:
-        _write_folder(folder, robot, survey, found, table)
-        output = output or folder / "plan.csv"
-    assert output is not None
-    write_csv(output, table.assign(expected_accuracy_m=float(found.accuracy_m[-1])))
-    save(plan_picture(arm, cell, found), str(output.with_suffix(".pdf")), str(output.with_suffix(".png")))
+        with write_together(folder, (ROBOT, CSV, *names, DOCUMENT)) as partial:
+            _write_campaign(partial, folder.name, robot, survey, found, table)
+            if output is None:
+                write_plan(partial)
+    if output is not None:
+        with write_together(output.parent, names) as partial:
+            write_plan(partial)
+    output = output or Path(str(folder), names[0])
     random = 1e3 * np.quantile(found.random_m[:, -1], [0.05, 0.5, 0.95])
     frame = FRAMES[ROBOT if survey.unknown_base else BASE]
     lines = [
@@ -108,8 +130,7 @@ def plan(
         f"{criterion}-efficiency: at least {found.efficiency:.2f} of the best design with as many poses",
         f"    {output}, {output.with_suffix('.pdf')}" + (f", {folder}" if folder else ""),
     ]
-    for line in lines:
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+    print_lines(lines, console)
 
 
 def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
@@ -128,10 +149,8 @@ def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
     return tuple(found)
 
 
-def _write_folder(folder: Path, robot: Path, survey: Survey, found: Plan, table: pd.DataFrame) -> None:
+def _write_campaign(place: Path, name: str, robot: Path, survey: Survey, found: Plan, table: pd.DataFrame) -> None:
     """A campaign to fill in: campaign.yaml, the robot file, and a sheet whose measurement columns are empty."""
-    import shutil
-
     import yaml
 
     from elastocal.application.planning.sheet import campaign_document
@@ -139,9 +158,10 @@ def _write_folder(folder: Path, robot: Path, survey: Survey, found: Plan, table:
     from elastocal.campaigns.measurements import CSV
     from elastocal.io.atomic_writes import write_text
     from elastocal.io.data_frames import write_csv
+    from elastocal.io.documents import LARGEST_BYTES
+    from elastocal.io.texts import read_text
 
-    folder.mkdir(parents=True)
-    shutil.copyfile(robot, folder / "robot.yaml")
-    write_csv(folder / CSV, table)
-    document = campaign_document(folder.name, "robot.yaml", survey, found)
-    write_text(folder / DOCUMENT, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))
+    write_text(place / ROBOT, read_text(robot, LARGEST_BYTES))
+    write_csv(place / CSV, table)
+    document = campaign_document(name, ROBOT, survey, found)
+    write_text(place / DOCUMENT, yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=120))

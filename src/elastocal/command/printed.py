@@ -1,10 +1,16 @@
-"""Options that a document prints as they are: names and numbers on one line, and dates."""
+"""What is printed: options of documents as they are, names and numbers on one line, and dates; and lines on a terminal."""
 
 from __future__ import annotations
 
 from datetime import date
+from typing import TYPE_CHECKING
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, escaped, steering
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from rich.console import Console
 
 # As in campaign.yaml.
 _LONGEST = 60
@@ -30,7 +36,7 @@ def printed(option: str, text: str) -> str:
         Nothing but blanks, a line break or another control character, or more characters than a line of the document has.
     """
     line = text.strip(" ")
-    if not line.isprintable() or not 0 < len(line) <= _LONGEST:
+    if steering(line) or not 0 < len(line) <= _LONGEST:
         raise InputError(option, "", repr(text), f"1 to {_LONGEST} characters on one line")
     return line
 
@@ -62,3 +68,9 @@ def iso_date(option: str, text: str) -> str:
     if day != text or not text:
         raise InputError(option, "", repr(text), "a date of the calendar as ISO 8601 has it, such as 2026-11-20")
     return day
+
+
+def print_lines(lines: Iterable[str], console: Console) -> None:
+    """Print lines as they are, with what would steer a terminal as escapes: they hold names and paths of other people."""
+    for line in lines:
+        console.print(escaped(line), markup=False, highlight=False, soft_wrap=True)

@@ -133,7 +133,7 @@ def lines_of(text: str, path: str | Path) -> list[str]:
     for number, line in enumerate(lines, 1):
         if character := steering(line.replace("\t", " ")):
             allowed = "printable characters, in UTF-8, or in UTF-16 with a byte order mark"
-            raise InputError(path, f"line {number}", f"the character {ascii(character)}", allowed)
+            raise InputError(path, f"line {number}", f"the character {character!a}", allowed)
     return lines[:-1] if lines[-1] == "" else lines
 
 

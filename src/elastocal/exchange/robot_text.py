@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import write_text
+from elastocal.io.atomic_writes import check_places, write_text
 from elastocal.io.documents import check_document, one_line
 from elastocal.mechanics.robot_file import robot_from_document
 
@@ -188,5 +188,6 @@ def refuse_existing(path: str | Path, force: bool) -> None:
     """
     if Path(path).is_dir() or not Path(path).resolve().parent.is_dir():
         raise InputError(path, "", "no place for a file", "a file in a folder that is there")
+    check_places(path)
     if Path(path).exists() and not force:
         raise InputError(path, "", "a file that is there already", "another --output, or --force to replace it")

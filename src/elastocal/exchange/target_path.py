@@ -147,7 +147,9 @@ def _poses(read: TextTable) -> tuple[np.ndarray, np.ndarray]:
     ):
         row = int(np.argmax(size))
         if size[row] > largest:
-            raise InputError(read.path, f"line {read.lines[row]}", f"a {what} of {size[row]:g}", f"{allowed}, {largest:.3g} at most")
+            raise InputError(
+                read.path, f"line {read.lines[row]}", f"a {what} of {size[row]:g}", f"{allowed}, {largest:.3g} at most"
+            )
     return pose[:, :3], Rotation.from_rotvec(pose[:, 3:]).as_matrix()
 
 

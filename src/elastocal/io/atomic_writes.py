@@ -16,8 +16,15 @@ from elastocal.io.texts import kind_of
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-def check_places(*paths: str | Path) -> None:
-    """Refuse a file to be written whose name something else has, which is never replaced or written through."""
+
+def check_places(*paths: str | Path, top: Path | None = None) -> None:
+    """Refuse a file to be written whose name something else has, which is never replaced or written through.
+
+    Nor is a folder between the file and `top`, which the user named, a link.
+    """
+    folders = dict.fromkeys(folder for path in paths for folder in Path(path).parents if top in folder.parents)
+    if link := next((folder for folder in folders if folder.is_symlink()), None):
+        raise InputError(link, "", "a link", "a folder")
     for path in paths:
         try:
             mode = os.lstat(path).st_mode
@@ -30,7 +37,7 @@ def check_places(*paths: str | Path) -> None:
 
 
 def check_folder(folder: str | Path) -> None:
-    """Refuse a folder that holds links, pipes or devices, however deep: what is written there would go elsewhere, or nowhere."""
+    """Refuse a folder that holds links, pipes or devices, however deep: what is written there would go elsewhere."""
     for entry in os.scandir(folder):
         if entry.is_dir(follow_symlinks=False):
             check_folder(entry.path)
@@ -66,7 +73,9 @@ def write_together(folder: str | Path, names: Iterable[str]) -> Iterator[Path]:
     """
     folder, names = Path(os.path.abspath(folder)), [*names]
     check_places(*(folder / name for name in names))
-    new = not os.path.lexists(folder)
+    if os.path.lexists(folder) and not folder.is_dir():
+        raise InputError(folder, "", kind_of(os.lstat(folder).st_mode), "a folder, or a new name")
+    new = not folder.exists()
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = Path(_beside(folder if new else folder / names[0]))
     partial.mkdir()

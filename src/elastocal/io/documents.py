@@ -167,8 +167,8 @@ def parsed(text: str, source: str | Path) -> Any:
             here = "".join(text.splitlines()[line:][:1])[mark.column :][:40].strip()
             problem, _, wanted = found.partition("did not find expected ")
             shown = repr(here) if here else "the end of the line" if text.splitlines()[line + 1 :] else "the end of the text"
-            found = shown if wanted else f"{shown} ({problem.removeprefix('but ').removeprefix('found ')})"
-            allowed = wanted or allowed
+            found = shown if wanted else f"{problem.removeprefix('but ').removeprefix('found ')}: {shown}"
+            allowed = f"YAML with {wanted} here" if wanted else allowed
         where = "" if line is None else f"line {line + 1}"
         raise InputError(source, where, found, allowed) from None
 
@@ -244,11 +244,6 @@ def check_document(document: Any, schema: str, source: str) -> None:
     InputError
         Names the first key at fault, what was found and what is allowed.
     """
-    for path, text in _texts(document):
-        # White space between the transforms of a chain is free; headers of another table are nobody's names.
-        if fault := None if path[0] == "columns" else text_fault(" ".join(text.split()) if path == ("chain",) else text):
-            key, line = _key_of(path), _line_of(source, path)
-            raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
     validator = _Validator(read_schema(schema), format_checker=_FORMATS)
     errors = sorted(
         islice(validator.iter_errors(document), _MOST_FAULTS), key=lambda error: [str(part) for part in error.absolute_path]
@@ -260,6 +255,11 @@ def check_document(document: Any, schema: str, source: str) -> None:
             path.append(next(name for name in errors[0].instance if name not in errors[0].schema.get("properties", {})))
         line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
+    for path, text in _texts(document):
+        # White space between the transforms of a chain is free; headers of another table are nobody's names.
+        if fault := None if path[:1] == ("columns",) else text_fault(" ".join(text.split()) if path == ("chain",) else text):
+            key, line = _key_of(path), _line_of(source, path)
+            raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
 
 
 def _texts(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -294,10 +294,10 @@ def _line_of(source: str, path: Sequence[str | int]) -> str:
 
 
 _BOUNDS = {
-    "minimum": "{} or more",
-    "exclusiveMinimum": "more than {}",
-    "maximum": "{} or less",
-    "exclusiveMaximum": "less than {}",
+    "minimum": "{:g} or more",
+    "exclusiveMinimum": "more than {:g}",
+    "maximum": "{:g} or less",
+    "exclusiveMaximum": "less than {:g}",
 }
 
 
@@ -344,6 +344,8 @@ def _meant(allowed: str, meaning: str) -> str:
 
 def _bounds(schema: Mapping[str, Any]) -> list[str]:
     """What a number may be: of two bounds on the same side the one that holds."""
+    if "minimum" in schema and "maximum" in schema:
+        return [f"{schema['minimum']:g} to {schema['maximum']:g}"]
     inner = {"exclusiveMinimum": "minimum", "exclusiveMaximum": "maximum"}
     return [words.format(schema[name]) for name, words in _BOUNDS.items() if name in schema and inner.get(name) not in schema]
 

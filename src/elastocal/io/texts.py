@@ -17,7 +17,7 @@ LARGEST_NUMBER = 1e12
 A_NUMBER = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
 _LONGEST_NUMBER = 100
 # Tables hold names, and spreadsheets open tables; those of some countries take the wide signs too.
-_FORMULA = tuple("=+-@＝＋－＠")  # noqa: RUF001
+_FORMULA = tuple("=+-@＝＋－＠")
 
 
 def kind_of(mode: int) -> str:
@@ -134,7 +134,7 @@ def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
 def text_fault(text: str) -> tuple[str, str] | None:
     """What is wrong with a name or text that reports, tables and terminals show, and what is allowed; None where nothing is."""
     if character := steering(text):
-        return f"the character {ascii(character)} in {text!r}", "printable characters on one line"
+        return f"the character {character!a} in {text!r}", "printable characters on one line"
     if text.startswith(_FORMULA):
         return repr(text), f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula"
     return None

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
-_DECIMAL_WORDS = {",": "a finite number with a decimal comma", ".": "a finite number"}
+_DECIMAL_WORDS = {",": "a number with a decimal comma, not infinite", ".": "a number, not infinite"}
 
 
 def read_columns(path: str | Path, separator: str, needed: Iterable[str], kind: str) -> dict[str, tuple[str, ...]]:
