@@ -54,6 +54,8 @@ def steering(text: str) -> str:
     return "" if text.isprintable() else next((c for c in text if not (c.isprintable() or unicodedata.category(c) == "Zs")), "")
 
 
+# What the loader of libraries says of it.
+_NO_MEMORY = ("failed to map segment", "annot allocate memory")
 _SPACE = "a place with space where this user may write"
 _REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS), _SPACE),
@@ -66,10 +68,12 @@ _REMEDIES = {
 }
 
 
-def fault_of_machine(error: OSError | MemoryError, place: str = "disk") -> InputError:
+def fault_of_machine(error: OSError | MemoryError | ImportError, place: str = "disk") -> InputError:
     """A full disk, a folder that cannot be written to, memory that is used up and the like; at `place` where it has no name."""
-    if isinstance(error, MemoryError):
+    if isinstance(error, MemoryError) or any(words in str(error) for words in _NO_MEMORY):
         return InputError("memory", "", "none left", "a smaller file, more memory, or fewer jobs at a time (-j1)")
+    if isinstance(error, ImportError):
+        return InputError("Python", "", str(error), "an environment with every package of this version")
     found, allowed = error.strerror or str(error), _REMEDIES.get(error.errno or 0, "a disk that can be read and written")
     return InputError(str(error.filename or place), "", found, allowed)
 

@@ -84,8 +84,8 @@ class LogHandler(LogHandlerBase):
 
 
 def _reason(rule: str, logs: Sequence[str]) -> str:
-    """Last line of the logs of a job that failed; a script that was killed as it began has none."""
+    """Last line of the logs of a job that failed; one that was killed as it began, or for want of memory, has none."""
     lines = [line for log in logs if Path(log).is_file() for line in Path(log).read_text(encoding="utf-8").splitlines()]
     found = f"{rule}: found an end before its log began ({', '.join(logs)})"
-    otherwise = f"{found}; allowed: a script that can start (its error stands above)"
+    otherwise = f"{found}; allowed: memory that a script needs to start and to end, and a sound one (if it said why, above)"
     return next((line for line in reversed(lines) if line.strip()), otherwise)

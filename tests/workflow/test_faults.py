@@ -1,15 +1,20 @@
 """Bad input ends with one line that names the file, the key and what is allowed, and leaves nothing that looks finished."""
 
 import fcntl
+import os
 import re
 import subprocess
 import time
+from pathlib import Path
 
 import psutil
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from durations import HUNG_S
+from support import refused
+
+from one_run import begin
 
 KUKA = "config/robots/kuka.yaml"
 MEASURED = "data/simulated/kuka/200um/measured.parquet"
@@ -210,12 +215,50 @@ def test_a_killed_job_leaves_no_file_under_the_final_name(finished):
     started = subprocess.Popen(
         **finished.command("-j1", MEASURED), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True
     )
-    partial, latest = finished.path(f"{MEASURED}.partial"), time.monotonic() + HUNG_S
-    while not (partial.exists() and partial.stat().st_size > 4):
+    latest = time.monotonic() + HUNG_S
+    while not any(finished.path(name).stat().st_size > 4 for name in finished.files(f"{MEASURED}.*.partial")):
         assert started.poll() is None
         assert time.monotonic() < latest
         time.sleep(0.05)
     for process in [*psutil.Process(started.pid).children(recursive=True), started]:
         process.kill()
     assert started.wait() != 0
-    assert not finished.path(MEASURED).exists()
+    assert not finished.path(MEASURED).exists() and len(finished.files(f"{MEASURED}.*.partial")) == 1
+    finished.snakemake("-j1", "reports/tables/table4.tex")
+    assert finished.files(f"{MEASURED}.*.partial") == []
+
+
+@pytest.mark.parametrize(
+    "name",
+    [MEASURED, "results/logs/measure/kuka/200um.log", "results/timings", "reports/tables/none.csv", ".snakemake/runs.lock"],
+)
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_what_stands_in_a_folder_of_the_pipeline_and_is_no_file_is_refused_before_any_job(finished, tmp_path, name, kind):
+    place, victim = finished.path(name), tmp_path / "victim"
+    if place.exists():
+        place.rename(victim)
+    place.symlink_to(victim) if kind == "link" else os.mkfifo(place)
+    ended = finished.snakemake("-j1", MEASURED)
+    assert ended.returncode != 0
+    assert (
+        ended.stderr.splitlines()[-1] == f"{name}: found a {kind}; allowed: a place for a file: a new name, or that of a file"
+    )
+    assert place.is_symlink() or place.is_fifo()
+
+
+def test_at_every_name_of_a_finished_study_a_link_is_refused(finished, tmp_path, monkeypatch):
+    """Without Snakemake, which is too slow for each of them; what it writes itself is among them."""
+    monkeypatch.chdir(finished.folder)
+    folders = ["data", "results", "reports"]
+    names = [path for folder in (*folders, ".snakemake") for path in Path(folder).rglob("*") if path.name != "README.md"]
+    (tmp_path / "victim").touch()
+    for path in names:
+        path.rename(tmp_path / "kept")
+        path.symlink_to(tmp_path / "victim")
+        with refused(path, "", "found a link"):
+            begin(Path(".snakemake"), folders)
+        path.unlink()
+        (tmp_path / "kept").rename(path)
+    begin(Path(".snakemake"), folders).close()
+    print(f"{len(names)} names, each refused")
+    assert len(names) > 300

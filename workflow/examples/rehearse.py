@@ -22,7 +22,7 @@ from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
 from elastocal.exchange.target_path import read_target_path
-from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.atomic_writes import atomic_write, check_places
 from elastocal.plant.campaigns import usual_force_N
 
 ROBOTS = Path("config/robots")
@@ -30,6 +30,7 @@ ROBOTS = Path("config/robots")
 
 def measure(given, robot, document):
     path = given.folder / CSV
+    check_places(path)
     filled = filled_sheet(pd.read_csv(path), document, robot, given.seed, path.as_posix())
     with atomic_write(path) as partial:
         filled.to_csv(partial, index=False)
@@ -37,6 +38,7 @@ def measure(given, robot, document):
 
 
 def path(given, robot, document):
+    check_places(given.path)
     declared = read_robot(read_descriptions(given.folder, ROBOTS)[1])
     at, turned, angles = bow(declared, 0.2 * robot.arm.reach_m, 50, np.random.default_rng(given.seed))
     force = np.tile([0.0, 0.0, usual_force_N(robot.arm) / 2, 0.0, 0.0, 0.0], (len(at), 1))

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import IO
 
 from elastocal.errors import InputError
-from elastocal.io.atomic_writes import check_folder
+from elastocal.io.atomic_writes import check_folder, remove_partials
 
 # Of each run under way, and of each job (workflow/scripts/job.py); the system gives them back whatever ends the process.
 RUNS, JOBS = "runs.lock", "jobs.lock"
 
 
 def begin(snakemake_folder: Path, written: list[str]) -> IO[str]:
-    """Take away the locks of a run that was killed, once its jobs have ended.
+    """Take away the locks of a run that was killed and what it was writing, once its jobs have ended.
 
     Parameters
     ----------
@@ -49,6 +49,8 @@ def begin(snakemake_folder: Path, written: list[str]) -> IO[str]:
             if not _alone(jobs):
                 print("an earlier run was killed: waiting for the jobs that it left behind", flush=True)
             fcntl.flock(jobs, fcntl.LOCK_EX)
+        for folder in written:
+            remove_partials(folder)
         # Snakemake's locks hold names of files and not whose they are.
         for lock in (snakemake_folder / "locks").glob("*.lock"):
             with suppress(FileNotFoundError):

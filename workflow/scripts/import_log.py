@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, fault_of_machine
 from elastocal.io.atomic_writes import write_text
 
 
@@ -21,6 +21,8 @@ def _log_and_say(kind: type[BaseException], error: BaseException, trace: Traceba
     job = getattr(sys.modules["__main__"], "snakemake", None)
     if job is not None:
         write_log(job.log[0], "".join(traceback.format_exception(kind, error, trace)))
+    if job is not None and isinstance(error, MemoryError | ImportError) and (fault := fault_of_machine(error)).source == "memory":
+        write_log(job.log[0], f"{fault}\n")
     sys.__excepthook__(kind, error, trace)
 
 

@@ -92,7 +92,9 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
     folder = config.get("campaign")
     if not folder:
         return {}
-    campaign_files(folder, robots_folder)
+    for path in campaign_files(folder, robots_folder):
+        if set(path) & set("{}"):
+            raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
     document, _ = read_descriptions(folder, robots_folder)
     name, source = document["campaign"], f"{folder}/{DOCUMENT}"
     if _PERIODIC.search(name):

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_JOBS
+from elastocal.errors import InputError, steering
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -29,6 +30,9 @@ def diagnose(
     cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
 ) -> None:
     """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
+    # Braces are wildcards to it, the others mapping and comment of YAML.
+    if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in str(folder.resolve())), steering(str(folder.resolve()))):
+        raise InputError(folder, "", repr(mark), "a path without it, which Snakemake does not take for a path")
     place, snakefile = workplace(), pipeline() / "Snakefile"
     words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={folder.resolve()}"]
     # What is installed beside the package runs in the working directory.

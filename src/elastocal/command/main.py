@@ -41,5 +41,5 @@ def main() -> None:
         app()
     except InputError as error:
         sys.exit(str(error))
-    except (OSError, MemoryError) as error:
+    except (OSError, MemoryError, ImportError) as error:
         sys.exit(str(fault_of_machine(error)))

@@ -66,6 +66,7 @@ def plan(
     from elastocal.figures.style import save
     from elastocal.io.atomic_writes import check_places, write_together
     from elastocal.io.data_frames import write_csv
+    from elastocal.io.texts import kind_of
 
     console = Console(stderr=True)
     arm = read_robot(robot)
@@ -75,7 +76,7 @@ def plan(
     if output is None and folder is None:
         raise InputError("plan", "", "neither --output nor --folder", "where the plan shall go")
     if folder is not None and os.path.lexists(folder):
-        raise InputError(folder, "", "a name that is taken", "a new one")
+        raise InputError(folder, "", f"{kind_of(os.lstat(folder).st_mode)} that is there", "a new one")
     names = [(output or Path("plan.csv")).with_suffix(suffix).name for suffix in (".csv", ".pdf", ".png")]
     if output is not None:
         if output.name != names[0]:

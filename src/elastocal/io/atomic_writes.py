@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -15,6 +16,8 @@ from elastocal.io.texts import kind_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
+
+_PARTIAL = re.compile(r"\.[0-9a-f]{16}\.partial$")
 
 
 def check_places(*paths: str | Path, top: Path | None = None) -> None:
@@ -38,11 +41,20 @@ def check_places(*paths: str | Path, top: Path | None = None) -> None:
 
 def check_folder(folder: str | Path) -> None:
     """Refuse a folder that holds links, pipes or devices, however deep: what is written there would go elsewhere."""
-    for entry in os.scandir(folder):
-        if entry.is_dir(follow_symlinks=False):
-            check_folder(entry.path)
-        elif not entry.is_file(follow_symlinks=False):
-            check_places(entry.path)
+    # Another run may take away what it has just listed.
+    with suppress(FileNotFoundError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                check_folder(entry.path)
+            elif not entry.is_file(follow_symlinks=False):
+                check_places(entry.path)
+
+
+def remove_partials(folder: str | Path) -> None:
+    """Take away what was being written below a folder by runs that were killed; none may be at work."""
+    for path in Path(folder).rglob("*.partial"):
+        if _PARTIAL.search(path.name):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
 
 
 @contextmanager

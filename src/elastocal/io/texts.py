@@ -21,9 +21,9 @@ _FORMULA = tuple("=+-@＝＋－＠")
 
 
 def kind_of(mode: int) -> str:
-    """What has a name that is no file, by the mode of its status."""
-    kinds = {stat.S_IFLNK: "a link", stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
-    return kinds.get(stat.S_IFMT(mode), "a device")
+    """What has a name, by the mode of its status."""
+    kinds = {stat.S_IFREG: "file", stat.S_IFLNK: "link", stat.S_IFDIR: "folder", stat.S_IFIFO: "pipe", stat.S_IFSOCK: "socket"}
+    return f"a {kinds.get(stat.S_IFMT(mode), 'device')}"
 
 
 def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:

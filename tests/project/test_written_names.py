@@ -1,0 +1,200 @@
+"""A foreign folder overwrites nothing: at every name that a command writes, links, pipes, devices and folders are refused."""
+
+import os
+import runpy
+import shutil
+import socket
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import yaml
+from analysed_robots import ROBOTS, analysed
+from certified import certified_checkout
+from made_urdf import joint, link, written
+from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
+
+from elastocal.application.calibrated import nominal_forward
+from elastocal.command.main import app
+from elastocal.errors import InputError
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "workflow" / "examples"
+PLAN = ("plan", "arm.yaml", "--candidates", "60", "--poses", "18", "--held-out", "4")
+CSV = ("import", "csv", "t.csv", "--angles", "deg", "--lengths", "mm", "--target", "smr", "--folder")
+CERTIFICATE = ("certificate", "made", "--tolerance", "0.5mm")
+# What each is called with, and the folder in which it writes; all names are relative to a checkout with a diagnosed campaign.
+COMMANDS = {
+    "init": (("init", "out"), "out"),
+    "init of a robot": (("init", "out", "--robot", "arm.yaml"), "out"),
+    "import urdf": (("import", "urdf", "arm.urdf", "--base", "base", "--tip", "hand", "-o", "out/arm.yaml"), "out"),
+    "import urdf again": (
+        ("import", "urdf", "arm.urdf", "--base", "base", "--tip", "hand", "-o", "out/arm.yaml", "--force"),
+        "out",
+    ),
+    "import dh": (("import", "dh", "arm.csv", "-o", "out/arm.yaml", "--force"), "out"),
+    "import csv": ((*CSV, "out"), "out"),
+    "import csv again": ((*CSV, "out", "--force"), "out"),
+    "plan": ((*PLAN, "--output", "out/plan.csv"), "out"),
+    "plan of a campaign": ((*PLAN, "--folder", "out/cell"), "out"),
+    "correct": (("correct", "made", "path.csv", "--output", "out/targets.csv"), "out"),
+    "export": (("export", "made", "--output", "out", "--table", "64"), "out"),
+    "certificate": ((*CERTIFICATE, "--output", "out"), "out"),
+    "certificate of the campaign": (CERTIFICATE, "reports/loop/made"),
+    "simulate_measurements.py": (("simulate_measurements.py", "simulated", "simulated/robot.yaml"), "simulated"),
+    "rehearse.py measure": (("rehearse.py", "measure", "planned"), "planned"),
+    "rehearse.py path": (("rehearse.py", "path", "planned", "out/path.csv"), "out"),
+}
+KINDS = ("link", "dangling link", "link to a folder", "pipe", "socket", "device", "folder")
+# Folders that are new as a whole: their own name is what is written, and nothing below it.
+WHOLE = {"plan of a campaign": "cell"}
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory):
+    """A checkout with what the commands read: a diagnosed campaign, a planned one, one to fill, robots and tables."""
+    top = tmp_path_factory.mktemp("checkout")
+    certified_checkout(top)
+    (top / "out").mkdir()
+    shutil.copy(ROBOTS / "ur10.yaml", top / "arm.yaml")
+    (top / "arm.csv").write_text("d,a,alpha\n0.1,0.4,90\n")
+    arm = link("base"), link("arm", 2.0), link("hand"), joint("j1", "base", "arm", xyz=(0, 0, 0.5)), joint("j2", "arm", "hand")
+    written(top, *arm).rename(top / "arm.urdf")
+    (top / "t.csv").write_text("J1;X;Y;Z\n90;1000,5;2;3\n-90;1000;2;3\n")
+    robot = analysed("kuka")
+    angles = robot.joint_limits.mean(axis=1) + [0.0, 0.2, 0.1, 0.3, 0.7, 0.0] + 0.2 * np.linspace(0, 1, 8)[:, None]
+    position, rotation = nominal_forward(robot, angles)
+    pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
+    pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(top / "path.csv", index=False)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(top)
+        assert run(*PLAN, "--folder", "planned", "--base-known", "--measured", "pose", "--force", "80", "--pull") is None
+        assert run("init", "simulated", "--robot", "arm.yaml") is None
+        document = yaml.safe_load(Path("simulated/campaign.yaml").read_text()) | {"measured": "pose", "frame": "base"}
+        document["targets"]["reflector"]["offset_m"] = [0, 0, 0]
+        Path("simulated/campaign.yaml").write_text(yaml.safe_dump(document))
+    return top
+
+
+def run(*words):
+    """What stopped a command or a script: None where it ended well, or with the exit code of a decision."""
+    if not words[0].endswith(".py"):
+        result = CliRunner().invoke(app, words)
+        return None if isinstance(result.exception, SystemExit | None) and result.exit_code in (0, 1) else result.exception
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", [str(EXAMPLES / words[0]), *words[1:]])
+        try:
+            runpy.run_path(str(EXAMPLES / words[0]), run_name="__main__")
+        except SystemExit as stopped:
+            return stopped.code
+    return None
+
+
+def listed(top):
+    """Name, kind and contents of all that is there."""
+    found = {}
+    for path in sorted(top.rglob("*")):
+        status = path.lstat()
+        found[path.relative_to(top).as_posix()] = (
+            status.st_mode,
+            path.read_bytes() if path.is_file() and not path.is_symlink() else os.readlink(path) if path.is_symlink() else None,
+        )
+    return found
+
+
+def plant(path, kind, victim):
+    if path.is_file() or path.is_symlink():
+        path.unlink()
+    if kind == "link":
+        path.symlink_to(victim)
+    elif kind == "dangling link":
+        path.symlink_to(victim.with_name("none"))
+    elif kind == "link to a folder":
+        path.symlink_to(victim.parent)
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind == "socket":
+        with socket.socket(socket.AF_UNIX) as one:
+            one.bind(os.path.relpath(path))
+    elif kind == "device":
+        os.mknod(path, 0o666 | 0o020000, os.makedev(1, 7))
+    else:
+        path.mkdir()
+
+
+def names_written(command, top):
+    """The names that a command writes in a clean folder."""
+    words, place = COMMANDS[command]
+    before = listed(top)
+    assert run(*words) is None
+    after = listed(top)
+    names = [name for name in after if after[name] != before.get(name) and (top / name).is_file()]
+    assert names and all(Path(name).is_relative_to(place) for name in names)
+    return [f"{place}/{WHOLE[command]}"] if command in WHOLE else names
+
+
+COUNTED = {}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_what_stands_at_a_name_that_is_written_is_refused_and_stays(checkout, tmp_path, monkeypatch, command):
+    clean = shutil.copytree(checkout, tmp_path / "clean", symlinks=True)
+    monkeypatch.chdir(clean)
+    names = names_written(command, clean)
+    victim = tmp_path / "elsewhere" / "victim"
+    victim.parent.mkdir()
+    victim.write_text("mine")
+    kinds = [kind for kind in KINDS if kind != "device" or os.geteuid() == 0]
+    for number, name in enumerate(names):
+        for kind in kinds:
+            top = shutil.copytree(checkout, tmp_path / f"{number} {kind}", symlinks=True)
+            monkeypatch.chdir(top)
+            plant(top / name, kind, victim)
+            before = listed(top)
+            stopped = run(*COMMANDS[command][0])
+            assert isinstance(stopped, InputError | str), (name, kind, stopped)
+            message = str(stopped)
+            assert len(message.splitlines()) == 1 and Path(name).name in message, (name, kind, message)
+            assert listed(top) == before, (name, kind)
+            assert os.listdir(victim.parent) == ["victim"] and victim.read_text() == "mine", (name, kind)
+            monkeypatch.chdir(checkout)
+            shutil.rmtree(top)
+    COUNTED[command] = len(names) * len(kinds)
+    print(f"{command}: {len(names)} names, {COUNTED[command]} refused")
+
+
+def test_names_that_were_once_foreseeable_are_not_written_through(checkout, tmp_path, monkeypatch):
+    victim = tmp_path / "victim"
+    victim.write_text("mine")
+    for number, (command, (words, _)) in enumerate(COMMANDS.items()):
+        clean, planted = (
+            shutil.copytree(checkout, tmp_path / f"{number} {each}", symlinks=True) for each in ("clean", "planted")
+        )
+        monkeypatch.chdir(clean)
+        names = names_written(command, clean)
+        for name in names:
+            (planted / f"{name}.partial").symlink_to(victim)
+        monkeypatch.chdir(planted)
+        assert run(*words) is None and victim.read_text() == "mine", command
+        assert all((planted / f"{name}.partial").is_symlink() and (planted / name).exists() for name in names), command
+
+
+def test_a_device_as_output_survives(checkout, monkeypatch):
+    monkeypatch.chdir(checkout)
+    before = os.stat("/dev/full")
+    stopped = run("correct", "made", "path.csv", "--output", "/dev/full")
+    assert str(stopped).startswith("/dev/full: found a device; allowed: a place for a file")
+    assert (os.stat("/dev/full").st_mode, os.stat("/dev/full").st_rdev) == (before.st_mode, before.st_rdev)
+
+
+def test_a_folder_of_reports_that_is_a_link_is_refused(checkout, tmp_path, monkeypatch):
+    top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
+    monkeypatch.chdir(top)
+    (top / "reports/loop/made").rename(tmp_path / "elsewhere")
+    (top / "reports/loop/made").symlink_to(tmp_path / "elsewhere")
+    before = listed(tmp_path / "elsewhere")
+    stopped = run(*CERTIFICATE)
+    assert isinstance(stopped, InputError) and "reports/loop/made: found a link; allowed: a folder" in str(stopped)
+    assert listed(tmp_path / "elsewhere") == before
