@@ -1,10 +1,11 @@
 """The error of bad input: one line, with the place, what stands there and what may."""
 
+import errno
 from pathlib import Path
 
 import pytest
 
-from elastocal.errors import LONGEST_MESSAGE, InputError
+from elastocal.errors import LONGEST_MESSAGE, InputError, escaped, fault_of_machine, steering
 
 
 def test_the_message_is_place_then_what_was_found_then_what_is_allowed():
@@ -44,3 +45,32 @@ def test_the_message_stays_short_whatever_stands_in_it(part):
 def test_what_would_steer_a_terminal_is_escaped():
     message = str(InputError("a\x1b.yaml", "\ud800", "\x1b[2Jµ", "\x07"))
     assert message == r"a\x1b.yaml: \ud800: found \x1b[2J\xb5".replace(r"\xb5", "µ") + r"; allowed: \x07"
+
+
+@pytest.mark.parametrize(
+    ("text", "character"), [("a\x1bb", "\x1b"), ("a\u202eb", "\u202e"), ("a\nb", "\n"), ("KR\u00a0270 é", "")]
+)
+def test_the_first_character_that_would_steer_is_found(text, character):
+    assert steering(text) == character
+    assert escaped(text) == (text.replace(character, ascii(character)[1:-1]) if character else text)
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device", "a"),
+            "a: found No space left on device; allowed: a place with space",
+        ),
+        (FileExistsError(errno.EEXIST, "File exists", "a"), "a: found File exists; allowed: a name that nothing else has"),
+        (NotADirectoryError(errno.ENOTDIR, "Not a directory", "a"), "allowed: a folder where the path has something else"),
+        (OSError(errno.EIO, "Input/output error", "a"), "allowed: a disk that can be read and written"),
+        (OSError("no name"), "here: found no name"),
+        (MemoryError(), "memory: found none left; allowed: a smaller file, more memory"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "memory: found none left"),
+        (ImportError("x.so: failed to map segment from shared object"), "memory: found none left"),
+        (ImportError("No module named 'x'"), "Python: found No module named 'x'; allowed: an environment"),
+    ],
+)
+def test_a_fault_of_the_machine_is_one_line_with_what_would_help(error, words):
+    assert words in str(fault_of_machine(error, "here"))

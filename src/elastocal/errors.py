@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 # A terminal shows a message as a whole: files may hold values of any length.
 LONGEST_MESSAGE = 500
+# Tables hold names, and spreadsheets open tables; those of some countries take the wide signs too.
+_FORMULA = tuple("=+-@＝＋－＠")
 _LONGEST_SOURCE, _LONGEST_KEY, _LONGEST_FOUND = 160, 100, 120
 
 
@@ -52,6 +54,15 @@ def escaped(text: str) -> str:
 def steering(text: str) -> str:
     """The first control character of a text, or mark that turns the order of letters or is not seen; empty where none is."""
     return "" if text.isprintable() else next((c for c in text if not (c.isprintable() or unicodedata.category(c) == "Zs")), "")
+
+
+def text_fault(text: str) -> tuple[str, str] | None:
+    """What is wrong with a name or text that reports, tables and terminals show, and what is allowed; None where nothing is."""
+    if character := steering(text):
+        return f"the character {character!a} in {text!r}", "printable characters on one line"
+    if text.startswith(_FORMULA):
+        return repr(text), f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula"
+    return None
 
 
 # What the loader of libraries says of it.

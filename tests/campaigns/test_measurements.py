@@ -8,6 +8,7 @@ import pytest
 from made_cells import assert_same
 from support import refused
 
+from elastocal.campaigns.measurements import CSV, read_measurements
 from elastocal.campaigns.reading import read_campaign
 
 
@@ -228,3 +229,10 @@ def test_one_file_of_measurements_must_be_there(cell):
         (cell.folder / name).unlink()
     with refused(cell.folder.as_posix(), "", "neither measurements.csv nor", "one of them"):
         read_campaign(cell.folder, cell.robots)
+
+
+@pytest.mark.parametrize("character", ["\x1b", "\x0c", "\u202e", "\x85"])
+def test_a_character_that_would_steer_a_terminal_is_refused_with_its_line(tmp_path, character):
+    (tmp_path / CSV).write_text(f"pose,target\n1,a\n2,a{character}b\n", encoding="utf-8")
+    with refused(tmp_path / CSV, "", "character"):
+        read_measurements(tmp_path, 6, "position")

@@ -1,5 +1,7 @@
 """A campaign's folder: what it means, and that every fault of it is refused in one line."""
 
+import os
+
 import numpy as np
 import pytest
 from made_cells import ARM, DOCUMENT, LOADS, POSES, REPEATS, WRENCH, assert_same
@@ -7,7 +9,7 @@ from support import refused
 
 from elastocal.campaigns.campaign import Target
 from elastocal.campaigns.holdout import split
-from elastocal.campaigns.reading import folds_of, held_out_campaign, read_campaign
+from elastocal.campaigns.reading import campaign_files, folds_of, held_out_campaign, read_campaign
 from elastocal.campaigns.writing import write_campaign
 
 
@@ -310,6 +312,23 @@ def test_no_file_outside_of_the_folder_is_read_for_a_robot_nor_shown(cell, name)
         cell.read()
     cell.document["robot"] = "../robots/planar.yaml"
     cell.read()
+
+
+@pytest.mark.parametrize("file", ["campaign.yaml", "measurements.csv", "measurements.parquet"])
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
+def test_what_is_no_file_is_called_what_it_is(cell, file, kind):
+    cell.write()
+    path = cell.folder / file
+    path.unlink(missing_ok=True)
+    if kind == "link":
+        path.symlink_to(cell.folder / "none")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+    for read in (read_campaign, campaign_files):
+        with refused(path, "", f"found a {kind} that leads to no file"):
+            read(cell.folder, cell.robots)
 
 
 @pytest.mark.parametrize("file", ["campaign.yaml", "measurements.csv"])

@@ -186,3 +186,10 @@ def test_two_campaigns_that_test_each_other_come_with_the_files_of_both(config, 
     assert user_campaign(config | {"campaign": folder}, robots, tmp_path) == {"cell7": folder}
     expected = [f"{folder}/campaign.yaml", f"{robots}/kuka.yaml", f"{folder}/../other/campaign.yaml", f"{robots}/kuka.yaml"]
     assert campaign_files(folder, robots) == expected
+
+
+def test_a_path_with_braces_is_refused_before_snakemake_takes_them_for_wildcards(config, config_folder, tmp_path):
+    (tmp_path / "a{x}b").mkdir()
+    folder = users_folder(tmp_path / "a{x}b")
+    with refused(f"{folder}/campaign.yaml", "", "braces", "without braces"):
+        user_campaign(config | {"campaign": folder}, config_folder / "robots", tmp_path)

@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from elastocal.command import diagnose
 from elastocal.command.main import app
+from elastocal.errors import InputError
 
 LINES = ["3 jobs\n", "1 of 3: read_campaign cell7\n", "2 of 3: judge_campaign cell7\n", "cell7: [bold] is missing\n"]
 
@@ -58,3 +59,9 @@ def test_on_a_terminal_jobs_move_a_bar_and_the_verdict_stays():
     assert "1 of 3" in text
     assert "3 jobs" not in text
     assert "[bold] is missing" in text
+
+
+@pytest.mark.parametrize("mark", ["{x}", ": ", " #", "\n", "\x1b", "\u202e"])
+def test_a_path_that_snakemake_takes_for_something_else_is_refused(tmp_path, mark):
+    result = CliRunner().invoke(app, ["diagnose", f"{tmp_path}/a{mark}b"])
+    assert isinstance(result.exception, InputError) and "a path without it" in str(result.exception)

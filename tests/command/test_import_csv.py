@@ -44,3 +44,11 @@ def test_measurements_that_are_there_stay_unless_forced_and_an_empty_sheet_is_fi
 def test_bad_options_leave_nothing_behind(tmp_path, option):
     assert isinstance(run(tmp_path, *OPTIONS, *option).exception, InputError)
     assert not (tmp_path / "cell").exists()
+
+
+@pytest.mark.parametrize("name", ["@SUM(A1)", "=1+1", "a\u202eb"])
+def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(tmp_path, name):
+    for words, text in ((("--target", name), TEXT), ((), f"J1;X;Y;Z;target\n90;1000,5;2;3;{name}\n")):
+        result = run(tmp_path, "--angles", "deg", "--lengths", "mm", *words, text=text)
+        assert isinstance(result.exception, InputError) and len(str(result.exception).splitlines()) == 1
+        assert not (tmp_path / "cell").exists()

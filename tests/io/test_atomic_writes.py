@@ -1,10 +1,20 @@
 """Files that appear whole or not at all."""
 
+import os
 from pathlib import Path
 
 import pytest
+from support import refused
 
-from elastocal.io.atomic_writes import atomic_write, write_text
+from elastocal.io import atomic_writes
+from elastocal.io.atomic_writes import (
+    atomic_write,
+    check_folder,
+    check_places,
+    remove_partials,
+    write_text,
+    write_together,
+)
 
 
 def test_a_file_appears_only_once_it_is_complete(tmp_path):
@@ -50,3 +60,113 @@ def test_a_block_that_writes_nothing_is_an_error_and_keeps_the_old_file(tmp_path
 def test_texts_are_written_as_utf_8(tmp_path):
     write_text(tmp_path / "one.txt", "5 µm\n")
     assert (tmp_path / "one.txt").read_bytes() == b"5 \xc2\xb5m\n" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_was_written_has_the_mode_of_any_new_file(tmp_path):
+    (tmp_path / "usual").touch()
+    write_text(tmp_path / "mine", "x")
+    assert (tmp_path / "mine").stat().st_mode == (tmp_path / "usual").stat().st_mode
+
+
+def test_names_on_the_way_are_random_and_opened_exclusively(tmp_path, monkeypatch):
+    names = set()
+    for _ in range(20):
+        with atomic_write(tmp_path / "one.txt") as partial:
+            names.add(partial)
+            Path(partial).write_text("x")
+    assert len(names) == 20
+    monkeypatch.setattr(atomic_writes.secrets, "token_hex", lambda _: "foreseen")
+    (tmp_path / "victim").write_text("mine")
+    (tmp_path / "one.txt.foreseen.partial").symlink_to(tmp_path / "victim")
+    with pytest.raises(FileExistsError), atomic_write(tmp_path / "one.txt"):
+        raise AssertionError("never written")
+    with pytest.raises(FileExistsError), write_together(tmp_path, ["one.txt"]):
+        raise AssertionError("never written")
+    assert (tmp_path / "victim").read_text() == "mine"
+
+
+def stands_there(path, kind):
+    if kind == "link":
+        path.symlink_to(path.parent / "victim")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.mkdir()
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe", "folder"])
+def test_what_is_no_file_is_neither_replaced_nor_written_through(tmp_path, kind):
+    (tmp_path / "victim").write_text("mine")
+    stands_there(tmp_path / "one.txt", kind)
+    with refused(tmp_path / "one.txt", "", f"found a {kind}; allowed: a place for a file"):
+        write_text(tmp_path / "one.txt", "x")
+    with refused(tmp_path / "one.txt", "", f"found a {kind}"), write_together(tmp_path, ["two.txt", "one.txt"]):
+        raise AssertionError("never written")
+    assert (tmp_path / "victim").read_text() == "mine" and len(list(tmp_path.iterdir())) == 2
+
+
+@pytest.mark.parametrize("kind", ["link", "pipe"])
+def test_a_folder_that_holds_something_else_than_files_is_refused_however_deep(tmp_path, kind):
+    (tmp_path / "a" / "b").mkdir(parents=True)
+    (tmp_path / "a" / "file").touch()
+    check_folder(tmp_path)
+    stands_there(tmp_path / "a" / "b" / "c", kind)
+    with refused(tmp_path / "a/b/c", "", f"found a {kind}"):
+        check_folder(tmp_path)
+
+
+def test_a_folder_below_the_one_that_the_user_named_is_no_link(tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "top").mkdir()
+    (tmp_path / "top" / "figures").symlink_to(tmp_path / "elsewhere")
+    check_places(tmp_path / "top/figures/a.pdf")
+    check_places(tmp_path / "top/figures/a.pdf", top=tmp_path / "top/figures")
+    with refused(tmp_path / "top/figures", "", "found a link; allowed: a folder"):
+        check_places(tmp_path / "top/figures/a.pdf", top=tmp_path / "top")
+
+
+def test_files_that_belong_together_appear_together_in_a_new_folder(tmp_path):
+    with write_together(tmp_path / "deep/new", ["a", "b"]) as partial:
+        for name in "ab":
+            write_text(partial / name, name)
+        assert not (tmp_path / "deep/new").exists()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["a", "b", "deep", "new"]
+
+
+def test_old_files_are_gone_before_the_first_new_one_is_there(tmp_path, monkeypatch):
+    """Whenever it is killed: at each rename no file of before stands beside a new one, and the user's own stay."""
+    for name in ("a", "b", "c", "mine"):
+        (tmp_path / name).write_text("old")
+    rename, seen = Path.rename, []
+
+    def watched(path, target):
+        rename(path, target)
+        seen.append({each.name: each.read_text() for each in tmp_path.iterdir() if each.is_file()})
+
+    monkeypatch.setattr(Path, "rename", watched)
+    with write_together(tmp_path, ["a", "b", "c"]) as partial:
+        for name in "ab":
+            (partial / name).write_text("new")
+        assert (tmp_path / "a").read_text() == "old"
+    assert seen == [{"a": "new", "mine": "old"}, {"a": "new", "b": "new", "mine": "old"}]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "b", "mine"]
+
+
+def test_a_block_that_fails_leaves_the_old_files(tmp_path):
+    (tmp_path / "a").write_text("old")
+    for folder in (tmp_path, tmp_path / "new"):
+        with pytest.raises(ValueError, match="mine"), write_together(folder, ["a"]) as partial:
+            (partial / "a").write_text("new")
+            raise ValueError("mine")
+    assert (tmp_path / "a").read_text() == "old" and len(list(tmp_path.iterdir())) == 1
+
+
+def test_what_killed_runs_left_is_taken_away_and_nothing_else(tmp_path):
+    left = tmp_path / "a" / f"one.parquet.{'0f' * 8}.partial"
+    left.parent.mkdir()
+    left.touch()
+    (tmp_path / f"new.{'0f' * 8}.partial").mkdir()
+    (tmp_path / f"new.{'0f' * 8}.partial" / "file").touch()
+    (tmp_path / "mine.partial").touch()
+    remove_partials(tmp_path)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["a", "mine.partial"]

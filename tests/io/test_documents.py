@@ -1,5 +1,6 @@
 """YAML documents: read, and refused in one line that names file, key and what is allowed."""
 
+import math
 import os
 
 import pytest
@@ -57,6 +58,13 @@ def test_bad_yaml_is_refused_in_one_line_that_names_the_line(tmp_path, text, lin
         read_document(path)
 
 
+CAMPAIGN = {
+    "campaign": "cell7",
+    "robot": "kuka",
+    "measured": "pose",
+    "frame": "base",
+    "targets": {"E": {"point": "6DoF", "offset_m": "unknown"}},
+}
 MASS = {"link": 1, "mass_kg": 10, "centre_m": [0, 0, 0.1], "relative_std": 0.1}
 
 
@@ -288,6 +296,68 @@ def test_a_pipe_is_no_document(tmp_path):
         read_document(tmp_path / "a.yaml")
 
 
+STEERING = ["a\x1b[2Jb", "a\u202eb", "a\u2067b", "a\u200bb", "a\nb", "a\tb", "a\x85b", "a\ufeffb"]
+FORMULAS = ["=1+1", "@SUM(A1)", "+x", "-x", "＝1"]
+
+
+@pytest.mark.parametrize("text", [*STEERING, *FORMULAS])
+def test_what_would_steer_a_terminal_or_a_spreadsheet_is_refused_wherever_it_stands(tmp_path, text):
+    """In a key as in a value; in the robot file as in the campaign; the message shows it as escapes."""
+    allowed = "printable characters on one line" if text in STEERING else f"does not begin with {text[0]}"
+    target = {"point": "6DoF", "offset_m": "unknown"}
+    for document, schema, key in (
+        (CAMPAIGN | {"targets": {text: target}}, "campaign", "targets"),
+        (CAMPAIGN | {"targets": {"E": target | {"point": text}}}, "campaign", "targets.E.point"),
+        (CAMPAIGN | {"declared": [text]}, "campaign", "declared[0]"),
+        (CAMPAIGN | {"robot": text}, "campaign", "robot"),
+        (ROBOT | {"name": text}, "robot", "name"),
+        (ROBOT | {"joint_names": [text]}, "robot", "joint_names[0]"),
+        (ROBOT | {"lengths_m": {text: 1.0}}, "robot", "lengths_m"),
+        ({"columns": {"x": "X"}, "target": text}, "measurement_import", "target"),
+    ):
+        with refused("a.yaml", key, allowed):
+            check_document(document, schema, "a.yaml")
+    (tmp_path / "a.yaml").write_text(yaml.safe_dump(ROBOT | {"name": text}, sort_keys=False), encoding="utf-8")
+    with refused(tmp_path / "a.yaml", "line 1, name", allowed):
+        check_document(read_document(tmp_path / "a.yaml"), "robot", (tmp_path / "a.yaml").as_posix())
+
+
+def test_blanks_that_do_not_break_and_other_alphabets_are_read():
+    check_document(ROBOT | {"name": "KR\u00a0270 Müller 机器人 רובוט", "chain": "Rz(q1)\n  Tx(l)\t[E]\n"}, "robot", "a.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "where", "found", "allowed"),
+    [
+        ("a: [1, 2\n", "line 2", "found the end of the text", "YAML with ',' or ']' here"),
+        ("- a\nb: 1\n", "line 2", "found 'b: 1'", "YAML with '-' indicator here"),
+        ("%x\na: 1\n", "line 1", "the end of the line", "YAML"),
+        ("a: b: c\n", "line 1", "mapping values are not allowed in this context: ': c'", "YAML"),
+    ],
+)
+def test_what_the_parser_of_yaml_found_is_what_stands_there(tmp_path, text, where, found, allowed):
+    with refused(tmp_path / "a.yaml", where, found, f"; allowed: {allowed}"):
+        _read(tmp_path, text)
+
+
+@pytest.mark.parametrize(
+    ("schema", "document", "key", "allowed"),
+    [
+        ("robot", ROBOT | {"payload_kg": 1e308}, "payload_kg", "1e-06 to 100000 (rated payload"),
+        ("robot", ROBOT | {"payload_kg": math.inf}, "payload_kg", "a finite number (rated payload"),
+        ("robot", ROBOT | {"gravity_m_s2": [0, 0]}, "gravity_m_s2", "3 entries"),
+        ("robot", {"chain": "x"}, "name", "string (maker and model"),
+        ("campaign", CAMPAIGN | {"holdout": {"fraction": 1}}, "holdout.fraction", "more than 0 and less than 1"),
+        ("config", {"robots": []}, "", "integer and 0 or more (all random streams start from it)"),
+    ],
+)
+def test_what_is_said_to_be_allowed_is(schema, document, key, allowed):
+    if schema == "config":
+        document = {name: value for name, value in read_document("config.yaml").items() if name != "seed"}
+    with refused("a.yaml", key, f"; allowed: {allowed}"):
+        check_document(document, schema, "a.yaml")
+
+
 @pytest.mark.parametrize(
     ("holdout", "words"),
     [
@@ -345,15 +415,6 @@ def test_a_value_that_the_file_does_not_have_has_no_line(tmp_path):
     path.write_text("name: x\n", encoding="utf-8")
     with refused(path, "yaml: stages[0]: found 3"):
         check_document({"name": "x", "stages": [3]}, "strategy", path.as_posix())
-
-
-CAMPAIGN = {
-    "campaign": "cell7",
-    "robot": "kuka",
-    "measured": "pose",
-    "frame": "base",
-    "targets": {"E": {"point": "6DoF", "offset_m": "unknown"}},
-}
 
 
 @pytest.mark.parametrize(

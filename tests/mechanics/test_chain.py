@@ -142,3 +142,9 @@ def test_stretches_are_the_rigid_parts_between_the_joints(kuka):
         (8, (1.2, 0.0, -0.041)),
         (12, (0.24, 0.0, 0.0)),
     )
+
+
+@pytest.mark.parametrize("name", ["@SUM(A1)", "=1", "-x", "a\u202eb", "a\x1b[b"])
+def test_a_point_whose_name_a_table_or_a_terminal_takes_for_something_else_is_refused(name):
+    with refused("a.yaml", "chain"):
+        parse_chain(f"Rz(q1) Tx(1.0) [{name}]", {}, "a.yaml")

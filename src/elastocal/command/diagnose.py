@@ -30,11 +30,12 @@ def diagnose(
     cores: Annotated[int, typer.Option("--cores", "-j", min=1, max=MOST_JOBS, help="Jobs at a time.")] = 2,
 ) -> None:
     """Find what the model of a robot lacks, and report the error before and after on held-out poses."""
-    # Braces are wildcards to it, the others mapping and comment of YAML.
-    if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in str(folder.resolve())), steering(str(folder.resolve()))):
+    campaign = str(folder.resolve())
+    # Braces are wildcards to Snakemake, the others mapping and comment of YAML.
+    if mark := next((mark for mark in ("{", "}", ": ", " #") if mark in campaign), steering(campaign)):
         raise InputError(folder, "", repr(mark), "a path without it, which Snakemake does not take for a path")
     place, snakefile = workplace(), pipeline() / "Snakefile"
-    words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={folder.resolve()}"]
+    words = ["-m", "snakemake", f"-j{cores}", "diagnose", "--config", f"campaign={campaign}"]
     # What is installed beside the package runs in the working directory.
     words += [] if snakefile.parent == place else ["--snakefile", str(snakefile)]
     with subprocess.Popen(

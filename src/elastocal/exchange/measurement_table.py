@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.campaigns.measurements import closest_first, file_columns, shown
-from elastocal.errors import InputError
+from elastocal.errors import InputError, text_fault
 from elastocal.exchange.column_names import (
     COVARIATES,
     LENGTH,
@@ -41,7 +41,7 @@ from elastocal.exchange.rotations import (
     is_rotation,
     rotation_vectors,
 )
-from elastocal.io.texts import A_NUMBER, plain_number, text_fault
+from elastocal.io.texts import A_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH_NAMES
 
 if TYPE_CHECKING:

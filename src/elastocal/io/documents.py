@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, ClassVar
 import jsonschema
 import yaml
 
-from elastocal.errors import InputError
-from elastocal.io.texts import read_text, text_fault
+from elastocal.errors import InputError, text_fault
+from elastocal.io.texts import read_text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -8,7 +8,7 @@ import re
 import stat
 from pathlib import Path
 
-from elastocal.errors import InputError, steering
+from elastocal.errors import InputError
 
 # Python also takes 1_0 for 10, other scripts' digits, and words for what is no number.
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -16,8 +16,6 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 LARGEST_NUMBER = 1e12
 A_NUMBER = f"a number such as -0.25 or 2.5e-3, up to {LARGEST_NUMBER:g} in size"
 _LONGEST_NUMBER = 100
-# Tables hold names, and spreadsheets open tables; those of some countries take the wide signs too.
-_FORMULA = tuple("=+-@＝＋－＠")
 
 
 def kind_of(mode: int) -> str:
@@ -129,12 +127,3 @@ def plain_number(text: str, largest: float = LARGEST_NUMBER) -> float | None:
     """
     value = float(text) if len(text) <= _LONGEST_NUMBER and _NUMBER.fullmatch(text) else math.inf
     return value if abs(value) <= largest else None
-
-
-def text_fault(text: str) -> tuple[str, str] | None:
-    """What is wrong with a name or text that reports, tables and terminals show, and what is allowed; None where nothing is."""
-    if character := steering(text):
-        return f"the character {character!a} in {text!r}", "printable characters on one line"
-    if text.startswith(_FORMULA):
-        return repr(text), f"a text that does not begin with {text[0]}, which a spreadsheet takes for a formula"
-    return None

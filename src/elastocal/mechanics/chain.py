@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.errors import InputError
+from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -186,6 +186,8 @@ def parse_chain(text: str, lengths_m: Mapping[str, float], source: str) -> Chain
         if token["point"]:
             if token["point"] in {p.name for p in points}:
                 raise InputError(source, "chain", f"[{token['point']}] twice", "each measuring point once")
+            if fault := text_fault(token["point"]):
+                raise InputError(source, "chain", *fault)
             points.append(MeasuringPoint(token["point"], len(transforms)))
             continue
         kind, axis, argument = token["kind"], AXES.index(token["axis"]), token["argument"]
