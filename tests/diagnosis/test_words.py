@@ -126,7 +126,8 @@ def test_hypotheses_that_hold_the_first_are_told_by_what_they_add():
 
 def test_keys_in_a_sentence_become_words_and_common_words_stay():
     said = in_words("link_weight@2: mass is 4 kg, beyond the rated payload of 3 kg; the step 'with joint_offset' raised it")
-    assert said == "gravity sag of joint 2: mass is 4 kg, beyond the rated payload of 3 kg; the step 'with zero offset' raised it"
+    assert said.startswith("gravity sag of joint 2: mass is 4 kg, beyond the rated payload of 3 kg;")
+    assert said.endswith("; the step 'with zero offset' raised it")
     assert in_words("payload: mass is -3 kg") == "weight of an undeclared payload: mass is -3 kg"
     said = in_words("transmission_ratio@3: per_q3 is -0.0042 rad/rad, more than 3 times what such an effect reaches")
     assert said.startswith("gear ratio or coupling error of joint 3: per movement of joint 3 is -0.0042 rad/rad, more than")

@@ -20,6 +20,8 @@ from typer.testing import CliRunner
 from elastocal.application.calibrated import nominal_forward
 from elastocal.command.main import app
 from elastocal.errors import InputError
+from elastocal.figures import style
+from elastocal.report import certificate_pages
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "workflow" / "examples"
 PLAN = ("plan", "arm.yaml", "--candidates", "60", "--poses", "18", "--held-out", "4")
@@ -179,6 +181,28 @@ def test_names_that_were_once_foreseeable_are_not_written_through(checkout, tmp_
         monkeypatch.chdir(planted)
         assert run(*words) is None and victim.read_text() == "mine", command
         assert all((planted / f"{name}.partial").is_symlink() and (planted / name).exists() for name in names), command
+
+
+@pytest.mark.parametrize("command", ["plan", "plan of a campaign", "export", "certificate"])
+def test_a_command_that_is_killed_leaves_the_old_files_or_none(checkout, tmp_path, monkeypatch, command):
+    """Killed while it draws: what it wrote has no final name; the next run replaces all of the old ones."""
+    top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
+    monkeypatch.chdir(top)
+    words = COMMANDS[command][0]
+    names = [] if command in WHOLE else names_written(command, top)
+    for name in names:
+        (top / name).write_text("old")
+    child = os.fork()
+    if not child:
+        monkeypatch.setattr(style, "save", lambda *_: os._exit(9))
+        monkeypatch.setattr(certificate_pages, "write_certificate", lambda *_: os._exit(9))
+        run(*words)
+        os._exit(0)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 9
+    assert all((top / name).read_text() == "old" for name in names)
+    assert not (top / "out/cell").exists()
+    assert run(*words) is None
+    assert all((top / name).read_bytes() != b"old" for name in names)
 
 
 def test_a_device_as_output_survives(checkout, monkeypatch):
