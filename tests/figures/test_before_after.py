@@ -57,7 +57,7 @@ def test_errors_on_fitted_poses_are_diamonds_in_the_row_of_their_model():
 
 def test_models_stand_from_top_to_bottom_in_the_order_of_the_table():
     axis = before_after(step_rows()).axes[0]
-    assert row_labels(axis) == ["frames and targets", "declared model", "with lost motion (backlash)"]
+    assert row_labels(axis) == ["frames and targets", "declared model", "with lost motion\n(backlash)"]
     assert axis.get_yticks().tolist() == sorted(axis.get_yticks()) and axis.get_ylim()[0] > axis.get_ylim()[1]
 
 

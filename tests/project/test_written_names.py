@@ -3,6 +3,7 @@
 import os
 import runpy
 import shutil
+import signal
 import socket
 import sys
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 import yaml
 from analysed_robots import ROBOTS, analysed
 from certified import certified_checkout
+from durations import HUNG_S
 from made_urdf import joint, link, written
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
@@ -181,6 +183,43 @@ def test_names_that_were_once_foreseeable_are_not_written_through(checkout, tmp_
         monkeypatch.chdir(planted)
         assert run(*words) is None and victim.read_text() == "mine", command
         assert all((planted / f"{name}.partial").is_symlink() and (planted / name).exists() for name in names), command
+
+
+# What is read: a pattern may match some files that the command leaves alone.
+READ = {
+    "import urdf": ["arm.urdf"],
+    "import dh": ["arm.csv"],
+    "import csv": ["t.csv"],
+    "init of a robot": ["arm.yaml"],
+    "plan": ["arm.yaml"],
+    "correct": ["path.csv", "made/campaign.yaml", "made/measurements.*", "results/loop/made/*"],
+    "certificate": ["reports/loop/made/verdict.json", "reports/loop/made/*"],
+    "rehearse.py measure": ["planned/*.yaml", "planned/measurements.csv"],
+}
+
+
+@pytest.mark.parametrize("command", READ)
+def test_a_pipe_where_a_file_is_read_is_refused_and_never_waited_for(checkout, tmp_path, monkeypatch, command):
+    def too_long(*_):
+        raise TimeoutError
+
+    top = shutil.copytree(checkout, tmp_path / "top", symlinks=True)
+    monkeypatch.chdir(top)
+    before, refused = signal.signal(signal.SIGALRM, too_long), 0
+    try:
+        for path in [path for pattern in READ[command] for path in sorted(top.glob(pattern)) if path.is_file()]:
+            path.rename(tmp_path / "kept")
+            os.mkfifo(path)
+            signal.alarm(HUNG_S)
+            stopped = run(*COMMANDS[command][0])
+            signal.alarm(0)
+            assert isinstance(stopped, InputError | str) or (stopped is None and "*" in "".join(READ[command])), (path, stopped)
+            refused += isinstance(stopped, InputError | str)
+            path.unlink()
+            (tmp_path / "kept").rename(path)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert refused >= len(READ[command])
 
 
 @pytest.mark.parametrize("command", ["plan", "plan of a campaign", "export", "certificate"])

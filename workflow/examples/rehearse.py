@@ -9,6 +9,7 @@ from the robot file of the campaign, --seed and --effect, and is the same in bot
 """
 
 import argparse
+import io
 import sys
 from pathlib import Path
 
@@ -21,8 +22,10 @@ from elastocal.blind.rehearsal import filled_sheet, hidden_robot, reached
 from elastocal.campaigns.measurements import CSV
 from elastocal.campaigns.reading import read_descriptions, read_robot
 from elastocal.errors import InputError
+from elastocal.exchange.csv_dialect import LARGEST_BYTES
 from elastocal.exchange.target_path import read_target_path
 from elastocal.io.atomic_writes import atomic_write, check_places
+from elastocal.io.texts import read_text
 from elastocal.plant.campaigns import usual_force_N
 
 ROBOTS = Path("config/robots")
@@ -31,7 +34,9 @@ ROBOTS = Path("config/robots")
 def measure(given, robot, document):
     path = given.folder / CSV
     check_places(path)
-    filled = filled_sheet(pd.read_csv(path), document, robot, given.seed, path.as_posix())
+    filled = filled_sheet(
+        pd.read_csv(io.StringIO(read_text(path, LARGEST_BYTES))), document, robot, given.seed, path.as_posix()
+    )
     with atomic_write(path) as partial:
         filled.to_csv(partial, index=False)
     print(f"{len(filled)} measurements in {path}")
@@ -51,7 +56,7 @@ def path(given, robot, document):
 
 def move(given, robot, document):
     wanted = read_target_path(given.path, robot.arm.joints)
-    targets = pd.read_csv(given.targets)
+    targets = pd.read_csv(io.StringIO(read_text(given.targets, LARGEST_BYTES)))
     wrench = np.zeros((len(wanted), 6)) if wanted.wrench is None else wanted.wrench
     rms = []
     for name, ending in (("uncorrected", "_uncorrected"), ("corrected", "")):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import write_text
+from elastocal.io.texts import check_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -74,6 +75,7 @@ def checksum(path: str | Path) -> str:
     -------
     str
     """
+    check_file(path)
     with open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

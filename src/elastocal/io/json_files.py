@@ -6,6 +6,7 @@ import json
 from typing import TYPE_CHECKING
 
 from elastocal.io.atomic_writes import write_text
+from elastocal.io.texts import check_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -23,6 +24,7 @@ def read_json(path: str | Path) -> Any:
     -------
     object
     """
+    check_file(path)
     with open(path, encoding="utf-8") as file:
         return json.load(file)
 

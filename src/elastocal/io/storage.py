@@ -18,6 +18,7 @@ import pyarrow.parquet as pq
 
 from elastocal.errors import InputError
 from elastocal.io.atomic_writes import atomic_write
+from elastocal.io.texts import check_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -198,6 +199,7 @@ def read_provenance(path: str | Path) -> dict[str, Any]:
 
 def _parquet_file(path: str | Path) -> pq.ParquetFile:
     try:
+        check_file(path)
         return pq.ParquetFile(path)
     except (OSError, pa.ArrowException) as error:
         raise InputError(path, "", f"no readable Parquet file ({error})", _AS_WRITTEN) from None

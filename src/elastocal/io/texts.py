@@ -24,6 +24,14 @@ def kind_of(mode: int) -> str:
     return f"a {kinds.get(stat.S_IFMT(mode), 'device')}"
 
 
+def check_file(path: str | Path, kind: str = "a readable file") -> int:
+    """Size of a file in bytes; a pipe or a device is refused before it is opened, as it might never end."""
+    status = os.stat(path)
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(path, "", kind_of(status.st_mode), kind)
+    return status.st_size
+
+
 def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") -> bytes:
     """Contents of a file.
 
@@ -45,10 +53,7 @@ def read_bytes(path: str | Path, largest: int, kind: str = "a readable file") ->
         No file, none that may be read, a larger one, or a pipe or device, which might never end.
     """
     try:
-        status = os.stat(path)
-        if not stat.S_ISREG(status.st_mode):
-            raise InputError(path, "", kind_of(status.st_mode), kind)
-        if status.st_size <= largest:
+        if check_file(path, kind) <= largest:
             with open(path, "rb") as file:
                 content = file.read(largest + 1)
             if len(content) <= largest:
