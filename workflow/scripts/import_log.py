@@ -20,9 +20,9 @@ def _log_and_say(kind: type[BaseException], error: BaseException, trace: Traceba
     # Snakemake puts it into the script itself.
     job = getattr(sys.modules["__main__"], "snakemake", None)
     if job is not None:
-        said = "".join(traceback.format_exception(kind, error, trace))
+        text = "".join(traceback.format_exception(kind, error, trace))
         fault = fault_of_machine(error) if isinstance(error, MemoryError | ImportError) else None
-        write_log(job.log[0], f"{said}{fault}\n" if fault and fault.source == "memory" else said)
+        write_log(job.log[0], f"{text}{fault}\n" if fault and fault.source == "memory" else text)
     sys.__excepthook__(kind, error, trace)
 
 

@@ -109,5 +109,5 @@ def _denavit_hartenberg(nominal: Robot, robot: Robot, partial: Path, output: Pat
     write_csv(partial / DH, dh_table(robot, nominal), digits=12)
     write_csv(partial / DELTAS, dh_deltas(nominal, robot))
     names = [str(number) for number in range(len(frames) - 1)] + [nominal.chain.end_effector.name]
-    save(dh_frames_picture(frames, nominal.name, names), *(str(partial / name) for name in FRAMES))
+    save(dh_frames_picture(frames, nominal.name, names), str(partial / FRAMES[0]), str(partial / FRAMES[1]))
     return [f"    {output / name}" for name in (DH, DELTAS, FRAMES[1])]

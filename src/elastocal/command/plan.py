@@ -109,7 +109,7 @@ def plan(
 
     def write_plan(place: Path) -> None:
         write_csv(place / names[0], stated)
-        save(picture, *(str(place / name) for name in names[1:]))
+        save(picture, str(place / names[1]), str(place / names[2]))
 
     if folder is not None:
         with write_together(folder, (ROBOT, CSV, *names, DOCUMENT)) as partial:

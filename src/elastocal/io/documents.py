@@ -163,7 +163,7 @@ def parsed(text: str, source: str | Path) -> Any:
         line, found = getattr(mark, "line", None), (getattr(error, "problem", None) or str(error))
         if isinstance(error, yaml.reader.ReaderError):
             line, found = text.count("\n", 0, error.position), f"the control character {chr(error.character)!r}"
-        elif mark and not isinstance(error, _UnclearError):
+        elif line is not None and mark and not isinstance(error, _UnclearError):
             here = "".join(text.splitlines()[line:][:1])[mark.column :][:40].strip()
             problem, _, wanted = found.partition("did not find expected ")
             shown = repr(here) if here else "the end of the line" if text.splitlines()[line + 1 :] else "the end of the text"
@@ -255,10 +255,10 @@ def check_document(document: Any, schema: str, source: str) -> None:
             path.append(next(name for name in errors[0].instance if name not in errors[0].schema.get("properties", {})))
         line = _line_of(source, path)
         raise InputError(source, ", ".join(part for part in (line, key) if part), found, allowed)
-    for path, text in _texts(document):
+    for place, text in _texts(document):
         # White space between the transforms of a chain is free; headers of another table are nobody's names.
-        if fault := None if path[:1] == ("columns",) else text_fault(" ".join(text.split()) if path == ("chain",) else text):
-            key, line = _key_of(path), _line_of(source, path)
+        if fault := None if place[:1] == ("columns",) else text_fault(" ".join(text.split()) if place == ("chain",) else text):
+            key, line = _key_of(place), _line_of(source, place)
             raise InputError(source, ", ".join(part for part in (line, key) if part), *fault)
 
 
@@ -294,10 +294,10 @@ def _line_of(source: str, path: Sequence[str | int]) -> str:
 
 
 _BOUNDS = {
-    "minimum": "{:g} or more",
-    "exclusiveMinimum": "more than {:g}",
-    "maximum": "{:g} or less",
-    "exclusiveMaximum": "less than {:g}",
+    "minimum": "{} or more",
+    "exclusiveMinimum": "more than {}",
+    "maximum": "{} or less",
+    "exclusiveMaximum": "less than {}",
 }
 
 
@@ -345,9 +345,17 @@ def _meant(allowed: str, meaning: str) -> str:
 def _bounds(schema: Mapping[str, Any]) -> list[str]:
     """What a number may be: of two bounds on the same side the one that holds."""
     if "minimum" in schema and "maximum" in schema:
-        return [f"{schema['minimum']:g} to {schema['maximum']:g}"]
+        return [f"{_number(schema['minimum'])} to {_number(schema['maximum'])}"]
     inner = {"exclusiveMinimum": "minimum", "exclusiveMaximum": "maximum"}
-    return [words.format(schema[name]) for name, words in _BOUNDS.items() if name in schema and inner.get(name) not in schema]
+    return [
+        words.format(_number(schema[name]))
+        for name, words in _BOUNDS.items()
+        if name in schema and inner.get(name) not in schema
+    ]
+
+
+def _number(value: float) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _count(schema: Mapping[str, Any]) -> str:
