@@ -3,7 +3,6 @@
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.optimize import brentq
 
 from elastocal.campaigns.joint_space import SAME_POSE_RAD, beyond_range, blocks, configurations, repeated
@@ -114,14 +113,21 @@ def test_a_pose_repeats_another_where_no_joint_stands_elsewhere_than_one_pose_ma
     assert not repeated(fitted, np.diag(fitted[:6])[None] * np.ones((1, 6))).any()
 
 
-def test_poses_are_of_one_configuration_as_single_linkage_has_it():
-    """Pairs, a chain, and poses a little farther apart than one may be; scipy's hierarchical clustering has the last word."""
+def test_repeats_of_a_pose_are_one_configuration_in_the_order_of_the_poses():
     rng = np.random.default_rng(5)
     apart = rng.uniform(-2, 2, (12, 6))
-    chain = apart[0] + 0.9 * SAME_POSE_RAD * np.arange(1, 5)[:, None] * np.eye(6)[2]
     near = apart[5] + 1.1 * SAME_POSE_RAD * np.eye(6)[:3]
-    angles = np.concatenate([apart, chain, near, apart[8:10] + 1e-4])[rng.permutation(21)]
-    found = configurations(np.repeat(angles, 2, axis=0), np.repeat(np.arange(21), 2))
-    expected = pd.factorize(fcluster(linkage(angles, "single", "chebyshev"), SAME_POSE_RAD, "distance"))[0]
-    np.testing.assert_array_equal(found, expected)
-    assert found.max() + 1 == 15
+    angles = np.concatenate([apart, near, apart[8:11] + 0.9 * SAME_POSE_RAD])
+    order = rng.permutation(18)
+    found = configurations(np.repeat(angles[order], 2, axis=0), np.repeat(np.arange(18), 2))
+    names = np.concatenate([np.arange(15), [8, 9, 10]])[order]
+    np.testing.assert_array_equal(found, pd.factorize(names)[0])
+
+
+def test_poses_along_a_path_are_configurations_no_wider_than_twice_what_one_pose_may_be():
+    """Each is near the next, and they are not one."""
+    path = np.linspace(0.0, 1.0, 400)[:, None] * [1.0, -0.5]
+    found = configurations(path, np.arange(400))
+    assert (np.diff(found) >= 0).all()
+    assert {np.ptp(path[found == each], axis=0).max() <= 2 * SAME_POSE_RAD for each in np.unique(found)} == {True}
+    assert found.max() + 1 == pytest.approx(1.0 / SAME_POSE_RAD, rel=0.2)

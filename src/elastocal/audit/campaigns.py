@@ -9,13 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from pandas.api.types import is_numeric_dtype
-from scipy.spatial import KDTree
 
+from elastocal.audit.configurations import configurations
 from elastocal.audit.elastic import STATE, far_off, good_rows
 from elastocal.audit.equilibrium import Sagging, sagging
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.fits import SETTLED, STEP_BACK
-from elastocal.campaigns.joint_space import SAME_POSE_RAD
 
 if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
@@ -47,12 +46,10 @@ def measurements(run: Audited, file: str, campaign: str) -> list[Finding]:
     note = f"{words}s {sorted(shared)[:3]}"
     found = [held(file, f"no {words} is fitted and held out", "pandas", not shared, note, len(poses[0]))]
     if {"fraction", "blocks"} & set(_document(run, campaign).get("campaign", {}).get("holdout", {})):
-        means = [frame.groupby(_POSE).mean(numeric_only=True).filter(regex=r"^q\d+$") for frame in (fitted, held_out)]
-        near = float(KDTree(means[0]).query(means[1], p=np.inf)[0].min())
-        apart = near > SAME_POSE_RAD
-        found.append(
-            held(file, "no configuration is fitted and held out", "scipy", apart, f"{near:.4f} rad apart", len(means[1]))
-        )
+        both = pd.concat([fitted.assign(unseen=False), held_out.assign(unseen=True)]).groupby(_POSE).mean(numeric_only=True)
+        parts = both["unseen"].groupby(configurations(both.filter(regex=r"^q\d+$").to_numpy())).nunique()
+        note = f"{(parts > 1).sum()} of {len(parts)}"
+        found.append(held(file, "no configuration is fitted and held out", "numpy", bool(parts.eq(1).all()), note, len(both)))
     if run.there(source) and _document(run, campaign).get("held_out") is None:
         rows, original = pd.concat([fitted, held_out]).sort_values("row"), run.table(source)
         numbered = compared(

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 from scipy import stats
-from scipy.cluster.hierarchy import fcluster, linkage
 
+from elastocal.audit.configurations import configurations
 from elastocal.audit.findings import Finding, compared, held
 from elastocal.audit.intervals import Errors, distances, drawn, limits, metrics, reduction
 from elastocal.audit.streams import numbers
-from elastocal.campaigns.joint_space import SAME_POSE_RAD
 
 if TYPE_CHECKING:
     from elastocal.audit.audited import Audited
@@ -40,10 +39,9 @@ def folds(run: Audited, file: str, data: str) -> list[Finding]:
     expected = poses.index.to_frame().to_numpy()
     found = [compared(file, "every measured pose once", "counting", frame[["session", "pose"]], expected, 0.0)]
     count = int(frame["random"].max())
-    joined = linkage(poses.filter(regex=r"^q\d+$").to_numpy(), "single", "chebyshev")
-    configuration, names = pd.factorize(fcluster(joined, SAME_POSE_RAD, "distance"))
-    dealt = numbers(run.seed, data, "league folds", 0).permutation(len(names))[configuration] % count + 1
-    found.append(compared(file, "random folds", "numpy's Philox stream, scipy's single linkage", frame["random"], dealt, 0.0))
+    configuration = configurations(poses.filter(regex=r"^q\d+$").to_numpy())
+    dealt = numbers(run.seed, data, "league folds", 0).permutation(configuration.max() + 1)[configuration] % count + 1
+    found.append(compared(file, "random folds", "numpy's Philox stream", frame["random"], dealt, 0.0))
     blocks = frame["blocks"].groupby(configuration)
     sizes = blocks.first().value_counts()
     even = len(sizes) == count and sizes.max() - sizes.min() <= 1 and (blocks.max() == blocks.min()).all()

@@ -1,8 +1,6 @@
 """Where poses lie in joint space: blocks of neighbours, and what lies beyond the range of others."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 # Measurements of one pose share their joint angles up to what a controller's servo error can differ: a joint that moves less
@@ -68,15 +66,21 @@ def blocks(joint_angles: np.ndarray, count: int) -> np.ndarray:
 def configurations(joint_angles: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """The configuration of each pose, ndarray of int (P,), from angles (N, n) and pose, 0 .. P-1, of measurements or states.
 
-    Poses share a configuration where poses link them each of which lies within what a controller's servo error can differ
-    from the next: single linkage, so that no two configurations have poses that repeat each other. Numbered in the order of
-    the poses.
+    In the order of the poses each that has none yet begins one and takes those with its joint angles, up to what a
+    controller's servo error can differ: the leader algorithm (Hartigan, Clustering Algorithms, 1975). Poses along a path, each
+    near the next, are several configurations.
     """
     mean = _means(joint_angles, pose)
-    pairs = cKDTree(mean).query_pairs(SAME_POSE_RAD, p=np.inf, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs), bool), tuple(pairs.T)), shape=(len(mean), len(mean)))
-    first, index = np.unique(connected_components(links, directed=False)[1], return_index=True, return_inverse=True)[1:]
-    return np.argsort(np.argsort(first))[index]
+    tree = cKDTree(mean)
+    if not tree.query_pairs(SAME_POSE_RAD, p=np.inf):
+        return np.arange(len(mean))
+    found, count = np.full(len(mean), -1), 0
+    for leader in range(len(mean)):
+        if found[leader] < 0:
+            near = np.array(tree.query_ball_point(mean[leader], SAME_POSE_RAD, p=np.inf))
+            found[near[found[near] < 0]] = count
+            count += 1
+    return found
 
 
 def blocks_of_poses(joint_angles: np.ndarray, pose: np.ndarray, count: int) -> np.ndarray:

@@ -149,14 +149,14 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         errors = gross_errors(final, part.noise, case.campaign.measurements, part.kept, settings)
         # A row that a model without it explains stays, whatever the next model says of it: no set of rows comes back.
         good |= ~part.kept & ~errors.gross
-        kept = ~errors.gross | good
-        if (kept == part.kept).all() or number + 1 == settings.gross_error_rounds:
+        remaining = ~errors.gross | good
+        if (remaining == part.kept).all() or number + 1 == settings.gross_error_rounds:
             break
         # The model found looks at all rows once more, without these, before another search is made.
-        some = case.select(kept)
+        some = case.select(remaining)
         about = fit(final.model, some.observations, final.noise, final.estimate, True, ON_THE_WAY)
-        errors = gross_errors(about, part.noise, case.campaign.measurements, kept, settings)
-        good |= ~kept & ~errors.gross
+        errors = gross_errors(about, part.noise, case.campaign.measurements, remaining, settings)
+        good |= ~remaining & ~errors.gross
         last, part = part, fitted_to(case, ~errors.gross | good, part)
         if part is last:
             break
@@ -219,19 +219,19 @@ def _explained(
     settings: Settings,
     seed: int,
     tell: Callable[[str], None],
-    near: tuple[Fit, tuple[str, ...]] | None,
+    start: tuple[Fit, tuple[str, ...]] | None,
 ) -> tuple[Evidence, Fit]:
     """Evidence about the declared model, and again about the model found where that, or its noise, is far from it.
 
-    At once about a model, with the mechanisms that it has beyond the declared one, that is known to be ``near``.
+    At once about a model, with the mechanisms that it has beyond the declared one, where the search is to ``start``.
     """
     candidates = list(case.candidates.values())
     about, searched = searched_part(declared, case.observations, settings)
     before = None
-    if near:
-        found_before, before = near
+    if start:
+        found_before, before = start
         about = fit(found_before.model, searched, found_before.noise, found_before.estimate, True, ON_THE_WAY)
-    for round_number in range(1 if near else 0, settings.linearizations):
+    for round_number in range(1 if start else 0, settings.linearizations):
         problem = linearized(about, searched, candidates, settings)
         nothing, alone = initial_screening(problem.problem)
         draws = stream(seed, case.campaign.name, "null distribution", round_number)

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 # With so many configurations the largest error bounds 69 % of all others at 95 % confidence; fewer show little more than half.
 FEWEST_CONFIGURATIONS = 8
-# Over this turn an error that goes with the sine of a joint's angle changes by half of its amplitude: over less it can hardly
-# be told from a constant.
+# Over this turn an error that goes with the sine of a joint's angle changes by half of its amplitude: over less it is hardly
+# distinguishable from a constant.
 LEAST_TURN_RAD = 2.0 * np.arcsin(0.25)
 # The same of a rail, as a share of its travel.
 LEAST_TRAVEL = 0.1

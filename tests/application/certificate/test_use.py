@@ -1,0 +1,43 @@
+"""The use of a robot: wanted poses are corrected, and those beyond what was fitted or out of reach are named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_calibrated import USUAL, made_calibrated
+from planted import planted
+
+from elastocal.application.calibrated import nominal_forward
+from elastocal.application.certificate.use import use_at
+from elastocal.exchange.target_path import TargetPath
+
+
+@pytest.fixture(scope="module")
+def calibrated(kuka):
+    return made_calibrated(kuka, *USUAL)
+
+
+def path_at(calibrated, angles, wrench):
+    position, rotation = nominal_forward(calibrated.robot, calibrated.robot.reported_angles(angles))
+    count = len(angles)
+    start = calibrated.robot.reported_angles(angles)
+    lines = tuple(range(2, count + 2))
+    return TargetPath(position, rotation, start, np.tile(wrench, (count, 1)), None, None, None, lines)
+
+
+def test_poses_within_what_was_fitted_are_corrected_and_not_beyond(kuka, calibrated):
+    states = planted(kuka, {}, seed=1, poses=20).observations.states
+    angles = states.joint_angles.mean(axis=0) + 0.1 * np.eye(6)[:3]
+    used = use_at(calibrated, states, path_at(calibrated, angles, np.zeros(6)))
+    assert not used.outside.any()
+    assert np.abs(kuka.model_angles(used.reported_angles) - angles).max() < 0.02
+
+
+@pytest.mark.parametrize("fault", ["a load beyond", "out of reach"])
+def test_a_load_beyond_and_a_pose_out_of_reach_lie_outside(kuka, calibrated, fault):
+    states = planted(kuka, {}, seed=1, poses=20).observations.states
+    wrench = np.array([0.0, 0.0, -1e5, 0.0, 0.0, 0.0]) if fault == "a load beyond" else np.zeros(6)
+    wanted = path_at(calibrated, states.joint_angles[:2], wrench)
+    if fault == "out of reach":
+        wanted = replace(wanted, position=wanted.position + 50.0)
+    assert use_at(calibrated, states, wanted).outside.all()
