@@ -151,15 +151,12 @@ def test_a_prediction_that_fails_exits_with_1(run, top, tmp_path):
     assert result.exit_code == 1 and result.output.startswith("fail") and "Nobody has measured" in result.output
 
 
-def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, tmp_path):
-    corrected_and_measured(top, tmp_path / "after", 0.0)
+def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, corrected, tmp_path):
     found = []
     for name, turn in (("path.csv", 0.0), ("heavy.csv", 5e3)):
-        path = pd.read_csv(tmp_path / "after" / "path.csv")
-        path.assign(fx=0.0, fy=0.0, fz=-turn, mx=0.0, my=0.0, mz=0.0).to_csv(tmp_path / "after" / name, index=False)
-        result = run(
-            top / "made", "--tolerance", "1mm", "--use", tmp_path / "after" / name, "--output", tmp_path / f"out{turn:.0f}"
-        )
+        path = pd.read_csv(corrected[0] / "path.csv")
+        path.assign(fx=0.0, fy=0.0, fz=-turn, mx=0.0, my=0.0, mz=0.0).to_csv(tmp_path / name, index=False)
+        result = run(top / "made", "--tolerance", "1mm", "--use", tmp_path / name, "--output", tmp_path / f"out{turn:.0f}")
         document = json.loads((tmp_path / f"out{turn:.0f}" / "certificate.json").read_text())
         assert document["accuracy"]["poses"] == 20 and document["accuracy"]["region"] == "the poses and loads of its use"
         found.append((result.exit_code, document["conformity"]["shortfalls"]))
