@@ -5,10 +5,14 @@ CORES ?= 2
 # The pins have every dependency, so none is looked for; compiled once, since an environment may forbid programs to do it as they run.
 INSTALL = $(BIN)/uv pip install -q --system-certs --compile-bytecode --python $(BIN)/python
 
-.PHONY: paper test test-slurm fuzz soak mutants lint bench pictures site crate lock clean
+.PHONY: paper audit test test-slurm fuzz soak mutants lint bench pictures site crate supply lock clean
 
 paper: .venv/ready
 	$(BIN)/snakemake -j$(CORES)
+
+# Samples of every file worked out again, by pinocchio among others, which nothing else of a run needs.
+audit: .venv/ready-for-audit
+	$(BIN)/snakemake -j$(CORES) audit
 
 test: .venv/ready-for-tests
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 2 --dist loadfile
@@ -57,18 +61,26 @@ crate: .venv/ready .venv-crate/ready
 	$(BIN)/python workflow/check_crate.py
 	.venv-crate/bin/python workflow/validate_crate.py
 
+# What the environment consists of, as CycloneDX, and what is known to be vulnerable in it: asks the vulnerability service of PyPI.
+supply: .venv/ready .venv-supply/ready
+	.venv-supply/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o sbom.cdx.json $(BIN)/python
+	.venv-supply/bin/pip-audit --progress-spinner off --skip-editable --path $$($(BIN)/python -c "import site; print(*site.getsitepackages())")
+
 # New pins. The index is the caller's own; none is written into the lock files.
 lock:
 	uv pip compile --group install --universal --python-version 3.11 --generate-hashes --no-header -o requirements-install.lock
 	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-header -o requirements.lock
+	uv pip compile pyproject.toml --extra build --extra audit --universal --python-version 3.11 --generate-hashes --no-header \
+	    -c requirements.lock -o requirements-audit.lock
 	uv pip compile pyproject.toml --extra build --extra cluster --universal --python-version 3.11 --generate-hashes --no-header \
 	    -c requirements.lock -o requirements-cluster.lock
-	uv pip compile pyproject.toml --extra build --extra cluster --extra test --universal --python-version 3.11 --generate-hashes --no-header \
-	    -c requirements-cluster.lock -o requirements-test.lock
+	uv pip compile pyproject.toml --all-extras --universal --python-version 3.11 --generate-hashes --no-header \
+	    -c requirements-audit.lock -c requirements-cluster.lock -o requirements-test.lock
 	uv pip compile --group crate --universal --python-version 3.11 --generate-hashes --no-header -o requirements-crate.lock
+	uv pip compile --group supply --universal --python-version 3.11 --generate-hashes --no-header -o requirements-supply.lock
 
 clean:
-	rm -rf .venv .venv-crate .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json
+	rm -rf .venv .venv-crate .venv-supply .snakemake data/simulated results/[a-z]* reports/[a-z]* site ro-crate-metadata.json sbom.cdx.json
 
 # A file of its own: the interpreter in the environment is a link to an old one, which make would take for out of date for ever.
 .venv/made: requirements-install.lock
@@ -81,6 +93,11 @@ clean:
 	$(INSTALL) --no-deps --no-build-isolation -e .
 	touch $@
 
+# What the audit needs besides.
+.venv/ready-for-audit: requirements-audit.lock .venv/ready
+	$(INSTALL) --no-deps --require-hashes -r requirements-audit.lock
+	touch $@
+
 # What a run on a cluster needs besides: docs/cluster.md.
 .venv/ready-for-cluster: requirements-cluster.lock .venv/ready
 	$(INSTALL) --no-deps --require-hashes -r requirements-cluster.lock
@@ -90,8 +107,8 @@ clean:
 	$(INSTALL) --no-deps --require-hashes -r requirements-test.lock
 	touch $@
 
-# The validator of crates.
-.venv-crate/ready: requirements-crate.lock | .venv/made
-	$(PYTHON) -m venv .venv-crate
-	$(BIN)/uv pip install -q --system-certs --python .venv-crate/bin/python --no-deps --require-hashes -r requirements-crate.lock
+# Tools of their own: the validator of crates, and what looks at the environment from outside.
+.venv-%/ready: requirements-%.lock | .venv/made
+	$(PYTHON) -m venv .venv-$*
+	$(BIN)/uv pip install -q --system-certs --python .venv-$*/bin/python --no-deps --require-hashes -r requirements-$*.lock
 	touch $@

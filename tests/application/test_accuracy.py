@@ -55,6 +55,14 @@ def test_one_pose_has_the_error_that_it_has_among_others(fanuc):
     assert alone[0] == pytest.approx(among[0], rel=1e-12)
 
 
+def test_what_is_said_of_each_pose_needs_no_drawn_robots(fanuc):
+    calibrated, angles = scoped(made_calibrated(fanuc, *USUAL), True), np.random.default_rng(2).uniform(-1, 1, (5, 6))
+    drawn, bare = (predicted(calibrated, angles, NEUTRAL, draws) for draws in (30, 0))
+    for name in ("parameters_m", "repeated_m", "std_rad", "error_m", "bound_m"):
+        np.testing.assert_array_equal(getattr(drawn, name), getattr(bare, name))
+    assert (len(drawn.rms_m), len(bare.rms_m)) == (30, 0)
+
+
 @pytest.mark.parametrize("unknown_base", [False, True])
 def test_bounds_hold_95_percent_of_robots_drawn_from_the_covariance(fanuc, unknown_base):
     """Of 300 robots; 92 to 98 % are within two and a half standard errors."""

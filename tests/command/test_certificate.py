@@ -1,4 +1,5 @@
 import json
+import shutil
 
 import numpy as np
 import pandas as pd
@@ -33,10 +34,18 @@ def run(top, monkeypatch):
     return called
 
 
-def test_pages_and_document_are_written_beside_the_report(run, top):
-    result = run(top / "made", "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20")
+@pytest.fixture(scope="module")
+def issued(top):
+    """A certificate's command and the folder that it wrote into."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(top)
+        words = ["certificate", str(top / "made"), "--tolerance", "0.5mm", "--serial", "7", "--date", "2026-11-20"]
+        return CliRunner().invoke(app, words), top / "reports" / "loop" / "made"
+
+
+def test_pages_and_document_are_written_beside_the_report(issued):
+    result, reports = issued
     assert result.exit_code == 0, result.output
-    reports = top / "reports" / "loop" / "made"
     assert (reports / "certificate.pdf").read_bytes().startswith(b"%PDF")
     document = json.loads((reports / "certificate.json").read_text())
     assert (document["serial"], document["date"]) == ("7", "2026-11-20")
@@ -89,43 +98,46 @@ def test_a_campaign_without_a_report_is_refused(run, top, tmp_path):
     assert isinstance(result.exception, InputError) and "elastocal diagnose" in str(result.exception)
 
 
-def corrected_and_measured(top, folder, off_m):
-    """A campaign at targets that `correct` wrote, of a robot that misses each by so much along x."""
-    robot = analysed("kuka")
+@pytest.fixture(scope="module")
+def corrected(top, tmp_path_factory):
+    """Targets that `correct` wrote, their folder, and what it said."""
+    folder, robot = tmp_path_factory.mktemp("corrected"), analysed("kuka")
     bent = (
         np.random.default_rng(1).uniform(-0.3, 0.3, (20, 6)) + robot.joint_limits.mean(axis=1) + [0.0, 0.2, 0.1, 0.3, 0.7, 0.0]
     )
     position, rotation = nominal_forward(robot, robot.reported_angles(bent))
-    columns = ["x", "y", "z", "rx", "ry", "rz"]
     pose = np.column_stack([position, Rotation.from_matrix(rotation).as_rotvec()])
-    folder.mkdir()
-    pd.DataFrame(pose, columns=columns).to_csv(folder / "path.csv", index=False)
-    found = CliRunner().invoke(
-        app, ["correct", str(top / "made"), str(folder / "path.csv"), "--output", str(folder / "targets.csv")]
-    )
+    pd.DataFrame(pose, columns=["x", "y", "z", "rx", "ry", "rz"]).to_csv(folder / "path.csv", index=False)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(top)
+        words = ["correct", str(top / "made"), str(folder / "path.csv"), "--output", str(folder / "targets.csv")]
+        found = CliRunner().invoke(app, words)
     assert found.exit_code == 0, found.output
+    return folder, found.stderr
+
+
+def measured_again(corrected, folder, off_m):
+    """A campaign at those targets, of a robot that misses each by so much along x."""
+    shutil.copytree(corrected[0], folder)
     targets = pd.read_csv(folder / "targets.csv")
-    rows = targets[[f"q{joint}" for joint in range(1, 7)]].assign(load=0, repeat=0, target="T", **targets[columns[:3]])
+    rows = targets[[f"q{joint}" for joint in range(1, 7)]].assign(load=0, repeat=0, target="T", **targets[["x", "y", "z"]])
     rows = rows.assign(pose=1 + np.arange(20), x=rows["x"] + off_m, fx=0, fy=0, fz=0, mx=0, my=0, mz=0)
     rows.to_csv(folder / "measurements.csv", index=False)
-    target = {"point": robot.chain.end_effector.name, "offset_m": [0, 0, 0]}
+    target = {"point": analysed("kuka").chain.end_effector.name, "offset_m": [0, 0, 0]}
     document = {"campaign": "after", "robot": "kuka", "measured": "position", "frame": "base", "targets": {"T": target}}
     (folder / "campaign.yaml").write_text(yaml.safe_dump(document))
-    return found.stderr
 
 
-def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(run, top, tmp_path):
-    said = corrected_and_measured(top, tmp_path / "after", 0.0)
-    run(top / "made", "--tolerance", "0.5mm", "--output", tmp_path / "out")
-    words = accuracy_sentence(accuracy_from(json.loads((tmp_path / "out" / "certificate.json").read_text())["accuracy"]))
-    assert words in said
+def test_one_campaign_has_one_accuracy_in_correct_and_certificate_to_the_digit(corrected, issued):
+    words = accuracy_sentence(accuracy_from(json.loads((issued[1] / "certificate.json").read_text())["accuracy"]))
+    assert words in corrected[1]
 
 
 @pytest.mark.parametrize(("off_m", "decision", "code"), [(3e-4, "pass", 0), (8e-4, "fail", 1)])
 def test_a_robot_that_was_measured_at_corrected_targets_is_called_so_and_a_fail_exits_with_1(
-    run, top, tmp_path, off_m, decision, code
+    run, top, tmp_path, corrected, off_m, decision, code
 ):
-    corrected_and_measured(top, tmp_path / "after", off_m)
+    measured_again(corrected, tmp_path / "after", off_m)
     result = run(top / "made", "--tolerance", "0.5mm", "--measured", tmp_path / "after", "--output", tmp_path / "out")
     document = json.loads((tmp_path / "out" / "certificate.json").read_text())
     assert result.exit_code == code and document["conformity"]["decision"] == decision
@@ -139,15 +151,12 @@ def test_a_prediction_that_fails_exits_with_1(run, top, tmp_path):
     assert result.exit_code == 1 and result.output.startswith("fail") and "Nobody has measured" in result.output
 
 
-def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, tmp_path):
-    corrected_and_measured(top, tmp_path / "after", 0.0)
+def test_a_stated_use_is_what_is_judged_and_denies_a_pass_where_it_lies_beyond_what_was_fitted(run, top, corrected, tmp_path):
     found = []
     for name, turn in (("path.csv", 0.0), ("heavy.csv", 5e3)):
-        path = pd.read_csv(tmp_path / "after" / "path.csv")
-        path.assign(fx=0.0, fy=0.0, fz=-turn, mx=0.0, my=0.0, mz=0.0).to_csv(tmp_path / "after" / name, index=False)
-        result = run(
-            top / "made", "--tolerance", "1mm", "--use", tmp_path / "after" / name, "--output", tmp_path / f"out{turn:.0f}"
-        )
+        path = pd.read_csv(corrected[0] / "path.csv")
+        path.assign(fx=0.0, fy=0.0, fz=-turn, mx=0.0, my=0.0, mz=0.0).to_csv(tmp_path / name, index=False)
+        result = run(top / "made", "--tolerance", "1mm", "--use", tmp_path / name, "--output", tmp_path / f"out{turn:.0f}")
         document = json.loads((tmp_path / f"out{turn:.0f}" / "certificate.json").read_text())
         assert document["accuracy"]["poses"] == 20 and document["accuracy"]["region"] == "the poses and loads of its use"
         found.append((result.exit_code, document["conformity"]["shortfalls"]))

@@ -24,15 +24,15 @@ def test_links_joints_and_masses_are_there_and_no_geometry(tmp_path):
     mesh = '<visual><geometry><mesh filename="package://gone/x.stl"/></geometry></visual>'
     heavy = link("b", 2.0, (0, 0, 1)).replace("</link>", mesh + "</link>")
     urdf = read_urdf(file_of(tmp_path, robot(link("a"), heavy, SOUND[2], '<gazebo reference="a"/>', name="arm")))
-    assert urdf.robot.name == "arm" and [one.name for one in urdf.robot.joints] == ["j"]
-    assert urdf.robot.links[1].inertial.mass == 2.0 and not urdf.robot.links[1].visuals
+    assert urdf.name == "arm" and [one.name for one in urdf.joints] == ["j"]
+    assert urdf.links[1].mass == 2.0 and urdf.links[1].centre.tolist() == [0, 0, 1]
 
 
 def test_a_robot_without_a_name_has_that_of_the_file_and_namespaces_say_nothing(tmp_path):
     text = robot(*SOUND).replace(
         '<robot name="made">', '<robot xmlns="http://www.ros.org" xmlns:xacro="http://ros.org/wiki/xacro">'
     )
-    assert read_urdf(file_of(tmp_path, text)).robot.name == "made"
+    assert read_urdf(file_of(tmp_path, text)).name == "made"
 
 
 @pytest.mark.parametrize("text", [BOMB, OUTSIDE], ids=["entities of entities", "an entity outside"])

@@ -38,8 +38,9 @@ def of_the_catalogue():
     ids=["residuals", "arrows", "candidates", "confounding of the catalogue", "confounding", "before_after"],
 )
 def test_nothing_is_cut_off_and_a_rerun_gives_the_same_bytes(figure, tmp_path):
-    assert_nothing_cut_off(figure())
     for run in "ab":
-        save(figure(), str(tmp_path / f"{run}.pdf"), str(tmp_path / f"{run}.png"))
+        drawn = figure()
+        save(drawn, str(tmp_path / f"{run}.pdf"), str(tmp_path / f"{run}.png"))
+    assert_nothing_cut_off(drawn)
     for kind in ("pdf", "png"):
         assert (tmp_path / f"a.{kind}").read_bytes() == (tmp_path / f"b.{kind}").read_bytes()

@@ -51,10 +51,9 @@ def test_one_accuracy_stands_in_headline_budget_and_report(found, parts):
     assert document["held_out"][-1]["max_m_low"] is None
 
 
-def test_a_certificate_passes_below_and_fails_above_what_is_predicted(top, parts):
+def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, top, parts):
     limits = (0.2, 2.0)
-    rms = certificate(top / "made", ROBOTS, *parts, WANTED)[0]["accuracy"]["rms_m"]
-    wanted = [replace(WANTED, tolerance_m=share * rms) for share in limits]
+    wanted = [replace(WANTED, tolerance_m=share * found[0]["accuracy"]["rms_m"]) for share in limits]
     found = [certificate(top / "made", ROBOTS, *parts, each)[0]["conformity"]["decision"] for each in wanted]
     assert found == ["fail", "pass"]
 

@@ -26,3 +26,10 @@ def test_an_engine_is_handed_what_is_copied_and_nothing_else():
 def test_a_user_whom_the_image_does_not_know_has_a_home_and_a_name():
     """As with `docker run --user "$(id -u)"`; Snakemake stops without either."""
     assert re.search(r"^ENV HOME=/tmp USER=\w+$", RECIPE, re.MULTILINE)
+
+
+def test_its_base_is_one_image_and_what_it_runs_is_not_root():
+    """The user comes after all that installs, and before what runs."""
+    assert re.findall(r"^FROM \S+@sha256:[0-9a-f]{64}$", RECIPE, re.MULTILINE) == re.findall(r"^FROM .*", RECIPE, re.MULTILINE)
+    instructions = re.findall(r"^[A-Z]+ .*", RECIPE, re.MULTILINE)
+    assert re.fullmatch(r"USER [1-9]\d*:[1-9]\d*", instructions[-2]) and instructions[-1].startswith("ENTRYPOINT ")

@@ -14,6 +14,7 @@ CHECKED = {
     "citation-file-format": ["CITATION.cff"],
     "github-workflows": [".github/workflows/ci.yml"],
     "github-issue-forms": [f".github/ISSUE_TEMPLATE/{name}.yml" for name in ("fault", "verdict", "proposal")],
+    "dependabot": [".github/dependabot.yml"],
     "github-issue-config": [".github/ISSUE_TEMPLATE/config.yml"],
 }
 

@@ -90,6 +90,7 @@ ELSEWHERE = {
         )
     },
     "pip install -e .": ("Makefile", "--no-deps --no-build-isolation -e ."),
+    "pip install pin": ("pyproject.toml", 'audit = ["pin>=3"]'),
     "pip wheel --no-deps .": ("tests/project/test_wheel.py", '[*pip, "wheel", *alone, ".", "-w", "dist"]'),
     "python -m pip wheel --no-deps --no-build-isolation -w dist .": (
         "tests/project/test_wheel.py",

@@ -8,30 +8,22 @@ import pytest
 from study_folder import Study
 
 
-def _of_all_workers(tmp_path_factory, name, *arguments):
-    """A finished small study: the worker that asks first makes it, another that asks meanwhile waits."""
+@pytest.fixture(scope="session")
+def small_study(tmp_path_factory):
+    """The finished small study on two cores: the worker that asks first makes it, another that asks meanwhile waits.
+
+    To be read, not to be changed.
+    """
     own = tmp_path_factory.getbasetemp()
-    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / name)
+    study = Study((own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "small")
     with open(study.folder.with_suffix(".lock"), "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         done = study.folder.with_suffix(".done")
         if not done.exists():
             shutil.rmtree(study.folder, ignore_errors=True)
-            Study.of_sources(study.folder).run(*arguments)
+            Study.of_sources(study.folder).run()
             done.touch()
     return study
-
-
-@pytest.fixture(scope="session")
-def small_study(tmp_path_factory):
-    """The finished small study on two cores; to be read, not to be changed."""
-    return _of_all_workers(tmp_path_factory, "small")
-
-
-@pytest.fixture(scope="session")
-def serial_study(tmp_path_factory):
-    """The finished small study on one core; to be read, not to be changed."""
-    return _of_all_workers(tmp_path_factory, "serial", "-j1")
 
 
 @pytest.fixture

@@ -140,3 +140,12 @@ def test_the_command_says_which_file_is_wrong(finished):
     assert "reports/tables/table4.csv" in set(wrong["file"]) <= ours
     assert not finished.path("reports/audit.txt").exists()
     assert "do not hold" in finished.path("reports/audit.html").read_text("utf-8")
+
+
+def test_without_pinocchio_an_audit_ends_in_a_line_before_any_job(unstarted):
+    """It comes with an extra; Python imports `sitecustomize` before all else, which hides it here."""
+    unstarted.path("src/sitecustomize.py").write_text("import sys\n\nsys.modules['pinocchio'] = None\n", encoding="utf-8")
+    done = unstarted.snakemake("-j1", "--quiet", "all", "--", "audit")
+    line = "audit: pinocchio: found no such package; allowed: the extra audit: make audit, or pip install pin"
+    assert (done.returncode, done.stderr.strip().splitlines()[-1:]) == (1, [line]), done.stderr
+    assert "Traceback" not in done.stderr and unstarted.files("data/**/*.parquet", "results/**/*.parquet") == []

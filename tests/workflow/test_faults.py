@@ -25,30 +25,12 @@ def _unknown_point(study):
     study.replace("config/strategies/3+6DoF-comb.yaml", "[3DoF, 6DoF]", "[3DoF, 7DoF]")
 
 
+# What stands behind each door: its schema, its YAML, its file, a robot's, a strategy's, one key beside another. What else is
+# refused there is in tests/study/test_configuration.py.
 FAULTS = {
     "typo in a key": (
         lambda study: study.replace("config.yaml", "data_sets:", "data_set:"),
         ["config.yaml: data_set: ", "allowed: 'data_sets'?"],
-    ),
-    "typo in a key of a section": (
-        lambda study: study.replace("config.yaml", "average: stiffness", "averages: stiffness"),
-        ["config.yaml: interpretations.averages: ", "allowed: 'average'?"],
-    ),
-    "value outside its range": (
-        lambda study: study.configure({"interpretations": {"joint_range": "half_turn"}}),
-        ["config.yaml: interpretations.joint_range: ", "'half_turn'", "allowed: full_turn | limits"],
-    ),
-    "unknown strategy": (
-        lambda study: study.configure({"strategies": ["6DoF", "3+6DoF-com"]}),
-        ["config.yaml: strategies", "'3+6DoF-com'", "allowed: a file of config/strategies: '3+6DoF-comb'?"],
-    ),
-    "unknown robot": (
-        lambda study: study.configure({"robots": ["kuka", "staubli"]}),
-        ["config.yaml: robots", "'staubli'", "allowed: a file of config/robots: ", "kuka, kuka_extended"],
-    ),
-    "negative noise level": (
-        lambda study: study.configure({"noise_um": [200, -50]}),
-        ["config.yaml: noise_um[1]: ", "found -50", "allowed: 0 "],
     ),
     "configuration that is no YAML": (
         lambda study: study.append("config.yaml", "tables: [\n"),
@@ -66,24 +48,9 @@ FAULTS = {
         lambda study: study.replace(KUKA, "Rz(q1)", "Rz q1"),
         [f"{KUKA}: chain: ", "'Rz'", "allowed: Tx(length)"],
     ),
-    "wrong number of compliances": (
-        lambda study: study.replace(KUKA, "[0.54, ", "["),
-        [f"{KUKA}: compliance_urad_per_Nm: ", "found 5 entries", "allowed: one for each of the 6 joints"],
-    ),
     "strategy with an unknown point": (
         _unknown_point,
         ["config/strategies/3+6DoF-comb.yaml: stages[0].points: ", "'7DoF'", "allowed: 2DoF, 3DoF, 4DoF, 6DoF"],
-    ),
-    "data set too short to solve": (
-        lambda study: study.configure(
-            {
-                "configurations": 1,
-                "interpretations": {"measured": "position"},
-                "evaluation": {"lengths": [1]},
-                "tables": {"length": 1},
-            }
-        ),
-        ["config.yaml: configurations: ", "found 1", "allowed: 2 or more"],
     ),
     "evaluation beyond the configurations": (
         lambda study: study.configure({"evaluation": {"lengths": [5, 20, 21]}}),

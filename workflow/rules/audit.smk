@@ -1,15 +1,22 @@
 """The audit: samples of every file of a finished run worked out again by libraries that share no code with the pipeline.
 
-`snakemake -j2 audit` makes what is not made yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
+`make audit` makes what is not made yet, then writes reports/audit.html and reports/audit.csv, and, where all checks
 hold, reports/audit.txt; where one does not, it ends with an error. Files of other targets, such as blind, are audited where they are.
 """
 
 from elastocal.audit.targets import finished
 
 
+def audited(wildcards):
+    """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
+    if find_spec("pinocchio") is None:
+        sys.exit(str(InputError("audit", "pinocchio", "no such package", "the extra audit: make audit, or pip install pin")))
+    return files_behind([*rules.study.input, *rules.loop.input])
+
+
 rule audit_files:
     input:
-        files=lambda wildcards: files_behind([*rules.study.input, *rules.loop.input]),
+        files=audited,
         reference=f"{CONFIG}/paper/reference.csv",
         sources=sources("audit_files.py"),
     output:

@@ -32,6 +32,7 @@ from outcome import outcome
 PACKAGES = ROOT / "src" if (ROOT / "src").is_dir() else Path(elastocal.__file__).parents[1]
 
 
+@cache
 def placed(file):
     """A file of the workflow or the package by the name that rules have for it: in a checkout, which may move, without the folders above."""
     return (file.relative_to(Path.cwd()) if file.is_relative_to(Path.cwd()) else file).as_posix()

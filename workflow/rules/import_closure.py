@@ -39,7 +39,7 @@ def closure(script: Path, source: Path) -> list[Path]:
         files.add(file)
         modules |= _imports(file) & _graph().modules
         left += {own for name in _imports(file) if (own := file.with_name(f"{name}.py")).is_file()} - files
-    modules |= {found for name in modules for found in _graph().find_upstream_modules(name)}
+    modules |= {found for name in modules for found in _upstream(name)}
     # With a module come the packages above it.
     names = {package for name in modules for package in accumulate(name.split("."), "{}.{}".format)}
     return sorted(files - {script} | {_file(name, source) for name in names if name.split(".")[0] == PACKAGE})
@@ -58,6 +58,11 @@ def _graph() -> grimp.ImportGraph:
             if module != catalogue:
                 graph.add_import(importer=catalogue, imported=module)
     return graph
+
+
+@cache
+def _upstream(module: str) -> set[str]:
+    return _graph().find_upstream_modules(module)
 
 
 @cache
@@ -80,6 +85,7 @@ def _no_python(file: Path | str, error: SourceSyntaxError | SyntaxError) -> Inpu
     return InputError(file, f"line {error.lineno}", (error.text or "").strip() or "the end of the file", "Python")
 
 
+@cache
 def _file(module: str, source: Path) -> Path:
     path = source.joinpath(*module.split("."))
     return path / "__init__.py" if path.is_dir() else path.with_suffix(".py")

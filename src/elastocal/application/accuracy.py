@@ -202,15 +202,20 @@ class Prediction:
         )
 
 
-def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions) -> Prediction:
-    """Predicted errors of the corrected robot where it is commanded to joint angles (N, n)."""
+def predicted(
+    calibrated: CalibratedRobot, reported_angles: np.ndarray, operating: OperatingConditions, draws: int = _DRAWS
+) -> Prediction:
+    """Predicted errors of the corrected robot where it is commanded to joint angles (N, n).
+
+    Drawn robots, most of the work, are for errors over all poses; where those of each pose are enough, none (0) need be.
+    """
     scope, robot = _under(scope_in(calibrated), operating), calibrated.robot
     root, repeated = square_root(calibrated.covariance), np.hypot(calibrated.noise.joint_rad, calibrated.noise.pose_rad)
     stream = np.random.default_rng(_SEED)
-    drawn = stream.standard_normal((root.shape[1], _DRAWS))
+    drawn = stream.standard_normal((root.shape[1], draws))
     freedom = scope.repeated_freedom
-    size = np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, _DRAWS)) if freedom else np.ones(_DRAWS)
-    total, worst = np.zeros(_DRAWS), np.zeros(_DRAWS)
+    size = np.sqrt(stream.gamma(0.5 * freedom, 2.0 / freedom, draws)) if freedom else np.ones(draws)
+    total, worst = np.zeros(draws), np.zeros(draws)
     parts = []
     for start in range(0, len(reported_angles), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
@@ -220,7 +225,7 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
         jacobian = jacobians(robot.chain, robot.model_angles(angles), robot.chain.end_effector)
         apart = jacobian * repeated
         parts.append([each @ each.transpose(0, 2, 1) for each in (moved, apart)])
-        off = moved[:, :3] @ drawn + apart[:, :3] @ (size * stream.standard_normal((len(angles), apart.shape[2], _DRAWS)))
+        off = moved[:, :3] @ drawn + apart[:, :3] @ (size * stream.standard_normal((len(angles), apart.shape[2], draws)))
         squares = (off**2).sum(axis=1)
         total += squares.sum(axis=0)
         worst = np.maximum(worst, squares.max(axis=0))
@@ -228,7 +233,7 @@ def predicted(calibrated: CalibratedRobot, reported_angles: np.ndarray, operatin
     ours, own = (np.diagonal(covariance, axis1=1, axis2=2) for covariance in covariances)
     left_out, form = scope.left_out_m**2, scope.form_m**2
     # An error of form is one law over all poses: what is open is how large it is.
-    unknown = form * stream.standard_normal(_DRAWS) ** 2
+    unknown = form * stream.standard_normal(draws) ** 2
     return Prediction(
         np.sqrt(ours[:, :3].sum(axis=1)),
         np.sqrt(own[:, :3].sum(axis=1)),

@@ -254,7 +254,7 @@ def _by_model(
     calibrated: CalibratedRobot, wanted: Wanted, operating: OperatingConditions
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found = corrected(calibrated, wanted.position, wanted.rotation, operating, wanted.start)
-    return found.joint_angles, predicted(calibrated, found.joint_angles, operating).error_m, found.status == OK
+    return found.joint_angles, predicted(calibrated, found.joint_angles, operating, draws=0).error_m, found.status == OK
 
 
 def _by_plant(plant: PhysicalRobot, robot: Robot, wanted: Wanted, seed: int) -> tuple[np.ndarray, np.ndarray]:

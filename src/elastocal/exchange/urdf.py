@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from yourdfpy import URDF, Joint
-
     from elastocal.exchange.robot_text import Imported
+    from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Limits to a billionth of a degree, or to a nanometre.
 _DECIMALS = 9
@@ -61,7 +60,7 @@ def robot_from_urdf(
     notes = list(weights.notes)
     limits = [_limits(joint, notes, source) for joint in chain.joints]
     document: dict[str, Any] = {
-        "name": urdf.robot.name,
+        "name": urdf.name,
         "joint_names": [joint.name for joint in chain.joints],
         "chain": chain.notation,
         "joint_limits_deg": limits,
@@ -72,17 +71,16 @@ def robot_from_urdf(
     if weights.masses:
         document["masses"] = weights.masses
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
-    if few := _few_digits(urdf, [joint.child for joint in urdf.robot.joints if joint.child in chain.links]):
+    if few := _few_digits(urdf, [joint.child for joint in urdf.joints if joint.child in chain.links]):
         notes.append(f"nearly right angles stay as they are written, with few digits: those of {few}")
     return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
 def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
     """Degrees, of prismatic joints metres."""
-    limit = joint.limit
-    low, high = (0.0, 0.0) if limit is None else (limit.lower or 0.0, limit.upper or 0.0)
-    prismatic = joint.type == "prismatic"
-    if joint.type == "continuous" and low >= high:
+    low, high = joint.lower, joint.upper
+    prismatic = joint.kind == "prismatic"
+    if joint.kind == "continuous" and low >= high:
         return list(UNLIMITED_DEG)
     if low >= high and prismatic:
         allowed = 'of a prismatic joint, <limit lower="..." upper="..."> in metres'
@@ -93,11 +91,11 @@ def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
     return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]
 
 
-def _few_digits(urdf: URDF, children: Sequence[str]) -> str:
+def _few_digits(urdf: Urdf, children: Sequence[str]) -> str:
     """Joints of the chain with a rotation that is a right angle but for the digits it was written with."""
     named = []
-    for joint in urdf.robot.joints:
-        if joint.child in children and joint.origin is not None:
+    for joint in urdf.joints:
+        if joint.child in children:
             off = np.abs(joint.origin[:3, :3] - np.round(joint.origin[:3, :3]))
             if _EXACTLY_RAD < off.max() < _NEARLY_RAD:
                 named.append(joint.name)

@@ -28,7 +28,7 @@ from elastocal.exchange.fixed_transforms import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from yourdfpy import URDF, Joint
+    from elastocal.exchange.urdf_reading import Joint, Urdf
 
 # Of a shorter one the direction is no more than rounding.
 _SHORTEST_AXIS = 1e-9
@@ -62,7 +62,7 @@ class UrdfChain:
     ----------
     words : tuple of str
         In the notation, with measuring points.
-    joints : tuple of yourdfpy.Joint
+    joints : tuple of Joint
         Those of q1, q2, ...
     links : dict of str to Carried
         Links on the chain.
@@ -78,17 +78,17 @@ class UrdfChain:
         return " ".join(self.words)
 
 
-def parent_joints(urdf: URDF) -> dict[str, Joint]:
+def parent_joints(urdf: Urdf) -> dict[str, Joint]:
     """The joint above each link, by the link's name; the root has none."""
-    return {joint.child: joint for joint in urdf.robot.joints}
+    return {joint.child: joint for joint in urdf.joints}
 
 
-def chain_between(urdf: URDF, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
+def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
     """The chain from one link to another that it carries.
 
     Parameters
     ----------
-    urdf : yourdfpy.URDF
+    urdf : Urdf
     base, tip : str
         Names of links.
     points : sequence of str
@@ -122,9 +122,8 @@ def chain_between(urdf: URDF, base: str, tip: str, points: Sequence[str], source
     place = Carried(0, np.eye(4), False)
     links = {base: place}
     for joint in path:
-        origin = np.eye(4) if joint.origin is None else joint.origin
-        words += displacement_words(origin)
-        place = Carried(place.body, place.transform @ origin, place.behind_passive)
+        words += displacement_words(joint.origin)
+        place = Carried(place.body, place.transform @ joint.origin, place.behind_passive)
         if joint.name in masters:
             moved, place = _moved(joint, *masters[joint.name], numbers, place, source)
             words += moved
@@ -144,10 +143,10 @@ def _moved(
     joint: Joint, master: str, sign: float, offset: float, numbers: dict[str, int], place: Carried, source: str
 ) -> tuple[list[str], Carried]:
     """Words of a joint that moves, and where it carries what is behind it."""
-    axis = np.asarray(joint.axis, float)
+    axis = joint.axis
     if not np.linalg.norm(axis) > _SHORTEST_AXIS:
         raise InputError(source, f"joint {joint.name!r}: axis xyz", " ".join(f"{part:g}" for part in axis), "a direction")
-    kind = _MOVING[joint.type]
+    kind = _MOVING[joint.kind]
     before, letter, minus, after = turned_axis(axis)
     negative = (minus == "-") != (sign < 0)
     fixed = (turn_word if kind == "R" else shift_word)(letter, -offset if minus else offset)
@@ -166,8 +165,8 @@ def _moved(
     return words, Carried(place.body, place.transform @ turn @ step @ turn.T, place.behind_passive or kind == "R")
 
 
-def _path(urdf: URDF, base: str, tip: str, source: str) -> list[Joint]:
-    names = [link.name for link in urdf.robot.links]
+def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
+    names = [link.name for link in urdf.links]
     for key, name in (("base", base), ("tip", tip)):
         if name not in names:
             raise InputError(source, key, repr(name), f"a link: {closest_first(name, names)}")
@@ -179,11 +178,11 @@ def _path(urdf: URDF, base: str, tip: str, source: str) -> list[Joint]:
         path.append(above[at])
         at = above[at].parent
     path.reverse()
-    if not any(joint.type in _MOVING for joint in path):
+    if not any(joint.kind in _MOVING for joint in path):
         raise InputError(source, f"base {base!r}, tip {tip!r}", "no joint that moves between them", "links with joints between")
     for joint in path:
-        if joint.type not in (*_MOVING, "fixed"):
-            raise InputError(source, f"joint {joint.name!r}", f"type {joint.type}", " | ".join((*_MOVING, "fixed")))
+        if joint.kind not in (*_MOVING, "fixed"):
+            raise InputError(source, f"joint {joint.name!r}", f"type {joint.kind}", " | ".join((*_MOVING, "fixed")))
     return path
 
 
@@ -196,10 +195,10 @@ def _relation(above: Mapping[str, Joint], base: str, tip: str) -> str:
     return "two branches of the tree"
 
 
-def _masters(urdf: URDF, path: Sequence[Joint], source: str) -> dict[str, tuple[str, float, float]]:
+def _masters(urdf: Urdf, path: Sequence[Joint], source: str) -> dict[str, tuple[str, float, float]]:
     """By name of each joint that moves: the joint of the chain whose coordinate it has, +1 or -1 of it, and an offset."""
-    every = {joint.name: joint for joint in urdf.robot.joints}
-    kinds = {joint.name: _MOVING[joint.type] for joint in path if joint.type in _MOVING}
+    every = {joint.name: joint for joint in urdf.joints}
+    kinds = {joint.name: _MOVING[joint.kind] for joint in path if joint.kind in _MOVING}
     masters = {}
     for name in kinds:
         master, factor, offset, seen = name, 1.0, 0.0, {name}

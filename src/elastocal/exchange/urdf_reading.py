@@ -1,8 +1,7 @@
 """A URDF file, read safely: its links, joints and masses, nothing that it refers to.
 
-The Unified Robot Description Format [1]_ is XML. A file is checked before the library yourdfpy makes its links and joints: no
-document type is accepted, and so no entity that grows or fetches another file; meshes, materials and plug-ins are left out, and
-no other file is opened.
+The Unified Robot Description Format [1]_ is XML. No document type is accepted, and so no entity that grows or fetches another
+file; meshes, materials and plug-ins are left out, and no other file is opened.
 
 References
 ----------
@@ -11,20 +10,22 @@ References
 
 from __future__ import annotations
 
-import io
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 from xml.parsers import expat
 
+import numpy as np
+
 from elastocal.errors import InputError
+from elastocal.exchange.fixed_transforms import rotation_about
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from yourdfpy import URDF
+    from collections.abc import Sequence
+    from xml.etree.ElementTree import Element
 
 # The longest public descriptions, of humanoids with hands, have less than a megabyte.
 LARGEST_BYTES = 20_000_000
@@ -33,6 +34,12 @@ MOST_PARTS = 2000
 LARGEST_LIMIT = 1e100
 KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _XACRO = "a URDF; this is xacro, run it first: xacro FILE > robot.urdf"
+# What is read of each, once at most.
+_READ = {
+    "link": ("inertial",),
+    "inertial": ("origin", "mass"),
+    "joint": ("parent", "child", "origin", "axis", "limit", "mimic"),
+}
 # How many numbers each attribute has that is read.
 _NUMBERS = {
     "origin": {"xyz": 3, "rpy": 3},
@@ -44,39 +51,88 @@ _NUMBERS = {
 _NEEDED = {"mass": "value", "mimic": "joint"}
 
 
-def read_urdf(path: str | Path) -> URDF:
+@dataclass(frozen=True)
+class Link:
+    """A link, its mass (kg, 0 where none is stated) and its centre of mass in the link's frame (m)."""
+
+    name: str
+    mass: float
+    centre: np.ndarray
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """The joint that another one follows."""
+
+    joint: str
+    multiplier: float
+    offset: float
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint: `origin` (4, 4) in the parent's frame, `axis` (3,) in its own; limits that are not stated are 0."""
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    origin: np.ndarray
+    axis: np.ndarray
+    lower: float
+    upper: float
+    mimic: Mimic | None
+
+
+@dataclass(frozen=True)
+class Urdf:
+    """A tree of links: every name once, every joint between two links that are there."""
+
+    name: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+
+
+def read_urdf(path: str | Path) -> Urdf:
     """Links, joints and masses of a URDF file.
 
-    Parameters
-    ----------
-    path : str or Path
-
-    Returns
-    -------
-    yourdfpy.URDF
-        Without geometry; every name once, every joint between two links that are there, and the links a tree.
-
-    Raises
-    ------
-    InputError
-        A file that is missing, too large, no URDF, or one whose joints and links do not hold together.
+    Raises `InputError` for a file that is missing, too large, no URDF, or one whose joints and links do not hold together.
     """
     source = Path(path).as_posix()
     root = _root_of(read_bytes(path, LARGEST_BYTES, "a URDF file"), source)
-    cleaned = ElementTree.Element("robot", {"name": root.get("name") or Path(path).stem})
-    for part in root:
-        if part.tag == "link":
-            cleaned.append(_copy(part, f"link {part.get('name')!r}", ("inertial",), source))
-        elif part.tag == "joint":
-            cleaned.append(_copy(part, f"joint {part.get('name')!r}", ("parent", "child", *_NUMBERS), source))
-    _check_tree(cleaned, source)
-    # Imported here: it takes longer than all the rest of the command.
-    from yourdfpy import URDF
-
-    return URDF.load(io.BytesIO(ElementTree.tostring(cleaned)), load_meshes=False, build_scene_graph=False)
+    links, joints = root.findall("link"), root.findall("joint")
+    for part in (*links, *joints):
+        if not part.get("name"):
+            raise InputError(source, f"<{part.tag}>", "no name", "a name")
+        _check_part(part, f"{part.tag} {part.get('name')!r}", source)
+    _check_tree(links, joints, source)
+    return Urdf(root.get("name") or Path(path).stem, tuple(map(_link, links)), tuple(map(_joint, joints)))
 
 
-def _root_of(data: bytes, source: str) -> ElementTree.Element:
+def _link(part: Element) -> Link:
+    (mass,) = _values(part, "inertial/mass", "value", "0")
+    return Link(part.attrib["name"], mass, np.array(_values(part, "inertial/origin", "xyz", "0 0 0")))
+
+
+def _joint(part: Element) -> Joint:
+    roll, pitch, yaw = _values(part, "origin", "rpy", "0 0 0")
+    origin = np.eye(4)
+    origin[:3, :3] = rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)
+    origin[:3, 3] = _values(part, "origin", "xyz", "0 0 0")
+    (lower,), (upper,) = _values(part, "limit", "lower", "0"), _values(part, "limit", "upper", "0")
+    (multiplier,), (offset,) = _values(part, "mimic", "multiplier", "1"), _values(part, "mimic", "offset", "0")
+    mimic = None if part.find("mimic") is None else Mimic(_end(part, "mimic", "joint"), multiplier, offset)
+    ends = _end(part, "parent"), _end(part, "child")
+    axis = np.array(_values(part, "axis", "xyz", "1 0 0"))
+    return Joint(part.attrib["name"], part.attrib["type"], *ends, origin, axis, lower, upper, mimic)
+
+
+def _values(part: Element, tag: str, attribute: str, default: str) -> list[float]:
+    child = part.find(tag)
+    return [float(word) for word in (default if child is None else child.get(attribute, default)).split()]
+
+
+def _root_of(data: bytes, source: str) -> Element:
     """The root of the tree, its names without namespaces."""
     parser = expat.ParserCreate()
 
@@ -106,42 +162,24 @@ def _root_of(data: bytes, source: str) -> ElementTree.Element:
     return root
 
 
-def _copy(part: ElementTree.Element, called: str, kept: tuple[str, ...], source: str) -> ElementTree.Element:
-    """The children that matter, each once, with numbers where there must be some."""
-    if not part.get("name"):
-        raise InputError(source, f"<{part.tag}>", "no name", "a name")
-    copy = ElementTree.Element(part.tag, part.attrib)
-    for tag, children in _by_tag(part, kept):
+def _check_part(part: Element, called: str, source: str) -> None:
+    """Each child that is read stands once at most, with numbers where there must be some."""
+    for tag in _READ[part.tag]:
+        children = part.findall(tag)
         if len(children) > 1:
             raise InputError(source, called, f"<{tag}> {len(children)} times", "once at most")
-        for attribute, count in _NUMBERS.get(tag, {}).items():
-            # Programs write 1e16 and more where a joint, a force or a speed has no limit.
-            largest = LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
-            _check_numbers(children[0].get(attribute), count, f"{called}: {tag} {attribute}", source, largest)
-        needed = _NEEDED.get(tag)
-        if needed and not children[0].get(needed):
-            raise InputError(source, called, f"<{tag}> without {needed}", f"<{tag} {needed}=...>")
-        copy.append(_copy_inertial(children[0], called, source) if tag == "inertial" else _bare(children[0]))
-    return copy
-
-
-def _copy_inertial(inertial: ElementTree.Element, called: str, source: str) -> ElementTree.Element:
-    inertial.set("name", "inertial")
-    copy = _copy(inertial, called, ("origin", "mass"), source)
-    mass = copy.find("mass")
-    if mass is not None and float(mass.attrib["value"]) < 0:
-        raise InputError(source, f"{called}: mass value", mass.attrib["value"], "0 or more kg")
-    return copy
-
-
-def _bare(element: ElementTree.Element) -> ElementTree.Element:
-    return ElementTree.Element(element.tag, element.attrib)
-
-
-def _by_tag(part: ElementTree.Element, kept: tuple[str, ...]) -> Iterator[tuple[str, list[ElementTree.Element]]]:
-    for tag in kept:
-        if children := part.findall(tag):
-            yield tag, children
+        for child in children:
+            for attribute, count in _NUMBERS.get(tag, {}).items():
+                # Programs write 1e16 and more where a joint, a force or a speed has no limit.
+                largest = LARGEST_LIMIT if tag == "limit" else LARGEST_NUMBER
+                _check_numbers(child.get(attribute), count, f"{called}: {tag} {attribute}", source, largest)
+            needed = _NEEDED.get(tag)
+            if needed and not child.get(needed):
+                raise InputError(source, called, f"<{tag}> without {needed}", f"<{tag} {needed}=...>")
+            if tag == "mass" and float(child.attrib["value"]) < 0:
+                raise InputError(source, f"{called}: mass value", child.attrib["value"], "0 or more kg")
+            if tag == "inertial":
+                _check_part(child, called, source)
 
 
 def _check_numbers(text: str | None, count: int, key: str, source: str, largest: float) -> None:
@@ -154,8 +192,7 @@ def _check_numbers(text: str | None, count: int, key: str, source: str, largest:
         )
 
 
-def _check_tree(robot: ElementTree.Element, source: str) -> None:
-    links, joints = robot.findall("link"), robot.findall("joint")
+def _check_tree(links: Sequence[Element], joints: Sequence[Element], source: str) -> None:
     for tag, parts in (("link", links), ("joint", joints)):
         if not parts:
             raise InputError(source, "", f"no <{tag}>", "a URDF with links and joints")
@@ -187,6 +224,6 @@ def _check_tree(robot: ElementTree.Element, source: str) -> None:
             at = parent_of.get(at)
 
 
-def _end(joint: ElementTree.Element, tag: str) -> str:
+def _end(joint: Element, tag: str, attribute: str = "link") -> str:
     end = joint.find(tag)
-    return "" if end is None else end.get("link", "")
+    return "" if end is None else end.get(attribute, "")

@@ -14,9 +14,8 @@ from elastocal.exchange.urdf_chain import parent_joints
 from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
-    from yourdfpy import URDF
-
     from elastocal.exchange.urdf_chain import Carried, UrdfChain
+    from elastocal.exchange.urdf_reading import Urdf
 
 # A URDF does not say where its masses come from: of a drawing without cables, grease and covers, or guessed. Where dynamic
 # parameters of robots were identified, masses and centres of such models were off by a tenth to a third.
@@ -42,12 +41,12 @@ class Weights:
     notes: tuple[str, ...]
 
 
-def weights_of(urdf: URDF, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
+def weights_of(urdf: Urdf, chain: UrdfChain, relative_std: float = RELATIVE_STD) -> Weights:
     """Masses and centres of what each joint carries.
 
     Parameters
     ----------
-    urdf : yourdfpy.URDF
+    urdf : Urdf
     chain : UrdfChain
     relative_std : float
         How well they are known.
@@ -58,19 +57,16 @@ def weights_of(urdf: URDF, chain: UrdfChain, relative_std: float = RELATIVE_STD)
     """
     moments: dict[int, np.ndarray] = {}
     held, passive = set(), set()
-    for link in urdf.robot.links:
-        mass = None if link.inertial is None else link.inertial.mass
-        carried = _carried(urdf, link.name, chain) if mass else None
+    for link in urdf.links:
+        carried = _carried(urdf, link.name, chain) if link.mass else None
         # What moves beside the column weighs on no joint of the chain.
-        if not mass or carried is None or (carried[0].body == 0 and carried[1]):
+        if carried is None or (carried[0].body == 0 and carried[1]):
             continue
         place, by = carried
         held.update(by)
         if place.behind_passive:
             passive.add(link.name)
-        own = np.eye(4) if link.inertial.origin is None else link.inertial.origin
-        centre = (place.transform @ own)[:3, 3]
-        moments[place.body] = moments.get(place.body, np.zeros(4)) + mass * np.append(centre, 1.0)
+        moments[place.body] = moments.get(place.body, np.zeros(4)) + link.mass * place.transform @ np.append(link.centre, 1.0)
     alike = {float(moment[3]) for moment in moments.values()}
     if len(moments) >= _FEWEST_ALIKE and len(alike) == 1:
         return Weights([], (f"every link weighs {alike.pop():g} kg: placeholders, which are left out",))
@@ -85,12 +81,12 @@ def weights_of(urdf: URDF, chain: UrdfChain, relative_std: float = RELATIVE_STD)
     return Weights(entries, tuple(notes))
 
 
-def gravity_in_base(urdf: URDF, base: str) -> list[float] | None:
+def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
     """Gravity in the axes of a link, m/s², where the root of the tree stands upright and the joints before it are at zero.
 
     Parameters
     ----------
-    urdf : yourdfpy.URDF
+    urdf : Urdf
     base : str
 
     Returns
@@ -100,29 +96,25 @@ def gravity_in_base(urdf: URDF, base: str) -> list[float] | None:
     """
     above, transform, at = parent_joints(urdf), np.eye(4), base
     while at in above:
-        transform = _at_zero(above[at]) @ transform
+        transform = above[at].origin @ transform
         at = above[at].parent
     gravity = np.round(-STANDARD_GRAVITY * transform[2, :3], _DECIMALS) + 0.0
     return None if gravity[2] == -STANDARD_GRAVITY else gravity.tolist()
 
 
-def _carried(urdf: URDF, link: str, chain: UrdfChain) -> tuple[Carried, list[str]] | None:
+def _carried(urdf: Urdf, link: str, chain: UrdfChain) -> tuple[Carried, list[str]] | None:
     """Where a link is on the chain, and the joints beside the chain that move it; None where the chain does not carry it."""
     above, transform, by, at = parent_joints(urdf), np.eye(4), [], link
     while at not in chain.links:
         if at not in above:
             return None
         joint = above[at]
-        transform = _at_zero(joint) @ transform
-        if joint.type != "fixed":
+        transform = joint.origin @ transform
+        if joint.kind != "fixed":
             by.append(joint.name)
         at = joint.parent
     place = chain.links[at]
     return type(place)(place.body, place.transform @ transform, place.behind_passive), by
-
-
-def _at_zero(joint: Any) -> np.ndarray:
-    return np.eye(4) if joint.origin is None else joint.origin
 
 
 def _entry(body: int, moment: np.ndarray, relative_std: float) -> dict[str, Any]:

@@ -87,7 +87,7 @@ def error_budget(
             shares.append(Share(name, rms, *limits))
     shares.sort(key=lambda share: -share.rms_m)
     off = pose_differences(*nominal_forward(calibrated.robot, reported_angles), whole, turned)
-    rest = predicted(calibrated, reported_angles, operating)
+    rest = predicted(calibrated, reported_angles, operating, draws=0)
     total, *ends = (
         Share(name, float(np.sqrt((length**2).mean())))
         for name, length in (

@@ -75,6 +75,6 @@ def workspace_errors(
         reported_angles,
         position,
         before_m(calibrated, position, rotation, off),
-        predicted(calibrated, reported_angles, operating).bound_m,
+        predicted(calibrated, reported_angles, operating, draws=0).bound_m,
         beyond_range(fitted_angles, calibrated.robot.model_angles(reported_angles)),
     )

@@ -1,0 +1,97 @@
+"""What is installed is used where it is installed for, and the public CI runs what is pinned, with the rights that it needs."""
+
+import ast
+import re
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+import yaml
+from packaging.requirements import Requirement
+
+ROOT = Path(__file__).resolve().parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+JOBS = yaml.safe_load((ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8"))["jobs"]
+WORKFLOW = (ROOT / ".github/workflows/ci.yml").read_text(encoding="utf-8")
+# Where a run begins, of what a wheel has too.
+RUN = [*ROOT.glob("src/**/*.py"), *ROOT.glob("workflow/rules/*.py"), *ROOT.glob("workflow/scripts/*.py")]
+AUDIT = [path for path in RUN if "audit" in path.parts]
+# Of the pipeline itself, and what pandas writes Markdown by.
+IMPORTED_BY_OTHERS = {"snakemake", "tabulate"}
+# It is where its package's own list of modules does not have it.
+DISTRIBUTIONS = packages_distributions() | {"pinocchio": ["pin"]}
+
+
+def names(requirements):
+    return {Requirement(text).name.lower() for text in requirements}
+
+
+def imported(paths):
+    """What is installed for each module that the files import, also within functions; several packages may share a module."""
+    found = set()
+    for path in paths:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            modules += [node.module] if isinstance(node, ast.ImportFrom) and node.module else []
+            found |= {module.partition(".")[0] for module in modules}
+    by_module = (DISTRIBUTIONS.get(module) for module in found)
+    return [{name.lower().replace("_", "-") for name in packages} for packages in by_module if packages]
+
+
+def test_what_every_user_installs_is_imported_by_what_every_user_runs():
+    """A package that a test alone needs is of the extra test; cvxpy was not, with 10 packages and 234 MB."""
+    assert names(PROJECT["dependencies"]) - set().union(*imported(RUN)) == IMPORTED_BY_OTHERS
+
+
+def test_what_a_run_imports_is_installed_and_the_audit_alone_needs_its_extra():
+    # Snakemake's plug-ins use its interfaces, which come with it.
+    given = names(PROJECT["dependencies"]) | {"elastocal", "snakemake-interface-logger-plugins"}
+    assert [packages for packages in imported(set(RUN) - set(AUDIT)) if not packages & given] == []
+    audit = names(PROJECT["optional-dependencies"]["audit"])
+    assert [packages for packages in imported(AUDIT) if not packages & given] == [audit] == [{"pin"}]
+
+
+@pytest.mark.parametrize("name", ["requirements", "requirements-cluster"])
+def test_the_pins_of_a_run_and_of_the_container_have_nothing_of_tests_and_audit(name):
+    pinned = set(re.findall(r"^([a-z0-9-]+)==", (ROOT / f"{name}.lock").read_text(encoding="utf-8"), re.MULTILINE))
+    extras = PROJECT["optional-dependencies"]
+    assert pinned >= names(PROJECT["dependencies"])
+    assert pinned & (names(extras["audit"]) | {"cvxpy", "pytest", "yourdfpy"}) == set()
+
+
+def steps():
+    return [(name, step) for name, job in JOBS.items() for step in job["steps"]]
+
+
+def test_an_action_is_named_by_its_commit_beside_its_version():
+    uses = re.findall(r"uses: (.*)", WORKFLOW)
+    assert len(uses) == len([step for _, step in steps() if "uses" in step]) > 5
+    assert [line for line in uses if not re.fullmatch(r"[\w-]+/[\w-]+@[0-9a-f]{40} # v\d+\.\d+\.\d+", line)] == []
+    assert len({line.partition("@")[0] for line in uses}) == len(set(uses)), "one action at two commits"
+
+
+def test_a_job_may_read_alone_but_for_the_one_that_signs_and_runs_nothing_else():
+    assert yaml.safe_load(WORKFLOW)["permissions"] == {"contents": "read"}
+    more = {name: job["permissions"] for name, job in JOBS.items() if "permissions" in job}
+    assert more == {"attest": {"attestations": "write", "id-token": "write"}}
+    assert JOBS["attest"]["if"] == "github.event_name != 'pull_request'"
+    assert [step["uses"].partition("@")[0] for step in JOBS["attest"]["steps"]] == [
+        "actions/download-artifact",
+        *2 * ["actions/attest"],
+    ]
+
+
+def test_a_checkout_leaves_no_credentials_behind():
+    checkouts = [step for _, step in steps() if step.get("uses", "").startswith("actions/checkout@")]
+    assert len(checkouts) == 2 and all(step["with"] == {"persist-credentials": False} for step in checkouts)
+
+
+def test_a_wheel_is_made_after_the_check_for_vulnerabilities_and_signed_with_the_list_of_packages():
+    commands = [step["run"] for step in JOBS["wheel"]["steps"] if "run" in step]
+    assert commands[0] == "make supply" and " pip wheel " in commands[1]
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8").split("\nsupply:")[1].split("\n\n")[0]
+    assert "cyclonedx-py environment" in recipe and "-o sbom.cdx.json" in recipe and "pip-audit" in recipe
+    signed = [step["with"] for step in JOBS["attest"]["steps"][1:]]
+    assert signed == [{"subject-path": "dist/*.whl"}, {"subject-path": "dist/*.whl", "sbom-path": "sbom.cdx.json"}]
+    assert JOBS["wheel"]["steps"][-1]["with"]["path"].split() == ["dist/*.whl", "sbom.cdx.json"]
