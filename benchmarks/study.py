@@ -25,7 +25,7 @@ FULL = Setting(("-j2", "study"), 7)
 # From seeds to a table, in three jobs.
 SMALL = Setting(("-j2", "reports/tables/table1.csv", "data/simulated/kuka/ideal.parquet", "--config", "data_sets=10"), 1)
 # Of results/: what Snakemake and `job.run`, which no reduced script calls, note on a job.
-NOTES = ("logs", "timings", "checksums", "jobs")
+NOTES = ("logs", "timings", "records")
 # Every recorded job in the order in which they ended, in this one process.
 ONE_PROCESS = """
 import pickle, sys

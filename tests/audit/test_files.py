@@ -5,8 +5,9 @@ from made_audits import CONFIGURATION, ROBOT, failed
 from planted_errors import forge
 
 from elastocal.audit.audited import Audited
-from elastocal.audit.files import described, intact, recorded
+from elastocal.audit.files import described, intact
 from elastocal.io.provenance import provenance
+from elastocal.io.records import recorded
 from elastocal.io.storage import write_table
 from elastocal.study.table_schemas import INITIAL
 
@@ -15,8 +16,7 @@ FILE = "results/initial/two.parquet"
 
 @pytest.fixture
 def run(tmp_path):
-    for folder in ("results/initial", "results/checksums/results/initial"):
-        (tmp_path / folder).mkdir(parents=True)
+    (tmp_path / "results/initial").mkdir(parents=True)
     return Audited(tmp_path, CONFIGURATION, {"two": ROBOT}, {}, 4)
 
 

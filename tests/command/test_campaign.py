@@ -1,15 +1,66 @@
-"""Where the result of a campaign is looked for."""
+"""Where the result of a campaign is looked for, and by which libraries and pins it may have been made."""
 
-from types import SimpleNamespace
+import pytest
+from analysed_robots import ROBOTS
+from certified import certified_checkout, record_jobs
+from support import refused
+from typer.testing import CliRunner
 
+from elastocal.campaigns.reading import campaign_files
 from elastocal.command import campaign
+from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.main import app
+from elastocal.io.origin import environment
 
 
-def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(tmp_path, monkeypatch):
-    asked = []
+@pytest.fixture(scope="module")
+def top(tmp_path_factory):
+    found = tmp_path_factory.mktemp("cell")
+    certified_checkout(found)
+    return found
+
+
+def test_robots_are_those_of_the_pipeline_and_results_those_of_the_workplace(top, tmp_path, monkeypatch):
+    (tmp_path / "installed").mkdir()
+    (tmp_path / "installed/config").symlink_to(ROBOTS.parent)
     monkeypatch.setattr(campaign, "pipeline", lambda: tmp_path / "installed")
-    monkeypatch.setattr(campaign, "workplace", lambda: tmp_path / "here")
-    found = SimpleNamespace(name="cell7")
-    monkeypatch.setattr("elastocal.loop.calibrated_files.load_diagnosed", lambda *where: asked.append(where) or found)
-    campaign.diagnosed_campaign(tmp_path / "cell7")
-    assert asked == [(tmp_path / "cell7", tmp_path / "installed" / "config" / "robots", tmp_path / "here" / "results" / "loop")]
+    monkeypatch.setattr(campaign, "workplace", lambda: top)
+    assert diagnosed_campaign(top / "made").name == "made"
+
+
+WANTED = {
+    "certificate": ["--tolerance", "0.5mm"],
+    "correct": ["nowhere.csv", "--output", "targets.csv"],
+    "export": ["--output", "out"],
+}
+# What ends each once it has read the results; an export is made.
+NOWHERE = {"certificate": ["--compare", "nowhere"], "correct": [], "export": []}
+
+
+def edited_pins(top):
+    (top / "requirements.lock").write_text("numpy==2.0\n", encoding="utf-8")
+    return "requirements.lock none", "requirements.lock "
+
+
+def another_numpy(_):
+    record_jobs("made", campaign_files("made", ROBOTS), environment(".") | {"numpy": "1.0"})
+    return "numpy 1.0", f"numpy {environment('.')['numpy']}"
+
+
+@pytest.mark.parametrize("change", [edited_pins, another_numpy])
+def test_results_of_another_environment_are_refused_by_every_command_unless_that_is_accepted(top, monkeypatch, capsys, change):
+    monkeypatch.chdir(top)
+    was, now = change(top)
+    for command, words in WANTED.items():
+        result = CliRunner().invoke(app, [command, "made", *words])
+        with refused(
+            "made", "", f"results by {was}", f"those of now, {now}", "elastocal diagnose made; or --accept-environment"
+        ):
+            raise result.exception
+    assert diagnosed_campaign(top / "made", True).name == "made"
+    assert capsys.readouterr().err.startswith(f"warning: {top}/made: found results by {was}")
+    for command, words in WANTED.items():
+        result = CliRunner().invoke(app, [command, "made", *words, *NOWHERE[command], "--accept-environment"])
+        assert "nowhere" in str(result.exception) or result.exit_code == 0
+    (top / "requirements.lock").unlink(missing_ok=True)
+    record_jobs("made", campaign_files("made", ROBOTS))

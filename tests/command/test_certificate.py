@@ -1,17 +1,19 @@
 import json
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 import yaml
-from analysed_robots import analysed
-from certified import certified_checkout
+from analysed_robots import ROBOTS, analysed
+from certified import certified_checkout, record_jobs
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
 from elastocal.application.calibrated import nominal_forward
+from elastocal.campaigns.reading import campaign_files
 from elastocal.command.main import app
 from elastocal.errors import InputError
 
@@ -75,27 +77,15 @@ def test_bad_options_end_in_one_line_and_write_nothing(run, top, tmp_path, words
     assert not (tmp_path / "out").exists()
 
 
-def test_data_at_fault_get_no_certificate(run, top, tmp_path):
-    path = top / "reports" / "loop" / "made" / "verdict.json"
-    before = path.read_text()
-    verdict = json.loads(before)
-    verdict["effects"] = [{"family": "data", "name": "wrong_sign"}]
+def test_data_at_fault_get_no_certificate(run, top, tmp_path, monkeypatch):
+    shutil.copytree(top, tmp_path / "top", symlinks=True)
+    monkeypatch.chdir(tmp_path / "top")
+    path = Path("reports/loop/made/verdict.json")
+    verdict = json.loads(path.read_text()) | {"effects": [{"family": "data", "name": "wrong_sign"}], "accuracy": None}
     path.write_text(json.dumps(verdict))
-    try:
-        result = run(top / "made", "--tolerance", "0.5mm", "--output", tmp_path / "out")
-    finally:
-        path.write_text(before)
+    record_jobs("made", campaign_files("made", ROBOTS))
+    result = CliRunner().invoke(app, ["certificate", "made", "--tolerance", "0.5mm", "--output", "out"])
     assert isinstance(result.exception, InputError) and "data at fault" in str(result.exception)
-
-
-def test_a_campaign_without_a_report_is_refused(run, top, tmp_path):
-    path = top / "reports" / "loop" / "made" / "before_after.csv"
-    path.rename(tmp_path / "kept")
-    try:
-        result = run(top / "made", "--tolerance", "0.5mm", "--output", tmp_path / "out")
-    finally:
-        (tmp_path / "kept").rename(path)
-    assert isinstance(result.exception, InputError) and "elastocal diagnose" in str(result.exception)
 
 
 @pytest.fixture(scope="module")

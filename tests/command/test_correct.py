@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import ROBOTS, analysed
-from diagnosed_folders import diagnosed_folder
+from certified import certified_checkout
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
@@ -22,13 +22,7 @@ BENT = np.array([0.0, 0.2, 0.1, 0.3, 0.7, 0.0])
 def cell(tmp_path_factory):
     """A checkout with a diagnosed campaign in it."""
     top = tmp_path_factory.mktemp("cell")
-    (top / "config").mkdir()
-    (top / "config" / "robots").symlink_to(ROBOTS)
-    (top / "Snakefile").touch()
-    folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
-    (top / "results" / "loop").mkdir()
-    (results / "made").rename(top / "results" / "loop" / "made")
-    return top, folder
+    return top, certified_checkout(top)
 
 
 def path_file(folder: Path, angles: np.ndarray) -> Path:
@@ -55,7 +49,7 @@ def test_the_targets_bring_the_diagnosed_robot_to_the_wanted_poses(monkeypatch, 
     assert result.exit_code == 0, result.stderr
     assert "8 of 8 targets corrected" in result.stderr
     targets = pd.read_csv(output)
-    robot = load_diagnosed(cell[1], ROBOTS, cell[0] / "results" / "loop").calibrated
+    robot = load_diagnosed(cell[1], ROBOTS, cell[0]).calibrated
     reached, _ = forward(robot, targets[[f"q{j}" for j in range(1, 7)]].to_numpy())
     wanted, _ = nominal_forward(robot.robot, angles)
     np.testing.assert_allclose(reached, wanted, atol=1e-7)

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from analysed_robots import ROBOTS, analysed
-from diagnosed_folders import diagnosed_folder
+from analysed_robots import analysed
+from certified import certified_checkout
 from typer.testing import CliRunner
 
 from elastocal.campaigns.reading import read_robot
@@ -19,13 +19,7 @@ from elastocal.mechanics.kinematics import poses
 @pytest.fixture(scope="module")
 def cell(tmp_path_factory):
     top = tmp_path_factory.mktemp("cell")
-    (top / "config").mkdir()
-    (top / "config" / "robots").symlink_to(ROBOTS)
-    (top / "Snakefile").touch()
-    folder, results = diagnosed_folder(top, analysed("kuka"), ROBOTS)
-    (top / "results" / "loop").mkdir()
-    (results / "made").rename(top / "results" / "loop" / "made")
-    return top, folder
+    return top, certified_checkout(top)
 
 
 def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, cell):

@@ -4,8 +4,8 @@ import hashlib
 from pathlib import Path
 
 from elastocal.crate.data_package import data_package
-from elastocal.io.job_records import JobRecord
 from elastocal.io.origin import Origin
+from elastocal.io.records import JobRecord
 
 
 def test_each_csv_below_the_folder_has_its_columns_digest_and_origin(tmp_path, monkeypatch):
@@ -15,7 +15,7 @@ def test_each_csv_below_the_folder_has_its_columns_digest_and_origin(tmp_path, m
     Path("reports/tables/Table_1.csv").write_text(text)
     Path("reports/empty.csv").write_text("\n")
     outputs = ("reports/empty.csv", "reports/tables/Table_1.csv", "reports/tables/table1.md", "results/other.csv")
-    job = JobRecord("tabulate", {}, "a", "b", (), outputs, Origin("c0ffee", "d16e57", 7))
+    job = JobRecord("tabulate", {}, "a", "b", {}, (), outputs, Origin("c0ffee", "d16e57", 7), {})
     empty, resource = data_package([job], "reports", "MIT")["resources"]
     assert empty["schema"]["fields"] == []
     assert (resource["path"], resource["name"]) == ("tables/Table_1.csv", "tables-table_1")

@@ -12,9 +12,9 @@ from rocrate.rocrate import ROCrate
 from elastocal.crate.run_crate import FinishedRun, run_crate
 from elastocal.crate.software import Package
 from elastocal.errors import InputError
-from elastocal.io.job_records import JobRecord
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import Origin
+from elastocal.io.records import JobRecord
 
 ORIGIN = Origin("c0ffee", "d16e57", 7)
 WORDS = {"name": "a run", "description": "It ran.", "author": "the developers", "licence": "MIT"}
@@ -35,7 +35,7 @@ TEXTS = {
 def record(rule, hour, inputs, output):
     sources = [f"workflow/scripts/{rule}.py", "src/elastocal/model.py"]
     times = (f"2026-01-01T{hour:02}:00:00+00:00", f"2026-01-01T{hour:02}:30:00+00:00")
-    return JobRecord(rule, {"robot": "kuka"}, *times, (*inputs, *sources), (output,), ORIGIN)
+    return JobRecord(rule, {"robot": "kuka"}, *times, dict.fromkeys((*inputs, *sources), ""), (), (output,), ORIGIN, {})
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def contents(study):
     return {
         name: hashlib.sha256(path.read_bytes()).hexdigest()
         for name, path in named.items()
-        if not name.startswith(("results/logs/", "results/timings/", "results/jobs/"))
+        if not name.startswith(("results/logs/", "results/timings/", "results/records/"))
     }
 
 

@@ -1,5 +1,6 @@
-"""A diagnosed campaign with its reports, as a certificate is made of it."""
+"""A diagnosed campaign with its reports and the records of its jobs, as a certificate is made of it."""
 
+import contextlib
 import shutil
 from dataclasses import replace
 
@@ -7,7 +8,16 @@ from analysed_robots import ROBOTS, analysed
 from loop_scripts import ANALYSIS, run_loop
 from made_folders import PLAN, made_folder, made_table
 
-REPORTS = {"verdict.json": "verdict.json", "before_after.csv": "before_after.csv", "residuals.parquet": "residuals.parquet"}
+from elastocal.campaigns.reading import campaign_files
+from elastocal.io.origin import Origin, environment
+from elastocal.io.records import JobRecord, input_digests, write_records
+
+# A module by which all was made.
+ENGINE = "src/engine.py"
+TABLES = ("campaign.json", "training.parquet", "held_out.parquet")
+FOUND = ("diagnosis.json", "steps.parquet", "correlations.parquet", "models.parquet", "confounding.parquet")
+REPORTS = ("verdict.json", "before_after.csv", "residuals.parquet")
+REPORT = "report.html"
 
 
 # Of which eight judge, as a pass needs.
@@ -26,6 +36,8 @@ def certified_checkout(top, name="made", offset=3e-4):
         (top / "config").mkdir()
         (top / "config" / "robots").symlink_to(ROBOTS)
         (top / "Snakefile").touch()
+        (top / ENGINE).parent.mkdir()
+        (top / ENGINE).write_text("'''Made it.'''\n", encoding="utf-8")
     robot = analysed("kuka")
     folder = made_folder(top / name, robot, name, table=made_table(robot, name, plan=_PLAN, offset_of_joint_3=offset))
     out = run_loop(folder, ROBOTS, top / "results" / "loop" / name, ANALYSIS)
@@ -34,4 +46,24 @@ def certified_checkout(top, name="made", offset=3e-4):
     reports.mkdir(parents=True)
     for file in REPORTS:
         shutil.move(out / file, reports / file)
+    (reports / REPORT).write_text("A report.\n", encoding="utf-8")
+    with contextlib.chdir(top):
+        record_jobs(name, campaign_files(folder, ROBOTS))
     return folder
+
+
+def record_jobs(name, files, installed=None):
+    """Keep the records of the jobs behind a campaign's report, in the working directory."""
+    tables, found = ([f"results/loop/{name}/{file}" for file in files] for files in (TABLES, FOUND))
+    reports = [f"reports/loop/{name}/{file}" for file in REPORTS]
+    jobs = {
+        "read_campaign": (files, tables),
+        "diagnose_campaign": (tables[:2], found),
+        "judge_campaign": (tables + found[:2], reports),
+        "compile_loop_report": (tables + found + reports, [f"reports/loop/{name}/{REPORT}"]),
+    }
+    for number, (rule, (inputs, outputs)) in enumerate(jobs.items()):
+        digests, own = input_digests([*inputs, ENGINE], None if number else [ENGINE])
+        times = f"2026-01-01T00:00:0{number}", f"2026-01-01T00:00:0{number + 1}"
+        origin, here = Origin("c0ffee", "d16e57", 1), installed or environment(".")
+        write_records(JobRecord(rule, {"campaign": name}, *times, digests, own, tuple(outputs), origin, here))

@@ -29,6 +29,7 @@ def made_document(decision="pass", comparison=None, repeats=True, measured=False
         "serial": "",
         "date": "2026-11-23",
         "versions": {"elastocal": "0.1.0"},
+        "origin": {"commit": "c0ffee", "code_sha256": "cd" * 32, "data_sha256": "da" * 32, "environment": {"numpy": "2"}},
         "files": {"campaign.yaml": "ab" * 32},
         "verdict": "named",
         "effects": ["lost_motion"],

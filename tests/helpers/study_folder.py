@@ -11,7 +11,7 @@ import yaml
 from durations import HUNG_S
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-SOURCES = ("Snakefile", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
+SOURCES = ("Snakefile", "requirements.lock", "config.yaml", "config", "workflow", "profiles", "src", "README.md")
 ROBOTS = ("kuka", "kuka_extended")
 NOISE = ("0", "200")
 STRATEGIES = ("6DoF", "4-6DoF-after-3DoF", "3+6DoF-comb")

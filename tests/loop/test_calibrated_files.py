@@ -1,17 +1,19 @@
-"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while the campaign is as it was."""
+"""The calibrated robot comes from the tables of a diagnosis as it was fitted, and only while all behind it is as it was."""
 
-import re
+import hashlib
+import json
 import shutil
 
 import numpy as np
 import pandas as pd
 import pytest
-from diagnosed_folders import diagnosed_folder
+from analysed_robots import ROBOTS
+from certified import ENGINE, certified_checkout
 from support import refused
 
 from elastocal.application.calibrated import calibrated_from
-from elastocal.io.checksums import record_checksums
 from elastocal.io.json_files import read_json
+from elastocal.io.origin import environment
 from elastocal.io.storage import read_table
 from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.diagnosis_tables import diagnosis_from
@@ -19,14 +21,22 @@ from elastocal.loop.schemas import STEPS
 
 
 @pytest.fixture(scope="module")
-def made(kuka, config_folder, tmp_path_factory):
-    return diagnosed_folder(tmp_path_factory.mktemp("calibrated"), kuka, config_folder / "robots")
+def made(tmp_path_factory):
+    top = tmp_path_factory.mktemp("calibrated")
+    certified_checkout(top)
+    return top
 
 
-def test_the_robot_is_that_of_the_final_fit(made, config_folder):
-    folder, results = made
-    found = load_diagnosed(folder, config_folder / "robots", results)
-    tables = results / "made"
+@pytest.fixture
+def changed(made, tmp_path):
+    """A copy, to be changed."""
+    shutil.copytree(made, tmp_path / "top", symlinks=True)
+    return tmp_path / "top"
+
+
+def test_the_robot_is_that_of_the_final_fit(made):
+    found = load_diagnosed(made / "made", ROBOTS, made)
+    tables = made / "results/loop/made"
     steps = read_table(tables / "steps.parquet", STEPS)
     again = diagnosis_from(found.case, read_json(tables / "diagnosis.json"), steps)
     expected = calibrated_from(again.final, found.case.campaign.robot)
@@ -37,12 +47,28 @@ def test_the_robot_is_that_of_the_final_fit(made, config_folder):
     assert (found.calibrated.noise.joint_rad >= expected.noise.joint_rad).all()
     assert found.calibrated.scope.frame == ("robot" if found.case.model.fitted_frames else "base")
     assert found.verdict["campaign"] == found.name == "made"
+    assert found.calibrated.scope.form_m == found.verdict["accuracy"]["form_m"]
 
 
-def test_the_folder_may_have_moved(made, config_folder, tmp_path):
-    folder, results = made
-    shutil.copytree(folder, tmp_path / "elsewhere")
-    assert load_diagnosed(tmp_path / "elsewhere", config_folder / "robots", results).name == "made"
+def test_it_says_what_code_data_and_environment_made_it(made):
+    origin = load_diagnosed(made / "made", ROBOTS, made).origin
+
+    def digest(value):
+        return hashlib.sha256(json.dumps(value, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+    files = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in (made / "made").iterdir()}
+    files["kuka.yaml"] = hashlib.sha256((ROBOTS / "kuka.yaml").read_bytes()).hexdigest()
+    assert origin == {
+        "commit": "c0ffee",
+        "code_sha256": digest({ENGINE: hashlib.sha256((made / ENGINE).read_bytes()).hexdigest()}),
+        "data_sha256": digest(sorted(files.items())),
+        "environment": environment(made),
+    }
+
+
+def test_the_folder_may_have_moved(made, tmp_path):
+    shutil.copytree(made / "made", tmp_path / "elsewhere")
+    assert load_diagnosed(tmp_path / "elsewhere", ROBOTS, made).name == "made"
 
 
 def another_seed(folder):
@@ -59,31 +85,38 @@ def moved_row(row):
     return change
 
 
-@pytest.mark.parametrize("change", [another_seed, *(moved_row(row) for row in range(0, 60, 12))])
-def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(made, config_folder, tmp_path, change):
-    folder, results = made
-    shutil.copytree(folder, tmp_path / "changed")
+def no_measurements(folder):
+    (folder / "measurements.csv").unlink()
+
+
+def another_table(folder):
+    (folder / "measurements.parquet").touch()
+
+
+@pytest.mark.parametrize(
+    "change", [another_seed, no_measurements, another_table, *(moved_row(row) for row in range(0, 60, 12))]
+)
+def test_a_campaign_that_has_changed_since_is_refused_be_it_in_a_held_out_row(made, tmp_path, change):
+    shutil.copytree(made / "made", tmp_path / "changed")
     change(tmp_path / "changed")
     with refused((tmp_path / "changed").as_posix(), "", "changes since its diagnosis", "elastocal diagnose"):
-        load_diagnosed(tmp_path / "changed", config_folder / "robots", results)
+        load_diagnosed(tmp_path / "changed", ROBOTS, made)
 
 
-def test_a_campaign_that_was_never_diagnosed_is_refused(made, config_folder, tmp_path):
-    with refused(made[0].as_posix(), "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
-        load_diagnosed(made[0], config_folder / "robots", tmp_path)
+def test_a_robot_file_that_has_changed_since_is_refused(made, tmp_path):
+    shutil.copytree(ROBOTS, tmp_path / "robots")
+    with open(tmp_path / "robots/kuka.yaml", "a", encoding="utf-8") as file:
+        file.write("# edited\n")
+    with refused(made / "made", "", "changes since its diagnosis", "elastocal diagnose"):
+        load_diagnosed(made / "made", tmp_path / "robots", made)
 
 
-def test_a_file_of_the_diagnosis_that_was_altered_is_refused(made, config_folder, tmp_path, monkeypatch):
-    """Where the pipeline has them, in results/loop; a number of diagnosis.json alone would move every target."""
-    folder, results = made
-    shutil.copytree(results / "made", tmp_path / "results/loop/made")
-    monkeypatch.chdir(tmp_path)
-    record_checksums(path.relative_to(tmp_path).as_posix() for path in (tmp_path / "results/loop/made").iterdir())
-    assert load_diagnosed(folder, config_folder / "robots", "results/loop").name == "made"
-    diagnosis = tmp_path / "results/loop/made/diagnosis.json"
-    text = diagnosis.read_text(encoding="utf-8")
-    place = re.search(r"\.\d*(\d)", text).start(1)
-    diagnosis.write_text(text[:place] + str((int(text[place]) + 1) % 10) + text[place + 1 :], encoding="utf-8")
-    monkeypatch.chdir(tmp_path.parent)
-    with refused(diagnosis, "", "other contents than were written"):
-        load_diagnosed(folder, config_folder / "robots", tmp_path / "results/loop")
+def test_a_campaign_that_was_never_diagnosed_is_refused(made, tmp_path):
+    with refused(made / "made", "", "no diagnosis of it in ", tmp_path.as_posix(), "elastocal diagnose"):
+        load_diagnosed(made / "made", ROBOTS, tmp_path)
+
+
+def test_results_of_another_engine_are_refused(changed):
+    (changed / ENGINE).write_text("'''Another version.'''\n", encoding="utf-8")
+    with refused(changed / ENGINE, "", "not what read_campaign made was made with", f"elastocal diagnose {changed}/made"):
+        load_diagnosed(changed / "made", ROBOTS, changed)

@@ -5,13 +5,12 @@ import json
 from dataclasses import replace
 
 import numpy as np
-import pandas as pd
 import pytest
 from analysed_robots import ROBOTS
 from certified import certified_checkout
 
 from elastocal.application.accuracy import accuracy_from, accuracy_sentence
-from elastocal.loop.calibrated_files import judged_as, load_diagnosed
+from elastocal.loop.calibrated_files import load_diagnosed
 from elastocal.loop.certificate import Wanted, certificate
 
 WANTED = Wanted(2e-4, 0.05, "SN 7", "2026-11-23", 1)
@@ -25,21 +24,17 @@ def top(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def parts(top):
-    reports = top / "reports" / "loop" / "made"
-    verdict = json.loads((reports / "verdict.json").read_text())
-    steps = pd.read_csv(reports / "before_after.csv")
-    found = load_diagnosed(top / "made", ROBOTS, top / "results" / "loop")
-    return judged_as(found, verdict), verdict, steps
+def diagnosed(top):
+    return load_diagnosed(top / "made", ROBOTS, top)
 
 
 @pytest.fixture(scope="module")
-def found(top, parts):
-    return certificate(top / "made", ROBOTS, *parts, WANTED, parts[0])
+def found(top, diagnosed):
+    return certificate(top / "made", ROBOTS, diagnosed, WANTED, diagnosed)
 
 
-def test_one_accuracy_stands_in_headline_budget_and_report(found, parts):
-    document, verdict = found[0], parts[1]
+def test_one_accuracy_stands_in_headline_budget_and_report(found, diagnosed):
+    document, verdict = found[0], diagnosed.verdict
     assert document["accuracy"] == document["predicted"]
     assert accuracy_sentence(accuracy_from(verdict["accuracy"])) == accuracy_sentence(accuracy_from(document["accuracy"]))
     assert document["accuracy"]["kind"] == "predicted" and document["measured"] is None
@@ -51,24 +46,25 @@ def test_one_accuracy_stands_in_headline_budget_and_report(found, parts):
     assert document["held_out"][-1]["max_m_low"] is None
 
 
-def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, top, parts):
+def test_a_certificate_passes_below_and_fails_above_what_is_predicted(found, top, diagnosed):
     limits = (0.2, 2.0)
     wanted = [replace(WANTED, tolerance_m=share * found[0]["accuracy"]["rms_m"]) for share in limits]
-    found = [certificate(top / "made", ROBOTS, *parts, each)[0]["conformity"]["decision"] for each in wanted]
+    found = [certificate(top / "made", ROBOTS, diagnosed, each)[0]["conformity"]["decision"] for each in wanted]
     assert found == ["fail", "pass"]
 
 
-def test_it_states_what_it_is_of(found, top):
+def test_it_states_what_it_is_of(found, top, diagnosed):
     document = found[0]
     assert (document["serial"], document["date"], document["campaign"]) == ("SN 7", "2026-11-23", "made")
     assert document["files"]["campaign.yaml"] == hashlib.sha256((top / "made" / "campaign.yaml").read_bytes()).hexdigest()
+    assert document["origin"] == diagnosed.origin and document["origin"]["commit"] == "c0ffee"
     assert set(document["versions"]) == {"elastocal", "numpy", "scipy", "python"}
     json.dumps(document, allow_nan=False)
 
 
-def test_the_map_is_drawn_without_load_and_under_the_largest(found, parts):
+def test_the_map_is_drawn_without_load_and_under_the_largest(found, diagnosed):
     document, maps = found
-    largest = np.linalg.norm(parts[0].case.observations.states.wrench[:, :3], axis=1).max()
+    largest = np.linalg.norm(diagnosed.case.observations.states.wrench[:, :3], axis=1).max()
     assert [each["force_N"] for each in document["workspace"]] == [0.0, pytest.approx(largest)]
     np.testing.assert_array_equal(maps[0].joint_angles, maps[1].joint_angles)
     assert (maps[0].bound_m > 0).all()
@@ -80,6 +76,6 @@ def test_a_campaign_compared_with_itself_has_not_changed(found):
     assert comparison["changes"][0]["before"] == comparison["changes"][0]["after"]
 
 
-def test_the_same_seed_gives_the_same_certificate(found, top, parts):
-    again, _ = certificate(top / "made", ROBOTS, *parts, WANTED, parts[0])
+def test_the_same_seed_gives_the_same_certificate(found, top, diagnosed):
+    again, _ = certificate(top / "made", ROBOTS, diagnosed, WANTED, diagnosed)
     assert again == found[0]

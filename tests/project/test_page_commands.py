@@ -62,9 +62,9 @@ ELSEWHERE = {
     ),
     "mkdir -p campaigns/cell7": (".ci/run", "mkdir -p campaigns/cell7"),
     "snakemake -j2 diagnose --config campaign=PATH": (".ci/run", "snakemake -j2 diagnose --config campaign=campaigns/cell7"),
-    "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet": (
+    "python -m elastocal.io.records | sha256sum --check --quiet": (
         "tests/workflow/test_crate.py",
-        "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet",
+        ".venv/bin/python -m elastocal.io.records | sha256sum --check --quiet",
     ),
     "snakemake --profile profiles/slurm study": ("tests/workflow/test_slurm.py", '"--profile", str(profile)'),
     "snakemake -j2 store --config store=s3://BUCKET/FOLDER": ("tests/workflow/test_store.py", 'STORE = ("store", "--config"'),

@@ -6,18 +6,10 @@ import sys
 import pytest
 
 from elastocal.errors import InputError
-from elastocal.io.checksums import check_checksums
-from elastocal.io.job_records import read_job_records
+from elastocal.io.records import RECORDS, input_digests, read_record
 
-# Texts for people: of what a job said and how long it took no job makes anything. The records of checksums judge the others.
-NOT_READ = ("results/logs/", "results/timings/", "results/checksums/")
-
-
-def read_next(name):
-    """As a job or a command begins."""
-    check_checksums([name])
-    if name.startswith("results/jobs/"):
-        read_job_records()
+# Texts for people: of what a job said and how long it took no job makes anything.
+NOT_READ = ("results/logs/", "results/timings/")
 
 
 def altered_bytes(folder, flips, seed):
@@ -43,13 +35,16 @@ def altered_bytes(folder, flips, seed):
     for name in (name for name in names if not name.startswith(NOT_READ) and name.count("/") > 1):
         path = folder / name
         written = path.read_bytes()
-        meant = read_job_records() if name.startswith("results/jobs/") else None
+        output = (
+            name.removeprefix(f"{RECORDS.as_posix()}/").removesuffix(".json") if path.is_relative_to(folder / RECORDS) else name
+        )
+        meant = read_record(output)
         for _ in range(flips):
             place, bit = draws.randrange(len(written)), 1 << draws.randrange(8)
             path.write_bytes(written[:place] + bytes([written[place] ^ bit]) + written[place + 1 :])
             try:
-                read_next(name)
-                same = meant is not None and meant == read_job_records()
+                input_digests([output])
+                same = output != name and meant == read_record(output)
                 counts["harmless" if same else "missed"] += 1
                 missed += [] if same else [f"{name} at {place}"]
             except InputError:
@@ -63,7 +58,7 @@ def test_any_altered_byte_is_found(finished, monkeypatch):
     monkeypatch.chdir(finished.folder)
     counts, missed = altered_bytes(finished.folder, 1, 5)
     assert missed == []
-    # Of a record of a job a blank is harmless; of any other file every byte counts.
+    # Of a record a blank is harmless; of any other file every byte counts.
     assert counts["found"] > 100 and counts["harmless"] < counts["found"] / 10
 
 

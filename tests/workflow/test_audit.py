@@ -68,7 +68,7 @@ def test_every_column_of_the_tables_is_followed_but_the_words_of_interpretations
 
 def found_in(folder, file, plant, run_of):
     """Files with findings once an error is planted; the file is put back."""
-    changed = [folder / file, folder / f"results/checksums/{file}.sha256"]
+    changed = [folder / file, folder / f"results/records/{file}.json"]
     before = [path.read_bytes() for path in changed]
     plant(folder)
     found = audit(run_of(folder), {file})

@@ -108,6 +108,24 @@ def test_a_new_commit_of_unchanged_sources_reruns_nothing(finished):
     assert finished.planned() == set()
 
 
+def test_an_edited_list_of_pins_reruns_every_job(finished, every_job):
+    finished.append("requirements.lock", "# edited\n")
+    assert finished.planned() == every_job
+
+
+def test_another_library_reruns_every_job(finished, every_job):
+    """Of two on the path the first counts."""
+    finished.path("src/numpy-1.0.dist-info").mkdir()
+    finished.path("src/numpy-1.0.dist-info/METADATA").write_text("Name: numpy\nVersion: 1.0\n", encoding="utf-8")
+    assert finished.planned() == every_job
+
+
+def test_pins_of_tests_clusters_and_crates_rerun_nothing(finished):
+    for name in ("test", "cluster", "crate", "install"):
+        finished.path(f"requirements-{name}.lock").write_text("# edited\n", encoding="utf-8")
+    assert finished.planned() == set()
+
+
 def test_a_strategy_with_other_stages_reruns_that_strategy(finished):
     """The points that it reads are the same, so the bounds are."""
     finished.replace(

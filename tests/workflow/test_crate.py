@@ -11,8 +11,10 @@ import pytest
 from rocrate.rocrate import ROCrate
 from study_folder import REPOSITORY
 
+from elastocal.io.records import read_record
+
 # As the pages have it.
-CHECK_ALL = "find results/checksums -name '*.sha256' -exec cat {} + | sha256sum --check --quiet"
+CHECK_ALL = ".venv/bin/python -m elastocal.io.records | sha256sum --check --quiet"
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +41,15 @@ def test_the_crate_describes_every_result_as_it_is_and_nothing_of_the_machine(st
 def test_every_job_of_the_study_is_an_action(study):
     crate = ROCrate(study.folder)
     actions = [entity for entity in crate.get_entities() if entity.type == "CreateAction"]
-    records = set(study.files("results/jobs/**/*.json")) - {"results/jobs/write_crate.json"}
+    names = [name.removeprefix("results/records/")[:-5] for name in study.files("results/records/**/*.json")]
+    jobs = {read_record(name, study.folder)[0].name for name in names} - {"write_crate"}
     # One more: the run as a whole.
-    assert len(actions) == len(records) + 1
+    assert len(actions) == len(jobs) + 1
     assert all(action["actionStatus"].endswith("CompletedActionStatus") for action in actions)
 
 
 def test_configuration_software_and_tables_stand_beside_it(study):
-    origin = json.loads(study.path("results/jobs/write_crate.json").read_text("utf-8"))["origin"]
+    origin = json.loads(study.path("results/records/ro-crate-metadata.json.json").read_text("utf-8"))["origin"]
     digest = hashlib.sha256(study.path("reports/configuration.json").read_bytes()).hexdigest()
     assert digest == origin["configuration_sha256"]
     assert {"snakemake", "numpy", "pyarrow"} <= set(pd.read_csv(study.path("reports/software.csv"))["name"])
@@ -64,7 +67,8 @@ def check(folder):
 
 
 def check_in_a_shell(folder):
-    return subprocess.run(CHECK_ALL, shell=True, cwd=folder, capture_output=True, text=True)
+    command = CHECK_ALL.replace(".venv/bin/python", sys.executable)
+    return subprocess.run(command, shell=True, cwd=folder, capture_output=True, text=True)
 
 
 def test_an_altered_and_a_missing_file_are_found(study, tmp_path):

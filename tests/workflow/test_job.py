@@ -1,11 +1,13 @@
 """What every script does around its one call: whatever ends it, the log says why, and bad input is one line."""
 
 import errno
+import hashlib
 import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from study_folder import REPOSITORY
 
@@ -15,7 +17,7 @@ from job import run
 
 from elastocal.errors import InputError
 
-INPUT, OUTPUT = "data/a.csv", "results/b.csv"
+INPUT, OUTPUT = "own/a.csv", "results/b.csv"
 
 
 def job_of(**files):
@@ -26,7 +28,7 @@ def job_of(**files):
 @pytest.fixture
 def job(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for folder in ("data", "results/logs", ".snakemake"):
+    for folder in ("own", "results/logs", ".snakemake"):
         (tmp_path / folder).mkdir(parents=True)
     (tmp_path / INPUT).write_text("1\n")
     return job_of(input=[INPUT], output=[OUTPUT], log=["results/logs/b.log"])
@@ -56,9 +58,9 @@ def test_what_a_job_wrote_is_checked_by_the_next(job):
     ("fault", "line"),
     [
         (InputError("a.csv", "row 1", "x", "y"), "a.csv: row 1: found x; allowed: y"),
-        (OSError(errno.ENOSPC, "No space left on device"), f"{OUTPUT}: found No space left on device; allowed: a disk with"),
+        (OSError(errno.ENOSPC, "No space left on device"), f"{OUTPUT}: found No space left on device; allowed: a place with space"),
         (PermissionError(errno.EROFS, "Read-only file system", "results/x"), "results/x: found Read-only file system; "),
-        (MemoryError(), "memory: found none left; allowed: more memory, or fewer jobs"),
+        (MemoryError(), "memory: found none left; allowed: a smaller file, more memory, or fewer jobs"),
     ],
 )
 def test_bad_input_and_faults_of_the_machine_are_one_line(job, fault, line):
@@ -90,8 +92,10 @@ def test_a_log_that_cannot_be_written_hides_no_fault(job):
 
 def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_and_from_what(job):
     run(copied, job)
-    record = json.loads(Path("results/jobs/b.json").read_text(encoding="utf-8"))
-    assert record["inputs"] == [INPUT] and record["outputs"] == [OUTPUT]
+    record = json.loads(Path("results/records/results/b.csv.json").read_text(encoding="utf-8"))
+    digest = hashlib.sha256(b"1\n").hexdigest()
+    assert record["inputs"] == {INPUT: digest} and record["outputs"] == [OUTPUT] and record["files"] == {OUTPUT: digest}
+    assert record["environment"]["numpy"] == np.__version__ and "requirements.lock" in record["environment"]
     assert (record["rule"], record["wildcards"], record["origin"]) == ("copy", {"robot": "kuka"}, job.config["origin"])
     assert record["started"] <= record["ended"] and record["ended"].endswith("+00:00")
 
@@ -99,4 +103,11 @@ def test_a_job_that_ended_well_leaves_a_record_of_what_it_read_and_wrote_when_an
 def test_a_job_that_failed_leaves_none(job):
     with pytest.raises(SystemExit):
         run(lambda _: (_ for _ in ()).throw(InputError("a", "", "x", "y")), job)
-    assert not Path("results/jobs").exists()
+    assert not Path("results/records").exists()
+
+
+def test_what_other_jobs_make_needs_their_record(job):
+    run(copied, job)
+    Path("results/records/results/b.csv.json").unlink()
+    with pytest.raises(SystemExit, match=f"^{OUTPUT}: found no record of the job that made it"):
+        run(copied, job_of(input=[OUTPUT], output=["results/c.csv"], log=["results/logs/c.log"]))

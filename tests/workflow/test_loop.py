@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,11 @@ import pytest
 import yaml
 from made_folders import made_folder, made_table
 from study_folder import Study
+from typer.testing import CliRunner
 
+from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.main import app
+from elastocal.errors import InputError
 from elastocal.mechanics.components import COMPONENTS
 
 CELL = "cells/made"
@@ -114,6 +119,54 @@ def test_residuals_and_figures_agree(diagnosed):
         mean = residuals.groupby(["pose", "load", "target"])[[f"{stage}_d{axis}" for axis in "xyz"]].mean()
         rms = np.sqrt((mean.to_numpy() ** 2).sum(axis=1).mean())
         assert steps.loc[kind, "heldout_rms_m"] == pytest.approx(rms, rel=1e-6)
+
+
+# What each needs besides a campaign, and would write.
+COMMANDS = {
+    "certificate": ["--tolerance", "0.5mm", "--output", "out"],
+    "correct": ["path.csv", "--output", "targets.csv"],
+    "export": ["--output", "out"],
+}
+# Texts for people, and what no job of this campaign has read or written.
+UNREAD = ("results/logs/", "results/timings/")
+
+
+def files_behind_the_report(study):
+    """Of a finished campaign: its folder, tables, reports and records, the robot file and one of the modules."""
+    own = study.files(f"{CELL}/**/*", "results/**/made/**/*", "reports/**/made/**/*", "results/**/*made*")
+    files = {name for name in own if study.path(name).is_file() and not name.startswith(UNREAD)}
+    return [*sorted(files), "src/elastocal/diagnosis/search.py", "config/robots/kuka.yaml"]
+
+
+def refusals(study, monkeypatch, change):
+    """The number of changes to files, one at a time, that every command refuses in one line before it writes; those missed."""
+    monkeypatch.chdir(study.folder)
+    found, missed = 0, []
+    for name in files_behind_the_report(study):
+        path = study.path(name)
+        before = path.read_bytes()
+        change(path, before)
+        for command, words in COMMANDS.items():
+            error = CliRunner().invoke(app, [command, CELL, *words]).exception
+            named = isinstance(error, InputError) and len(str(error).splitlines()) == 1
+            found += named and not study.files("out", "targets.csv")
+            missed += [] if named else [(command, name, error)]
+        path.write_bytes(before)
+    return found, missed
+
+
+@pytest.mark.parametrize("change", ["edited", "deleted"])
+def test_each_file_behind_a_report_that_was_changed_is_found_by_every_command(change, cell, monkeypatch):
+    changes = {
+        "edited": lambda path, before: path.write_bytes(before[:-1] + bytes([before[-1] ^ 1])),
+        "deleted": lambda path, _: path.unlink(),
+    }
+    files = files_behind_the_report(cell)
+    assert {name.split("/")[0] for name in files} == {"cells", "results", "reports", "src", "config"} and len(files) > 50
+    monkeypatch.chdir(cell.folder)
+    assert diagnosed_campaign(Path(CELL)).name == "made"
+    found, missed = refusals(cell, monkeypatch, changes[change])
+    assert missed == [] and found == len(COMMANDS) * len(files)
 
 
 def test_a_finished_diagnosis_has_nothing_to_do(diagnosed):

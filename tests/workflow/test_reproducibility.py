@@ -55,9 +55,9 @@ def test_one_core_and_two_make_the_same_data(small_study, serial_study):
 
 
 def test_every_figure_and_table_has_a_record_that_names_commit_configuration_and_seed(small_study):
-    records = [json.loads(small_study.path(name).read_text("utf-8")) for name in small_study.files("results/jobs/**/*.json")]
+    records = [json.loads(small_study.path(name).read_text("utf-8")) for name in small_study.files("results/records/**/*.json")]
     origins = {file: record["origin"] for record in records for file in record["outputs"]}
-    made = small_study.files("reports/figures/*", "reports/tables/*", "reports/*.pdf", "results/[!cjlt]*/**/*.parquet")
+    made = small_study.files("reports/figures/*", "reports/tables/*", "reports/*.pdf", "results/[!lt]*/**/*.parquet")
     assert {"reports/tables/table4.csv", "reports/figures/fig4.png", "reports/study.pdf"} < set(made)
     assert set(made) <= set(origins)
     (origin,) = {tuple(origin.items()) for origin in origins.values()}

@@ -81,8 +81,8 @@ def test_a_study_on_two_nodes_is_byte_for_byte_that_of_one_machine_and_in_few_jo
     assert made.keys() > set(TARGETS) and len(made) > 4
     assert contents(there) == made
     submitted = (done.stdout + done.stderr).count("has been submitted with SLURM jobid")
-    records = len(there.files("results/jobs/**/*.json"))
-    assert len(NODES) <= submitted <= records / 2
+    jobs = len(there.files("results/logs/**/*.log"))
+    assert len(NODES) <= submitted <= jobs / 2
     assert {node for node, _ in ended_jobs(cluster, there.folder)} == set(NODES)
 
 

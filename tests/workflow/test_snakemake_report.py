@@ -46,7 +46,7 @@ def test_the_report_shows_the_papers_tables_and_figures_with_the_graph_of_the_ru
 
 
 def test_the_report_names_what_the_run_was_made_from(report, small_study):
-    record = next(iter(sorted(small_study.path("results/jobs").glob("*.json")))).read_text(encoding="utf-8")
+    record = next(iter(sorted(small_study.path("results/records/reports").glob("*.json")))).read_text(encoding="utf-8")
     digest = re.search(r'"configuration_sha256": "(\w+)"', record)[1]
     assert digest in report
 

@@ -15,9 +15,9 @@ from elastocal.campaigns.importers.catalogue import importer
 from elastocal.campaigns.reading import campaign_files
 from elastocal.campaigns.sources import campaign_sources, named_league, user_campaign
 from elastocal.errors import InputError
-from elastocal.io.checksums import checksum
-from elastocal.io.origin import Origin, configuration_sha256
+from elastocal.io.origin import Origin, configuration_sha256, environment
 from elastocal.io.provenance import SOURCES_DIGEST
+from elastocal.io.records import checksum
 from elastocal.study.configuration import check_study, rows_read, with_overrides
 
 ROOT = Path(workflow.basedir)
@@ -137,11 +137,16 @@ def checksum_of(file):
 
 
 def watch_sources():
-    """Edited sources rerun their jobs whatever the date of the file: Snakemake looks at contents only where a date is new."""
+    """Edited sources rerun their jobs whatever the date of the file: Snakemake looks at contents only where a date is new.
+
+    Another environment, be it one of the libraries or the list of pins, reruns every job with a script.
+    """
+    environment_sha256 = configuration_sha256(environment(ROOT))
     for each in workflow.rules:
         if "sources" in each.input.keys():
             named = [file for file in each.input if isinstance(file, str) and not MADE.match(file)]
-            each.set_params(**{SOURCES_DIGEST: digest_of(file for file in named if Path(file).is_file())})
+            digest = digest_of(file for file in named if Path(file).is_file())
+            each.set_params(**{SOURCES_DIGEST: f"{digest} {environment_sha256}"})
 
 
 def outputs_behind(targets):

@@ -39,10 +39,8 @@ if "store" in config:
             "results/timings/upload/{stored}.tsv"
         wildcard_constraints:
             stored="((data|results|reports)/.+)|ro-crate-metadata.json",
-        params:
-            record="results/checksums/{stored}.sha256",
         shell:
-            "test ! -f {params.record:q} || sha256sum --check --quiet {params.record:q} &> {log:q} &&"
+            "{sys.executable:q} -m elastocal.io.records {input.file:q} 2> {log:q} | sha256sum --check --quiet &>> {log:q} &&"
             " cp {input.file:q} {output.file:q} &>> {log:q}"
 
 

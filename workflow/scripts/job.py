@@ -12,10 +12,11 @@ from typing import Any, Protocol
 from import_log import write_log
 
 from elastocal.errors import InputError, fault_of_machine
-from elastocal.io.checksums import check_checksums, record_checksums
-from elastocal.io.job_records import JobRecord, write_job_record
-from elastocal.io.origin import Origin
+from elastocal.io.origin import Origin, environment
+from elastocal.io.records import JobRecord, input_digests, write_records
 
+# With the Snakefile; the name of this file goes by the folder of the rules.
+TOP = Path(__file__).resolve().parents[2]
 # Shared by the jobs under way: a run that begins after another one was killed waits for the jobs that this one left behind.
 JOBS_LOCK = Path(".snakemake/jobs.lock")
 
@@ -35,7 +36,8 @@ class Job(Protocol):
 def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | None = None) -> None:
     """Call ``step(snakemake)``; an `InputError` or a fault of the machine ends the job with one line.
 
-    Files in `checked` that are no longer what a job wrote are refused before; all inputs where it is not given.
+    Files in `checked` that are no longer what a job wrote, or have no record of it, are refused before; all inputs where it is
+    not given.
     """
     log = snakemake.log[0]
     sys.excepthook = sys.__excepthook__
@@ -43,10 +45,9 @@ def run(step: Callable[[Job], None], snakemake: Job, checked: Iterable[str] | No
     try:
         with _under_way():
             started = _now()
-            check_checksums(snakemake.input if checked is None else checked)
+            digests, own = input_digests(snakemake.input, None if checked is None else set(map(str, checked)))
             step(snakemake)
-            record_checksums(snakemake.output)
-            write_job_record(snakemake.log[0], _record(snakemake, started))
+            write_records(_record(snakemake, started, digests, own))
     except InputError as error:
         write_log(log, f"{error}\n")
         sys.exit(str(error))
@@ -77,10 +78,10 @@ def _under_way() -> Iterator[None]:
         yield
 
 
-def _record(job: Job, started: str) -> JobRecord:
+def _record(job: Job, started: str, inputs: dict[str, str], own: tuple[str, ...]) -> JobRecord:
     wildcards = {name: str(value) for name, value in job.wildcards.items()}
-    inputs, outputs = (tuple(map(str, files)) for files in (job.input, job.output))
-    return JobRecord(job.rule, wildcards, started, _now(), inputs, outputs, origin_of(job))
+    outputs = tuple(map(str, job.output))
+    return JobRecord(job.rule, wildcards, started, _now(), inputs, own, outputs, origin_of(job), environment(TOP))
 
 
 def _now() -> str:

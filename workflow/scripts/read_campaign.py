@@ -18,4 +18,5 @@ def read_campaign(job: Job) -> None:
     write_json(job.output.descriptions, descriptions)
 
 
-run(read_campaign, snakemake)
+# Of a user's own files there is no record.
+run(read_campaign, snakemake, snakemake.input.sources if snakemake.params.get("files_sha256") else None)

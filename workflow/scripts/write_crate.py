@@ -12,13 +12,13 @@ from elastocal.crate.run_crate import FinishedRun, run_crate
 from elastocal.crate.software import installed_packages, python_version
 from elastocal.io.atomic_writes import write_text
 from elastocal.io.data_frames import write_csv
-from elastocal.io.job_records import jobs_behind, read_job_records
 from elastocal.io.json_files import write_json
 from elastocal.io.origin import canonical_json
+from elastocal.io.records import jobs_behind
 
 
 def write_crate(job: Job) -> None:
-    jobs, packages = jobs_behind(job.input.files, read_job_records()), installed_packages()
+    jobs, packages = jobs_behind(job.input.files), installed_packages()
     about = metadata("elastocal")
     write_text(job.output.configuration, canonical_json(job.params.configuration))
     write_csv(job.output.software, pd.DataFrame([asdict(package) | {"url": package.url} for package in packages]))

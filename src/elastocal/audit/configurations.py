@@ -7,7 +7,7 @@ _SAME_RAD = 0.02
 
 
 def configurations(joint_angles: np.ndarray) -> np.ndarray:
-    """The configuration of each pose (P, n), rad: the first pose without one takes all that are near it; ndarray of int (P,)."""
+    """The configuration of each pose (P, n), rad: the first without one takes all that are near it; ndarray of int (P,)."""
     found = np.full(len(joint_angles), -1)
     while (found < 0).any():
         first = joint_angles[np.argmax(found < 0)]

@@ -15,11 +15,8 @@ from elastocal.audit.findings import Finding, held
 from elastocal.audit.schemas import SCHEMAS
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from elastocal.audit.audited import Audited
 
-_RECORDS = "results/checksums"
 # What is asked of every file, whatever it holds; other checks work something out again.
 OF_EVERY_FILE = frozenset(
     {
@@ -39,25 +36,6 @@ _PLACES = (
     re.compile(r"results/(?!loop|league|blind|studies)\w+/(?P<robot>[^/]+)\.parquet"),
     re.compile(r"results/loop/(?P<campaign>[^/]+)/\w+\.parquet"),
 )
-
-
-def recorded(folder: Path) -> dict[str, str]:
-    """Checksums that jobs kept, by file.
-
-    Parameters
-    ----------
-    folder : Path
-
-    Returns
-    -------
-    dict of str to str
-    """
-    found: dict[str, str] = {}
-    for record in sorted((folder / _RECORDS).rglob("*.sha256")):
-        for line in record.read_text("utf-8").splitlines():
-            digest, _, file = line.partition("  ")
-            found[file] = digest
-    return found
 
 
 def intact(run: Audited, file: str, digest: str) -> Finding:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from elastocal.io.records import read_record, record_of
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -33,9 +35,5 @@ def finished(folder: Path) -> dict[str, str]:
     dict of str to str
         Checksum of the last file by target.
     """
-    records = {target: folder / f"results/checksums/{file}.sha256" for target, file in OTHERS.items()}
-    return {
-        target: record.read_text("utf-8").split()[0]
-        for target, record in records.items()
-        if record.is_file() and (folder / OTHERS[target]).is_file()
-    }
+    there = {target: file for target, file in OTHERS.items() if record_of(file, folder).is_file() and (folder / file).is_file()}
+    return {target: read_record(file, folder)[1][file] for target, file in there.items()}

@@ -24,9 +24,10 @@ from elastocal.audit import (
     scores,
     tables,
 )
-from elastocal.audit.files import described, intact, recorded
+from elastocal.audit.files import described, intact
 from elastocal.audit.findings import Finding, held
 from elastocal.errors import InputError
+from elastocal.io.records import RECORDS, recorded
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable
@@ -64,7 +65,7 @@ def audit(run: Audited, only: Collection[str] | None = None) -> list[Finding]:
             if run.there(file):
                 found += _recomputed(run, file)
     if not found:
-        found.append(held("results/checksums", "files that a job recorded", "counting", False, "none; is the run finished?"))
+        found.append(held(RECORDS.as_posix(), "files that a job recorded", "counting", False, "none; is the run finished?"))
     return found
 
 

@@ -2,63 +2,41 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
 
 from elastocal.command.pipeline import pipeline, workplace
+from elastocal.command.printed import print_lines
+from elastocal.errors import InputError
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from elastocal.loop.calibrated_files import Diagnosed
 
+AcceptEnvironment = Annotated[
+    bool, typer.Option("--accept-environment", help="Warn of results that other libraries or pins made, and use them.")
+]
 
-def diagnosed_campaign(folder: Path) -> Diagnosed:
+
+def diagnosed_campaign(folder: Path, accept_environment: bool = False) -> Diagnosed:
     """A campaign with what its diagnosis found, from the results of the pipeline, and what held-out poses said of its errors.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the campaign.
-
-    Returns
-    -------
-    Diagnosed
-
-    Raises
-    ------
-    InputError
-        As `load_diagnosed`.
+    An InputError refuses what `load_diagnosed` does, and results of another environment unless that is accepted: then a warning
+    says so.
     """
-    from elastocal.io.json_files import read_json
-    from elastocal.loop.calibrated_files import judged_as, load_diagnosed
+    from elastocal.io.origin import environment
+    from elastocal.loop.calibrated_files import load_diagnosed
 
-    found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace() / "results" / "loop")
-    verdict = report_file(found.name, "verdict.json")
-    return found if verdict is None else judged_as(found, read_json(verdict))
-
-
-def report_file(name: str, file: str) -> Path | None:
-    """A file of the reports of a campaign.
-
-    Parameters
-    ----------
-    name : str
-        Of the campaign.
-    file : str
-
-    Returns
-    -------
-    Path or None
-        None where there is none.
-
-    Raises
-    ------
-    InputError
-        A file that is no longer what the pipeline wrote.
-    """
-    from elastocal.io.checksums import check_checksums
-
-    place = f"reports/loop/{name}/{file}"
-    check_checksums([place], workplace())
-    path = workplace() / place
-    return path if path.is_file() else None
+    found = load_diagnosed(folder, pipeline() / "config" / "robots", workplace())
+    was, now = found.origin["environment"], environment(pipeline())
+    other = [name for name in sorted(was | now) if was.get(name) != now.get(name)]
+    if other:
+        there, here = (", ".join(f"{name} {each.get(name, 'none')[:12]}" for name in other) for each in (was, now))
+        allowed = f"those of now, {here}: elastocal diagnose {folder}; or --accept-environment"
+        error = InputError(folder, "", f"results by {there}", allowed)
+        if not accept_environment:
+            raise error
+        print_lines([f"warning: {error}"], Console(stderr=True))
+    return found

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from elastocal.command.campaign import diagnosed_campaign, report_file
+from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.pipeline import pipeline, workplace
 from elastocal.command.printed import iso_date, print_lines, printed
 from elastocal.command.quantities import LARGEST_SEED, length_m
@@ -41,6 +41,7 @@ def certificate(
     date: Annotated[str | None, typer.Option(help="Date of the certificate, as 2026-11-20; today without.")] = None,
     output: Annotated[Path | None, typer.Option(help="Folder for it; the campaign's reports without.")] = None,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
+    accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Accuracy against a tolerance, with the risk of being wrong; repeatability, error budget and map; what changed.
 
@@ -49,15 +50,13 @@ def certificate(
     """
     from datetime import date as calendar
 
-    import pandas as pd
-
     from elastocal.application.certificate.use import use_at
     from elastocal.campaigns.reading import read_descriptions
     from elastocal.exchange.target_path import read_target_path
     from elastocal.figures.certificate import budget_bars, workspace_map
     from elastocal.figures.style import save
     from elastocal.io.atomic_writes import check_places, write_together
-    from elastocal.io.json_files import read_json, write_json
+    from elastocal.io.json_files import write_json
     from elastocal.loop.certificate import Wanted
     from elastocal.loop.certificate import certificate as certified
     from elastocal.loop.measured import measured_errors
@@ -69,27 +68,20 @@ def certificate(
     limit = length_m("--tolerance", tolerance)
     number = stated if serial is None else printed("--serial", serial)
     day = calendar.today().isoformat() if date is None else iso_date("--date", date)
-    found = diagnosed_campaign(folder)
-    reports = workplace() / "reports" / "loop" / found.name
-    place = output or reports
+    found = diagnosed_campaign(folder, accept_environment)
+    place = output or workplace() / "reports" / "loop" / found.name
     check_places(place / PAGES, place / DOCUMENT, top=output or workplace() / "reports")
-    other = None if compare is None else diagnosed_campaign(compare)
+    other = None if compare is None else diagnosed_campaign(compare, accept_environment)
     robots = pipeline() / "config" / "robots"
     after = None if measured is None else measured_errors(measured, robots, found)
     used = None
     if use is not None:
         used = use_at(found.calibrated, found.case.observations.states, read_target_path(use, found.calibrated.robot.joints))
-    needed = [reports / name for name in ("verdict.json", "before_after.csv")]
-    for path in needed:
-        if report_file(found.name, path.name) is None:
-            raise InputError(path, "", "no report of the diagnosis", f"elastocal diagnose {folder}")
-    verdict = read_json(needed[0])
-    if any(effect["family"] == "data" for effect in verdict["effects"]):
+    if any(effect["family"] == "data" for effect in found.verdict["effects"]):
         raise InputError(folder, "", "data at fault", "a campaign whose data are in order; its report says what is wrong")
-    steps = pd.read_csv(needed[1])
     wanted = Wanted(limit, risk, number, day, seed)
     with console.status("working"):
-        document, maps = certified(folder, robots, found, verdict, steps, wanted, other, after, used)
+        document, maps = certified(folder, robots, found, wanted, other, after, used)
         facts = certificate_facts(document)
         with tempfile.TemporaryDirectory() as scratch, write_together(place, (PAGES, DOCUMENT)) as partial:
             forces = [each["force_N"] for each in document["workspace"]]

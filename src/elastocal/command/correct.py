@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 from rich.progress import Progress
 
-from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_lines
 from elastocal.errors import InputError
 
@@ -30,6 +30,7 @@ def correct(
     path: Annotated[Path, typer.Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
     output: Annotated[Path, typer.Option(help="CSV of joint targets.")],
     partial: Annotated[bool, typer.Option("--partial", help="Write the file though some targets cannot be reached.")] = False,
+    accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Joint targets that bring the loaded, sagging, imperfect robot to the wanted poses, and by how much it will miss them.
 
@@ -51,7 +52,7 @@ def correct(
     check_places(output)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
-    campaign = diagnosed_campaign(folder)
+    campaign = diagnosed_campaign(folder, accept_environment)
     calibrated = campaign.calibrated
     wanted = read_target_path(path, calibrated.robot.joints)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
-from elastocal.command.campaign import diagnosed_campaign
+from elastocal.command.campaign import AcceptEnvironment, diagnosed_campaign
 from elastocal.command.printed import print_lines
 from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
@@ -36,6 +36,7 @@ def export(
     ] = 0,
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Hanging load of the table in N.")] = 0.0,
     date: Annotated[str, typer.Option(help="Date that the sidecar states; today without.")] = "",
+    accept_environment: AcceptEnvironment = False,
 ) -> None:
     """Write the calibrated robot: robot file, URDF and DH parameters (geometry), and a sidecar with springs and effects."""
     from datetime import date as calendar
@@ -55,7 +56,7 @@ def export(
 
     console = Console(stderr=True)
     check_places(*(output / name for name in _NAMES))
-    found = diagnosed_campaign(folder)
+    found = diagnosed_campaign(folder, accept_environment)
     calibrated = found.calibrated
     robot = folded(calibrated).robot
     stated = f"Calibrated by elastocal from the campaign {found.name}."

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from elastocal.io.checksums import checksum
+from elastocal.io.records import checksum
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from elastocal.io.job_records import JobRecord
+    from elastocal.io.records import JobRecord
 
 _PROFILE = "https://datapackage.org/profiles/2.0/datapackage.json"
 _TYPES = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}

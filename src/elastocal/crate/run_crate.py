@@ -22,7 +22,7 @@ from rocrate.model.contextentity import ContextEntity
 from rocrate.rocrate import ROCrate
 
 from elastocal.errors import InputError
-from elastocal.io.checksums import checksum, files_of
+from elastocal.io.records import checksum, files_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from rocrate.model.entity import Entity
 
     from elastocal.crate.software import Package
-    from elastocal.io.job_records import JobRecord
     from elastocal.io.origin import Origin
+    from elastocal.io.records import JobRecord
 
 _VERSION = "1.1"
 _PROFILES = {

@@ -1,14 +1,22 @@
-"""Which commit, configuration and seed a file comes from, in words that stand in the file or beside it."""
+"""Which commit, configuration, seed and environment a file comes from, in words that stand in the file or beside it."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from typing import Any
+
+
+# Of what a run on one machine has installed; a wheel comes without.
+_LOCK = "requirements.lock"
+# What numbers may depend on wherever there is no such list.
+_LIBRARIES = ("numpy", "pandas", "pyarrow", "scipy")
 
 
 @dataclass(frozen=True)
@@ -62,3 +70,10 @@ def configuration_sha256(configuration: Any) -> str:
     str
     """
     return hashlib.sha256(canonical_json(configuration).encode()).hexdigest()
+
+
+def environment(folder: str | Path) -> dict[str, str]:
+    """Versions of the installed libraries, and the SHA-256 of the pins in the folder of the Snakefile, where it has some."""
+    lock = Path(folder, _LOCK)
+    pinned = {_LOCK: hashlib.sha256(lock.read_bytes()).hexdigest()} if lock.is_file() else {}
+    return {name: version(name) for name in _LIBRARIES} | pinned

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
+import pandas as pd
 
 from elastocal.application.scope import calibrated_on, with_form
-from elastocal.campaigns.columns import columns_of
+from elastocal.campaigns.reading import campaign_files, read_descriptions
 from elastocal.errors import InputError
-from elastocal.fitting.case import case_from, noise_from
-from elastocal.io.checksums import check_checksums
+from elastocal.fitting.case import noise_from
 from elastocal.io.json_files import read_json
+from elastocal.io.origin import configuration_sha256
+from elastocal.io.records import check_sources, checksum, jobs_behind
 from elastocal.io.storage import read_table
+from elastocal.loop.case_files import load_case
 from elastocal.loop.diagnosis_tables import final_parameters, rows_left_out, step_model
 from elastocal.loop.fit_columns import covariance_from
-from elastocal.loop.loading import load_campaign
-from elastocal.loop.schemas import CORRELATIONS, STEPS, measurements
+from elastocal.loop.schemas import CORRELATIONS, STEPS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Sequence
     from typing import Any
 
     from elastocal.application.calibrated import CalibratedRobot
     from elastocal.fitting.case import Case
+    from elastocal.io.records import JobRecord
 
-# Of results/loop/<campaign>/.
-DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS = "campaign.json", "training.parquet", "held_out.parquet", "diagnosis.json"
+# Of results/loop/<campaign>/ and of reports/loop/<campaign>/, whose last file has all others behind it.
+DESCRIPTIONS, TRAINING, DIAGNOSIS = "campaign.json", "training.parquet", "diagnosis.json"
 STEPS_TABLE, CORRELATIONS_TABLE = "steps.parquet", "correlations.parquet"
-_FILES = (DESCRIPTIONS, TRAINING, HELD_OUT, DIAGNOSIS, STEPS_TABLE, CORRELATIONS_TABLE)
+VERDICT, ERRORS, REPORT = "verdict.json", "before_after.csv", "report.html"
 
 
 @dataclass(frozen=True)
@@ -44,82 +46,70 @@ class Diagnosed:
     case : Case
         Of the training poses, without their gross errors.
     calibrated : CalibratedRobot
-        By the final model.
+        By the final model, its errors as large as verdict.json says after a look at held-out poses.
     verdict : dict
-        As verdict.json, without what held-out poses say.
+        verdict.json.
+    errors : DataFrame
+        before_after.csv.
+    origin : dict
+        ``commit`` of the jobs that made it, ``code_sha256`` and ``data_sha256`` of all that they read of the program and of the
+        campaign, ``environment``.
     """
 
     name: str
     case: Case
     calibrated: CalibratedRobot
     verdict: dict[str, Any]
+    errors: pd.DataFrame
+    origin: dict[str, Any]
 
 
-def load_diagnosed(folder: str | Path, robots_folder: str | Path, results: str | Path) -> Diagnosed:
-    """A campaign that was diagnosed and has not changed since.
+def load_diagnosed(folder: str | Path, robots_folder: str | Path, top: str | Path) -> Diagnosed:
+    """A campaign that was diagnosed, of which nothing has changed since, in the folder that holds results/ and reports/.
 
-    Parameters
-    ----------
-    folder, robots_folder : str or Path
-        As in `reading.read_campaign`.
-    results : str or Path
-        Holds a folder for each campaign with the tables of its diagnosis.
-
-    Returns
-    -------
-    Diagnosed
-
-    Raises
-    ------
-    InputError
-        Not diagnosed, changed since, or a file of the diagnosis that is no longer what the pipeline wrote.
+    An InputError refuses what is not as `jobs_behind` asks of all jobs behind its report or `check_sources` of those behind its
+    verdict, and other files of the campaign than were read.
     """
-    descriptions, *parts = load_campaign(folder, robots_folder)
-    name = descriptions["campaign"]["campaign"]
-    tables = Path(results).absolute() / name
-    again = f"a campaign as it was diagnosed: elastocal diagnose {folder}"
-    if not all((tables / file).is_file() for file in _FILES):
-        raise InputError(folder, "", f"no diagnosis of it in {results}", again)
-    # Of a job Snakemake's script does it; here people and their editors have been at the files.
-    top = tables.parents[2]
-    check_checksums([(tables / file).relative_to(top).as_posix() for file in _FILES], top)
-    columns = [columns_of(part) for part in parts]
-    kept = [
-        read_table(tables / file, measurements(part.joint_angles.shape[1]))
-        for file, part in zip((TRAINING, HELD_OUT), parts, strict=True)
-    ]
-    same = _described(read_json(tables / DESCRIPTIONS)) == _described(descriptions)
-    if not (same and all(map(_same, kept, columns))):
-        raise InputError(folder, "", "changes since its diagnosis", again)
+    name = read_descriptions(folder, robots_folder)[0]["campaign"]
+    results, reports = f"results/loop/{name}", f"reports/loop/{name}"
+    again = f"elastocal diagnose {folder}"
+    if not Path(top, reports, VERDICT).exists() and not Path(top, results, DIAGNOSIS).exists():
+        raise InputError(folder, "", f"no diagnosis of it in {Path(top, results)}", again)
+    jobs_behind([f"{reports}/{REPORT}"], top)
+    jobs = jobs_behind([f"{reports}/{VERDICT}"], top)
+    check_sources(jobs, top, f"results of this version: {again}")
+    data = _data_of(jobs, results)
+    now = {(Path(file).name, checksum(file)) for file in campaign_files(folder, robots_folder)}
+    if not data <= now <= {(Path(file).name, digest) for job in jobs for file, digest in job.inputs.items()}:
+        raise InputError(folder, "", "changes since its diagnosis", f"a campaign as it was diagnosed: {again}")
+    tables, stated = Path(top, results), Path(top, reports)
     facts, steps = read_json(tables / DIAGNOSIS), read_table(tables / STEPS_TABLE, STEPS)
-    case = case_from(descriptions, columns[0])
+    verdict = read_json(stated / VERDICT)
+    case = load_case(tables / DESCRIPTIONS, tables / TRAINING)
     case = case.select(~rows_left_out(case, facts))
     last = len(facts["steps"]) - 1
     model, estimate = step_model(case, facts, steps, last)
     covariance = covariance_from(final_parameters(facts, steps), read_table(tables / CORRELATIONS_TABLE, CORRELATIONS))
     noise = noise_from({"noise": facts["steps"][last]["noise"]})
     calibrated = calibrated_on(case, model, estimate, covariance, noise)
-    calibrated = with_form(calibrated, facts["document"].get("other_models_m") or 0.0)
-    return Diagnosed(name, case, calibrated, facts["document"])
+    accuracy = verdict["accuracy"]
+    form = (accuracy["form_m"], accuracy["contradicted"]) if accuracy else (facts["document"].get("other_models_m") or 0.0,)
+    origin = {
+        "commit": _listed(job.origin.commit for job in jobs),
+        "code_sha256": configuration_sha256({file: digest for job in jobs for file, digest in job.sources.items()}),
+        "data_sha256": configuration_sha256(sorted(data)),
+        "environment": {name: _listed(job.environment.get(name, "none") for job in jobs) for name in jobs[-1].environment},
+    }
+    return Diagnosed(name, case, with_form(calibrated, *form), verdict, pd.read_csv(stated / ERRORS), origin)
 
 
-def judged_as(found: Diagnosed, verdict: Mapping[str, Any]) -> Diagnosed:
-    """A diagnosed campaign whose predicted errors are as large as verdict.json says after a look at held-out poses."""
-    stated = verdict.get("accuracy")
-    if not stated:
-        return found
-    return replace(found, calibrated=with_form(found.calibrated, stated["form_m"], stated["contradicted"]))
+def _data_of(jobs: Sequence[JobRecord], results: str) -> set[tuple[str, str]]:
+    """Names and SHA-256 of the campaign's files as step 1 read them: the user's, which may have moved, or its folder's."""
+    job = next(job for job in jobs if f"{results}/{DESCRIPTIONS}" in job.outputs)
+    folder = Path(next(iter(job.inputs))).parent
+    files = job.own or [file for file in job.inputs if Path(file).parent == folder]
+    return {(Path(file).name, job.inputs[file]) for file in files}
 
 
-def _described(descriptions: Mapping[str, Any] | None) -> dict[str, Any] | None:
-    """What a campaign says of itself, wherever its folder is."""
-    if descriptions is None:
-        return None
-    return {**descriptions, "source": "", "held_out": _described(descriptions.get("held_out"))}
-
-
-def _same(one: Mapping[str, np.ndarray], other: Mapping[str, Any]) -> bool:
-    def equal(a: np.ndarray, b: np.ndarray) -> bool:
-        return a.shape == b.shape and bool(((a == b) | ((a != a) & (b != b))).all())
-
-    return set(one) == set(other) and all(equal(np.asarray(one[name]), np.asarray(other[name])) for name in one)
+def _listed(values: Iterable[str]) -> str:
+    return ", ".join(sorted(set(values)))

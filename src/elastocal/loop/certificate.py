@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import platform
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata
@@ -18,13 +17,12 @@ from elastocal.application.certificate.repeatability import of_sensor, repeatabi
 from elastocal.application.certificate.workspace import drawn_angles, workspace_errors
 from elastocal.application.scope import REGION, campaign_poses
 from elastocal.campaigns.reading import campaign_files
+from elastocal.io.records import checksum
 from elastocal.random_streams import stream
 from elastocal.validation.conformity import PASS, UNDECIDED, conformity, predicted_conformity
 from elastocal.validation.span import joint_ranges, shortfalls
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     import pandas as pd
 
     from elastocal.application.certificate.use import Use
@@ -64,8 +62,6 @@ def certificate(
     folder: str | Path,
     robots_folder: str | Path,
     found: Diagnosed,
-    verdict: Mapping[str, Any],
-    steps: pd.DataFrame,
     wanted: Wanted,
     other: Diagnosed | None = None,
     measured: MeasuredErrors | None = None,
@@ -79,10 +75,6 @@ def certificate(
         As in `reading.read_campaign`.
     found : Diagnosed
         The campaign.
-    verdict : dict
-        Contents of verdict.json.
-    steps : pandas.DataFrame
-        before_after.csv.
     wanted : Wanted
     other : Diagnosed, optional
         An earlier campaign of the same robot.
@@ -111,7 +103,7 @@ def certificate(
     if measured is not None:
         terms = wanted.tolerance_m, wanted.accepted_risk, _REPLICATES
         decision = conformity(measured.errors, *terms, draws("conformity"), measured.noise_m)
-    judged = verdict["heldout"]["configurations"] if measured is None else measured.configurations
+    judged = found.verdict["heldout"]["configurations"] if measured is None else measured.configurations
     missing = shortfalls(judged, states, robot, None if use is None else use.outside)
     if missing and decision.decision == PASS:
         decision = replace(decision, decision=UNDECIDED)
@@ -129,12 +121,13 @@ def certificate(
         "serial": wanted.serial,
         "date": wanted.date,
         "versions": {name: metadata.version(name) for name in _LIBRARIES} | {"python": platform.python_version()},
-        "files": {Path(file).name: _digest(file) for file in campaign_files(folder, robots_folder)},
-        "measured_files": {} if measured is None else {name: _digest(file) for name, file in measured.files.items()},
-        "verdict": verdict["verdict"],
-        "effects": [effect["name"] for effect in verdict["effects"]],
-        "held_out": [_step(row) for _, row in steps.iterrows()],
-        "noise_floor_rms_m": verdict["heldout"]["noise_floor_rms_m"],
+        "origin": found.origin,
+        "files": {Path(file).name: checksum(file) for file in campaign_files(folder, robots_folder)},
+        "measured_files": {} if measured is None else {name: checksum(file) for name, file in measured.files.items()},
+        "verdict": found.verdict["verdict"],
+        "effects": [effect["name"] for effect in found.verdict["effects"]],
+        "held_out": [_step(row) for _, row in found.errors.iterrows()],
+        "noise_floor_rms_m": found.verdict["heldout"]["noise_floor_rms_m"],
         "accuracy": (accuracy if measured is None else measured.accuracy).document(),
         "predicted": accuracy.document(),
         "conformity": asdict(decision) | {"configurations": judged, "shortfalls": missing},
@@ -181,7 +174,3 @@ def _summary(force_N: float, errors: WorkspaceErrors) -> dict[str, Any]:
         "bound_inside": quantiles(errors.bound_m[inside]) if inside.any() else None,
         "share_outside": float(errors.outside.mean()),
     }
-
-
-def _digest(file: str) -> str:
-    return hashlib.sha256(Path(file).read_bytes()).hexdigest()

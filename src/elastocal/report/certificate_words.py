@@ -64,6 +64,7 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
             ["date of this certificate", document["date"]],
             ["fitted poses span", span_words(document["joint_ranges"])],
             ["software", ", ".join(f"{name} {version}" for name, version in document["versions"].items())],
+            ["commit of the diagnosis", document["origin"]["commit"]],
         ],
         "decision": conformity["decision"],
         "kind": f" ({document['accuracy']['kind']})",
@@ -86,7 +87,11 @@ def certificate_facts(document: Mapping[str, Any]) -> dict[str, Any]:
         "budget_states": counted(document["budget_states"], "state"),
         "workspace": workspace_rows(document["workspace"]),
         "comparison": None if document["comparison"] is None else comparison_facts(document["comparison"]),
-        "files": [[name, digest] for name, digest in (document["files"] | document["measured_files"]).items()],
+        "files": [
+            ["code of the diagnosis", document["origin"]["code_sha256"]],
+            ["data of the diagnosis", document["origin"]["data_sha256"]],
+            *([name, digest] for name, digest in (document["files"] | document["measured_files"]).items()),
+        ],
     }
 
 

@@ -27,7 +27,7 @@ def path_at(calibrated, angles, wrench):
 
 def test_poses_within_what_was_fitted_are_corrected_and_not_beyond(kuka, calibrated):
     states = planted(kuka, {}, seed=1, poses=20).observations.states
-    angles = states.joint_angles.mean(axis=0) + [0.0, 0.3, 0.4, 0.2, 0.6, 0.1] + 0.1 * np.eye(6)[:3]
+    angles = np.array([0.0, -0.6, 0.5, 0.3, 0.6, 0.1]) + 0.1 * np.eye(6)[:3]
     used = use_at(calibrated, states, path_at(calibrated, angles, np.zeros(6)))
     assert not used.outside.any()
     assert np.abs(kuka.model_angles(used.reported_angles) - angles).max() < 0.02

@@ -1,0 +1,223 @@
+"""What each job read and wrote, when, and from which commit, configuration, seed and environment: a record beside every output.
+
+A record has the SHA-256 of its output and of all that the job read, scripts and modules too: whoever reads a file next finds a
+byte that was altered, in it or in anything behind it. `python -m elastocal.io.records | sha256sum --check` judges all files,
+with the name of one behind `records` this one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from elastocal.errors import InputError
+from elastocal.io.json_files import read_json, write_json
+from elastocal.io.origin import Origin, configuration_sha256
+from elastocal.io.texts import check_file
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Iterable, Mapping
+
+RECORDS = Path("results/records")
+# What the pipeline makes, folders and a file; the rest is the user's.
+_MADE = ("data", "results", "reports", "ro-crate-metadata.json")
+_AS_WRITTEN = "the file as the pipeline wrote it (delete it and run the pipeline again)"
+# Of one output, and of all else that its record says.
+_FILES, _DIGEST = "files", "sha256"
+# A module that looks up those beside it by itself: one that is new there counts, too.
+_CATALOGUE = "catalogue.py"
+
+
+@dataclass(frozen=True)
+class JobRecord:
+    """One job that has ended well.
+
+    Attributes
+    ----------
+    rule : str
+    wildcards : dict of str to str
+    started, ended : str
+        UTC, ISO 8601.
+    inputs : dict of str to str
+        SHA-256 of files by their names in the working directory; scripts and modules are among them.
+    own : tuple of str
+        Inputs of the user, which no job made and which may lie elsewhere by now.
+    outputs : tuple of str
+    origin : Origin
+    environment : dict of str to str
+        From `origin.environment`.
+    """
+
+    rule: str
+    wildcards: Mapping[str, str]
+    started: str
+    ended: str
+    inputs: Mapping[str, str]
+    own: tuple[str, ...]
+    outputs: tuple[str, ...]
+    origin: Origin
+    environment: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """The rule and its wildcards."""
+        return " ".join([self.rule, *self.wildcards.values()])
+
+    @property
+    def made_inputs(self) -> dict[str, str]:
+        """Inputs that other jobs made."""
+        return {file: digest for file, digest in self.inputs.items() if _made(file) and file not in self.own}
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """Inputs that come with the program or its configuration: modules, scripts, robots."""
+        return {file: digest for file, digest in self.inputs.items() if not _made(file) and file not in self.own}
+
+
+def write_records(job: JobRecord) -> None:
+    """Keep the record of each output that lies where the pipeline makes files; a folder's has all of these."""
+    for output in filter(_made, job.outputs):
+        place = record_of(output)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        written = asdict(job) | {_FILES: {file: checksum(file) for file in files_of(output)}}
+        write_json(place, written | {_DIGEST: configuration_sha256(written)})
+
+
+def read_record(path: str, within: str | Path = "") -> tuple[JobRecord, dict[str, str]]:
+    """The job that made a file or folder, and the SHA-256 of each file that it wrote there.
+
+    `within` is the folder that `path` and the records are in, here and below; the working directory without. An InputError
+    refuses a missing record and one that is not as it was written.
+    """
+    place = record_of(path, within)
+    if not place.is_file():
+        raise InputError(Path(within, path), "", f"no record of the job that made it, {place}", _AS_WRITTEN)
+    try:
+        kept = read_json(place)
+        if kept.pop(_DIGEST) != configuration_sha256(kept):
+            raise ValueError("other contents than were written")
+        files: dict[str, str] = kept.pop(_FILES)
+        names = {key: tuple(kept[key]) for key in ("own", "outputs")}
+        return JobRecord(**kept | names | {"origin": Origin(**kept["origin"])}), files
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        raise InputError(place, "", f"no record of a job ({error})", f"of {path} {_AS_WRITTEN}") from None
+
+
+def recorded(within: str | Path = "") -> dict[str, str]:
+    """SHA-256 of every file that has a record, as `read_record`."""
+    places = sorted(Path(within, RECORDS).rglob("*.json"))
+    names = [place.relative_to(Path(within, RECORDS)).as_posix().removesuffix(".json") for place in places]
+    return {file: digest for name in names for file, digest in read_record(name, within)[1].items()}
+
+
+def record_of(path: str, within: str | Path = "") -> Path:
+    """Where the record of a file or folder is."""
+    return Path(within, RECORDS, f"{path}.json")
+
+
+def input_digests(paths: Iterable[str], checked: Collection[str] | None = None) -> tuple[dict[str, str], tuple[str, ...]]:
+    """SHA-256 of what a job reads, and which of it is the user's own: what need not be checked and has no record.
+
+    Of what is `checked`, all without, an InputError refuses a file in data, results or reports that has no record or is no
+    longer what the job wrote that made it.
+    """
+    digests, own = {}, []
+    for path in map(str, paths):
+        if checked is None or path in checked:
+            digests[path] = _intact(path)[1] if _made(path) else _joint({file: checksum(file) for file in files_of(path)})
+        else:
+            digests[path] = _joint({file: checksum(file) for file in files_of(path)})
+            own += [] if record_of(path).is_file() else [path]
+    return digests, tuple(own)
+
+
+def jobs_behind(targets: Iterable[str], within: str | Path = "") -> list[JobRecord]:
+    """The jobs that made some files, and those that made what these read, to the first; in the order in which they began.
+
+    An InputError refuses a missing record or file, and any file of these jobs that is not as it was written or not the one that
+    the next job read.
+    """
+    found: dict[tuple[str, str], JobRecord] = {}
+    digests: dict[str, str] = {}
+    left = list(targets)
+    while left:
+        path = left.pop()
+        if path not in digests:
+            job, digests[path] = _intact(path, within)
+            if (job.started, job.name) not in found:
+                left += [*filter(_made, job.outputs), *job.made_inputs]
+            found[job.started, job.name] = job
+    for job in found.values():
+        for path, digest in job.made_inputs.items():
+            if digests[path] != digest:
+                raise InputError(Path(within, path), "", f"not what {job.name} read", _AS_WRITTEN)
+    return [job for _, job in sorted(found.items())]
+
+
+def check_sources(jobs: Iterable[JobRecord], within: str | Path, allowed: str) -> None:
+    """Refuse results that other modules, scripts or robots made than those that are here now: an InputError with `allowed`."""
+    for job in jobs:
+        sources = {Path(within, file): digest for file, digest in job.sources.items()}
+        for path, digest in sources.items():
+            if not path.is_file() or checksum(path) != digest:
+                raise InputError(path, "", f"not what {job.name} was made with", allowed)
+        for catalogue in (path for path in sources if path.name == _CATALOGUE):
+            if new := set(catalogue.parent.glob("*.py")) - sources.keys():
+                raise InputError(min(new), "", f"a module that {job.name} was made without", allowed)
+
+
+def checksum(path: str | Path) -> str:
+    """SHA-256 of a file."""
+    check_file(path)
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def files_of(path: str, within: str | Path = "") -> list[str]:
+    """The file, or all files below the folder but for hidden ones: Snakemake notes the time in one, after the step."""
+    folder = Path(within, path)
+    if not folder.is_dir():
+        return [path]
+    files = [file for file in folder.rglob("*") if file.is_file() and not file.name.startswith(".")]
+    return sorted(file.relative_to(within).as_posix() for file in files)
+
+
+def _intact(path: str, within: str | Path = "") -> tuple[JobRecord, str]:
+    """The job that made a file or folder, and what it holds, which is what the job wrote."""
+    job, written = read_record(path, within)
+    files = files_of(path, within)
+    found = {file: checksum(Path(within, file)) for file in files if Path(within, file).is_file()}
+    for file in sorted(written.keys() | found.keys()):
+        if written.get(file) != found.get(file):
+            what = "other contents than were written" if file in found else "nothing"
+            raise InputError(
+                Path(within, file),
+                "",
+                what,
+                _AS_WRITTEN if file == path else _AS_WRITTEN.replace("delete it", f"delete {path}"),
+            )
+    return job, _joint(written)
+
+
+def _joint(files: Mapping[str, str]) -> str:
+    """Of a file its own SHA-256, of a folder that of its list."""
+    return next(iter(files.values())) if len(files) == 1 else hashlib.sha256("".join(_lines(files)).encode()).hexdigest()
+
+
+def _lines(files: Mapping[str, str]) -> list[str]:
+    """As `sha256sum` has them."""
+    return [f"{digest}  {file}\n" for file, digest in files.items()]
+
+
+def _made(path: str) -> bool:
+    return Path(path).parts[:1] in [(name,) for name in _MADE] and ".." not in Path(path).parts
+
+
+if __name__ == "__main__":
+    try:
+        sys.stdout.writelines(_lines(read_record(sys.argv[1])[1] if sys.argv[1:] else recorded()))
+    except InputError as error:
+        sys.exit(str(error))

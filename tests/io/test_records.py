@@ -1,0 +1,189 @@
+"""Records of jobs: an altered, missing or unrecorded file is found by whoever reads it or what was made from it."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from support import refused
+
+from elastocal.errors import InputError
+from elastocal.io.origin import Origin
+from elastocal.io.records import (
+    JobRecord,
+    check_sources,
+    checksum,
+    files_of,
+    input_digests,
+    jobs_behind,
+    read_record,
+    record_of,
+    recorded,
+    write_records,
+)
+
+ORIGIN, HERE = Origin("c0ffee", "d16e57", 1), {"numpy": "2.0"}
+MEASURED, FITTED, TABLE, DRAWN = "data/sealed/block", "results/fit.json", "results/fit.csv", "reports/drawn.png"
+CODE, OWN = "src/fit.py", "data/mine.csv"
+ALTERED = {MEASURED: f"{MEASURED}/2/case.json", FITTED: FITTED, TABLE: TABLE, DRAWN: DRAWN}
+
+
+def write(rule, number, inputs, outputs, checked=None):
+    """As a job does that ended well."""
+    digests, own = input_digests(inputs, checked)
+    job = JobRecord(rule, {"robot": "kuka"}, f"{number}", f"{number + 1}", digests, own, tuple(outputs), ORIGIN, HERE)
+    write_records(job)
+    return job
+
+
+@pytest.fixture(autouse=True)
+def jobs(tmp_path, monkeypatch):
+    """Three of a chain, from a file of the user in a folder of the pipeline to a figure, and one beside it."""
+    monkeypatch.chdir(tmp_path)
+    for name in (CODE, OWN, f"{MEASURED}/1/case.json", f"{MEASURED}/2/case.json", FITTED, TABLE, DRAWN, "results/other.csv"):
+        Path(name).parent.mkdir(parents=True, exist_ok=True)
+        Path(name).write_bytes(name.encode() + bytes(range(64)))
+    found = [
+        write("measure", 1, [OWN, CODE], [MEASURED], checked=[CODE]),
+        write("fit", 2, [MEASURED, CODE], [FITTED, TABLE]),
+        write("draw", 3, [FITTED, CODE], [DRAWN, "docs/drawn.png"]),
+    ]
+    write("other", 4, [CODE], ["results/other.csv"])
+    return found
+
+
+def test_a_file_leads_back_to_every_job_behind_it_and_to_no_other(jobs):
+    assert jobs_behind([DRAWN]) == jobs
+    assert jobs_behind([TABLE]) == jobs[:2]
+    assert [job.name for job in jobs] == ["measure kuka", "fit kuka", "draw kuka"]
+
+
+def test_what_no_job_made_is_the_users_own_or_a_source(jobs):
+    assert jobs[0].own == (OWN,) and jobs[0].made_inputs == {}
+    assert [set(job.sources) for job in jobs] == [{CODE}] * 3
+    assert set(jobs[1].made_inputs) == {MEASURED} and jobs[1].inputs[CODE] == checksum(CODE)
+
+
+def test_records_stand_beside_what_the_pipeline_makes_and_nowhere_else(tmp_path):
+    assert sorted(record_of("").parent.rglob("*.json")) == sorted(
+        map(record_of, [MEASURED, FITTED, TABLE, DRAWN, "results/other.csv"])
+    )
+    write("elsewhere", 5, [], ["own/a.csv", "data/../a.csv", f"{tmp_path}/data/a.csv"])
+    assert len(list(record_of("").parent.rglob("*.json"))) == 5
+
+
+@pytest.mark.parametrize("place", [0, 30, -1])
+@pytest.mark.parametrize("output", ALTERED)
+def test_any_altered_byte_is_found_by_the_next_job_and_by_all_who_follow(output, place):
+    altered = Path(ALTERED[output])
+    content = bytearray(altered.read_bytes())
+    content[place] ^= 1
+    altered.write_bytes(content)
+    with refused(
+        altered.as_posix(), "", "other contents than were written", f"(delete {'it' if output == ALTERED[output] else output}"
+    ):
+        input_digests([CODE, output])
+    with refused(altered.as_posix(), "", "other contents than were written"):
+        jobs_behind([DRAWN])
+
+
+@pytest.mark.parametrize("output", ALTERED)
+def test_a_deleted_file_is_found(output):
+    Path(ALTERED[output]).unlink()
+    with refused(ALTERED[output], "", "found nothing"):
+        jobs_behind([DRAWN])
+
+
+@pytest.mark.parametrize("output", ALTERED)
+def test_a_missing_record_is_an_error(output):
+    record_of(output).unlink()
+    with refused(output, "", f"no record of the job that made it, {record_of(output)}"):
+        jobs_behind([DRAWN])
+    with refused(output, "", "no record of the job that made it"):
+        input_digests([output])
+
+
+def test_a_file_that_is_added_to_a_folder_is_found_but_for_the_time_that_snakemake_notes_there():
+    Path(MEASURED, ".snakemake_timestamp").touch()
+    jobs_behind([DRAWN])
+    Path(MEASURED, "3.json").touch()
+    with refused(f"{MEASURED}/3.json", "", "other contents"):
+        jobs_behind([DRAWN])
+
+
+def test_a_file_that_was_made_again_since_another_read_it_is_found(jobs):
+    Path(FITTED).write_text("another fit", encoding="utf-8")
+    write_records(jobs[1])
+    with refused(FITTED, "", "not what draw kuka read"):
+        jobs_behind([DRAWN])
+
+
+def test_what_is_not_checked_is_taken_as_it_is():
+    Path(FITTED).write_text("altered", encoding="utf-8")
+    assert input_digests([FITTED, CODE], []) == ({FITTED: checksum(FITTED), CODE: checksum(CODE)}, (CODE,))
+
+
+def test_files_of_another_folder_are_found_too(tmp_path, monkeypatch, jobs):
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert jobs_behind([DRAWN], tmp_path) == jobs
+    (tmp_path / FITTED).write_bytes(b"")
+    with refused(tmp_path / FITTED, "", "other contents than were written"):
+        jobs_behind([DRAWN], tmp_path)
+
+
+def test_other_code_than_made_the_results_is_found(jobs):
+    check_sources(jobs, "", "a rerun")
+    Path(CODE).write_text("edited", encoding="utf-8")
+    with refused(CODE, "", "not what measure kuka was made with", "a rerun"):
+        check_sources(jobs, "", "a rerun")
+    Path(CODE).unlink()
+    with refused(CODE, "", "not what measure kuka was made with", "a rerun"):
+        check_sources(jobs, "", "a rerun")
+
+
+def test_a_module_that_is_new_beside_a_catalogue_is_found(jobs):
+    Path("src/catalogue.py").write_text("", encoding="utf-8")
+    job = replace(jobs[0], inputs=input_digests([CODE, "src/catalogue.py"])[0])
+    check_sources([job], "", "a rerun")
+    Path("src/sag.py").touch()
+    with refused("src/sag.py", "", "a module that measure kuka was made without", "a rerun"):
+        check_sources([job], "", "a rerun")
+
+
+def test_modules_that_look_up_those_beside_them_are_called_catalogue():
+    package = Path(sys.modules["elastocal"].__file__).parent
+    assert {file.name for file in package.rglob("*.py") if "import pkgutil" in file.read_text("utf-8")} == {"catalogue.py"}
+
+
+def test_any_altered_character_of_a_record_is_found():
+    path = record_of(FITTED)
+    written = path.read_text(encoding="utf-8")
+    for place in range(0, len(written) - 1, 7):
+        if written[place].isspace():
+            continue
+        path.write_text(written[:place] + chr(ord(written[place]) ^ 1) + written[place + 1 :], encoding="utf-8")
+        with pytest.raises(InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job "):
+            read_record(FITTED)
+
+
+@pytest.mark.parametrize("text", ["", "{", "{}", "[]", "7", json.dumps({"sha256": "", "files": 1})])
+def test_a_damaged_record_is_refused_in_one_line(text):
+    record_of(FITTED).write_text(text, encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"^results/records/results/fit\.json\.json: found no record of a job .*; allowed: .*$"
+    ):
+        read_record(FITTED)
+
+
+def test_sha256sum_reads_what_is_recorded():
+    def lines(*names):
+        called = [sys.executable, "-m", "elastocal.io.records", *names]
+        return subprocess.run(called, capture_output=True, text=True, check=True).stdout
+
+    assert lines(MEASURED) == "".join(f"{checksum(file)}  {file}\n" for file in files_of(MEASURED))
+    assert len(lines().splitlines()) == len(recorded()) == 6
+    done = subprocess.run(["sha256sum", "--check"], input=lines(), capture_output=True, text=True)
+    assert done.returncode == 0 and f"{FITTED}: OK\n" in done.stdout
