@@ -178,6 +178,8 @@ def _searched(
     pool, looks = _STATES // len(reach.shares), (1 + _EXCHANGES) * poses
     share = min(1.0, _WORK / (criterion.work * (pool + looks * _SHORT_LIST)))
     short = max(int(share * _SHORT_LIST), 2 * poses)
+    # Hypotheses of a hundred units each leave time for one pass over the shortest list alone.
+    exchanges, radii = (_EXCHANGES, _RADII) if share * _SHORT_LIST >= poses else (0, ())
     entries = new_states.drawn(reach, max(int(share * pool), short), stream)
     entries, information = _short_list(criterion, instrument, entries, every, short, stream)
     chosen: list[int] = []
@@ -186,7 +188,7 @@ def _searched(
         left = criterion.left(total + information)
         left[chosen] = np.inf
         chosen.append(int(np.argmin(left)))
-    for _ in range(_EXCHANGES):
+    for _ in range(exchanges):
         before = list(chosen)
         for place in range(poses):
             rest = [number for number in chosen if number != chosen[place]]
@@ -196,7 +198,7 @@ def _searched(
         if chosen == before:
             break
     entries, information = entries.at(chosen), information[chosen]
-    for radius in _RADII:
+    for radius in radii:
         tried = new_states.near(reach, entries, _NEIGHBOURS, radius, stream)
         gained = instrument.information(tried, every)
         numbers = np.arange(poses)
