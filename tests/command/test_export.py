@@ -11,8 +11,10 @@ from typer.testing import CliRunner
 
 from elastocal.campaigns.reading import read_robot
 from elastocal.command.main import app
+from elastocal.errors import InputError
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
 
@@ -41,4 +43,30 @@ def test_robot_file_urdf_and_sidecar_hold_what_was_found(monkeypatch, tmp_path, 
     assert abs(deltas.loc["q3", "delta_theta_deg"]) == pytest.approx(np.degrees(3e-4), rel=0.2)
     assert (tmp_path / "out" / "dh_frames.png").stat().st_size > 10_000
     document = json.loads((tmp_path / "out" / "effects.json").read_text())
+    assert all(spring["std_error"] != 0 for spring in document["joint_compliance"])
     assert document["effects"] == [] and document["date"] == "2026-11-23" and len(document["joint_compliance"]) == 6
+
+
+def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_is_refused(monkeypatch, tmp_path, cell):
+    monkeypatch.chdir(cell[0])
+    mine, output = tmp_path / "mine.urdf", tmp_path / "out"
+    mine.write_text(urdf_of(analysed("kuka")).replace("<robot ", "<!-- mine --><robot ").replace('effort="1e9"', 'effort="77"'))
+    result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(mine), "--output", str(output)])
+    assert result.exit_code == 0, result.output
+    told = " ".join(result.stderr.split())
+    assert "robot.urdf: " in told and "joint origins changed, nothing else" in told and "cannot hold" not in told
+    text = (output / "robot.urdf").read_text()
+    assert text.count('effort="77"') == 6 and "<!-- mine -->" in text and text != mine.read_text()
+    robot = read_robot(output / "robot.yaml")
+    back = robot_from_urdf(output / "robot.urdf", "base", robot.chain.end_effector.name).robot
+    angles = 0.5 * np.linspace(-1, 1, 6)[None]
+    wanted = poses(robot.chain, robot.model_angles(angles), robot.chain.end_effector)[0]
+    np.testing.assert_allclose(poses(back.chain, angles, back.chain.end_effector)[0], wanted, atol=1e-9)
+    for wrong, where in ((urdf_of(analysed("gp180")), "imported"), ("<robot/>", "no <link>")):
+        other = tmp_path / "other.urdf"
+        other.write_text(wrong)
+        result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(other), "--output", str(tmp_path / "none")])
+        assert isinstance(result.exception, InputError) and where in str(result.exception)
+    result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(output / "robot.urdf"), "--output", str(output)])
+    assert isinstance(result.exception, InputError) and "would be replaced" in str(result.exception)
+    assert not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text

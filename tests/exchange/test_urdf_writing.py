@@ -1,5 +1,6 @@
 """A robot as URDF, where pinocchio has it and as it is read back."""
 
+import mujoco
 import numpy as np
 import pytest
 from analysed_robots import analysed
@@ -37,6 +38,17 @@ def test_read_back_it_is_the_robot_that_the_controller_moves(tmp_path, name):
         np.testing.assert_allclose(theirs[0], mine[0], atol=1e-9)
         np.testing.assert_allclose(theirs[1], mine[1], atol=1e-9)
     assert [mass.mass_kg for mass in back.masses] == [m.mass_kg for m in robot.masses]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_mujoco_loads_it_and_no_joint_is_without_effort_or_speed(tmp_path, name):
+    robot = analysed(name)
+    path = written(tmp_path, robot)
+    model, by_pinocchio = mujoco.MjModel.from_xml_path(str(path)), Pinocchio(path).model
+    assert model.nv >= robot.joints and (model.body_inertia[1:] > 0).all()
+    assert (by_pinocchio.effortLimit > 0).all() and (by_pinocchio.velocityLimit > 0).all()
+    heavy = sum(mass.mass_kg for mass in robot.masses if mass.link)
+    assert model.body_mass[1:].sum() == pytest.approx(heavy, abs=1e-4)
 
 
 def test_pinocchio_reads_it_too(tmp_path):

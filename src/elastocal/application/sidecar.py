@@ -56,7 +56,8 @@ def sidecar(calibrated: CalibratedRobot, name: str, date: str, accuracy: Accurac
         mine = deviations[start : start + len(values)]
         start += len(values)
         listed = [
-            {"name": label, "unit": unit, "value": float(value), "std_error": float(error)}
+            # Held, not known: no error is not an error of 0.
+            {"name": label, "unit": unit, "value": float(value), "std_error": float(error) or None}
             for (label, unit), value, error in zip(described, values, mine, strict=True)
         ]
         if effect.effect == SPRINGS:

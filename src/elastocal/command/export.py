@@ -14,13 +14,17 @@ from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from elastocal.application.calibrated import CalibratedRobot
+    from elastocal.exchange.urdf_origins import CorrectedUrdf
     from elastocal.mechanics.robot import Robot
 
 ROBOT, URDF, SIDECAR = "robot.yaml", "robot.urdf", "effects.json"
 TABLE = "table.csv"
 # Of the angles of the table.
 _SEED = 1
+_ROUNDING_MM = 1e-5
 DH, DELTAS, FRAMES = "dh.csv", "dh_deltas.csv", ("dh_frames.pdf", "dh_frames.png")
 _NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES, TABLE)
 
@@ -28,6 +32,12 @@ _NAMES = (ROBOT, URDF, SIDECAR, DH, DELTAS, *FRAMES, TABLE)
 def export(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     output: Annotated[Path, typer.Option(help="Folder for the files.")],
+    urdf: Annotated[
+        Path | None,
+        typer.Option(
+            help="The URDF that the robot was imported from: it comes back with its joint origins changed, nothing else."
+        ),
+    ] = None,
     table: Annotated[
         int,
         typer.Option(
@@ -49,6 +59,7 @@ def export(
     from elastocal.application.calibrated_geometry import folded
     from elastocal.application.scope import campaign_accuracy
     from elastocal.application.sidecar import left_out_m, sidecar
+    from elastocal.exchange.urdf_origins import with_calibrated_origins
     from elastocal.exchange.urdf_writing import urdf_of
     from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.json_files import write_json
@@ -56,9 +67,12 @@ def export(
 
     console = Console(stderr=True)
     check_places(*(output / name for name in _NAMES))
+    if urdf is not None and (output / URDF).resolve() == urdf.resolve():
+        raise InputError(urdf, "", "the file that would be replaced", "a URDF outside of --output")
     found = diagnosed_campaign(folder, accept_environment)
     calibrated = found.calibrated
     robot = folded(calibrated).robot
+    drop_in = None if urdf is None else with_calibrated_origins(urdf, calibrated.robot, robot)
     stated = f"Calibrated by elastocal from the campaign {found.name}."
     text = yaml.safe_dump(document_of(robot), sort_keys=False, default_flow_style=None, width=128)
     accuracy = campaign_accuracy(calibrated, found.case.observations.states)
@@ -66,7 +80,15 @@ def export(
     lines = [accuracy_sentence(accuracy), *(f"    {output / name}" for name in (ROBOT, URDF, SIDECAR))]
     with write_together(output, _NAMES) as partial:
         write_text(partial / ROBOT, f"# {stated}\n{text}")
-        write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
+        if drop_in is None:
+            write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
+        else:
+            (partial / URDF).write_bytes(drop_in.content)
+            lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
+        if drop_in is None and calibrated.robot.joint_names:
+            lines.append(
+                f"{URDF} has points for links, no meshes; --urdf FILE gives back the URDF that the robot was imported from"
+            )
         write_json(partial / SIDECAR, document)
         lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
         lines += _table(calibrated, table, force, partial, output) if table else []
@@ -78,6 +100,25 @@ def export(
         largest, rms = 1e3 * off.max(), 1e3 * np.sqrt((off**2).mean())
         lines.insert(0, f"only in {SIDECAR}: {names}; up to {largest:.3f} mm at the measured poses ({rms:.3f} mm RMS)")
     print_lines(lines, console)
+
+
+def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
+    """Lines to print: what became of the user's URDF, and how far its poses at a campaign's angles are from the robot file's."""
+    import numpy as np
+
+    from elastocal.exchange.urdf_origins import nominal_chain
+    from elastocal.exchange.urdf_reading import read_urdf
+    from elastocal.mechanics.kinematics import poses
+
+    _, chain = nominal_chain(read_urdf(path), drop_in.base, drop_in.tip, path.as_posix())
+    theirs, _ = poses(chain, angles, chain.end_effector)
+    mine, _ = poses(robot.chain, robot.model_angles(nominal.reported_angles(angles)), robot.chain.end_effector)
+    off = 1e3 * float(np.linalg.norm(theirs - mine, axis=1).max())
+    lines = [f"{URDF}: {drop_in.changed} joint origins changed, nothing else; put it where the old one is, beside its meshes"]
+    if off > _ROUNDING_MM:
+        what = "ratios of joints, and errors behind a last joint that has no fixed one after it"
+        lines.append(f"{URDF} cannot hold {what}: up to {off:.3f} mm at the measured poses")
+    return lines
 
 
 def _table(calibrated: CalibratedRobot, rows: int, force: float, partial: Path, output: Path) -> list[str]:

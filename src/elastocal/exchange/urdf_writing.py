@@ -2,7 +2,8 @@
 
 URDF [1]_ is rigid: compliances are not in it. Joint values are the controller's where it counts each joint by itself, in
 either sense; where it couples joints they are the angles of the chain, and a comment says so. A joint that stands in two places
-becomes a mimic joint. Masses are point masses.
+becomes a mimic joint. Masses are point masses; MuJoCo, which moves nothing without mass and inertia, is given the least. A URDF
+from which the robot was imported comes back by `urdf_origins`.
 
 References
 ----------
@@ -23,8 +24,10 @@ if TYPE_CHECKING:
     from elastocal.mechanics.chain import Transform
     from elastocal.mechanics.robot import Robot
 
-# URDF asks for them; nothing here depends on them.
-_EFFORT, _VELOCITY = "0", "0"
+# URDF asks for them, and 0 is a joint that nothing moves; a robot file does not know them.
+_UNLIMITED = "1e9"
+# MuJoCo's own extension of URDF, which other readers skip; kg and kg m².
+_LEAST = {"boundmass": "1e-6", "boundinertia": "1e-9"}
 
 
 def urdf_of(robot: Robot, comment: str = "") -> str:
@@ -48,6 +51,7 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
     root = Xml.Element("robot", name=robot.name.replace(" ", "_"))
     coupled = "" if own else " Joint values are angles of the chain: the controller couples joints, see the robot file."
     root.append(Xml.Comment(f" {comment}{coupled} ".replace("--", "- -")))
+    Xml.SubElement(Xml.SubElement(root, "mujoco"), "compiler", _LEAST)
     _link(root, robot, 0, "base")
     parent, here, places = "base", np.eye(4), {point.after: point for point in robot.chain.points}
     for place in range(len(robot.chain.transforms) + 1):
@@ -106,7 +110,7 @@ def _joint(
     axis = transform.sign * sense * np.eye(3)[transform.axis]
     Xml.SubElement(element, "axis", xyz=_numbers(axis + 0.0))
     low, high = sorted((limit - zero) / sense for limit in robot.joint_limits[joint])
-    Xml.SubElement(element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort=_EFFORT, velocity=_VELOCITY)
+    Xml.SubElement(element, "limit", lower=repr(float(low)), upper=repr(float(high)), effort=_UNLIMITED, velocity=_UNLIMITED)
     if master:
         Xml.SubElement(element, "mimic", joint=master, multiplier="1", offset="0")
 
