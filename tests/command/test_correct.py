@@ -73,3 +73,50 @@ def test_a_pose_out_of_reach_is_named_and_nothing_is_written(monkeypatch, tmp_pa
     assert result.exit_code == 0
     assert pd.read_csv(output)["status"].tolist().count("ok") == 7
     assert "7 of 8 targets corrected" in result.stderr
+
+
+def test_a_program_for_the_controller_stands_beside_the_table(monkeypatch, tmp_path, cell, angles):
+    path = path_file(tmp_path, angles)
+    result, output = run(monkeypatch, cell, path, "--format", "krl")
+    assert result.exit_code == 0, result.stderr
+    assert "targets.src goes to 8 of 8 targets: KUKA KRL, q1 as A1" in " ".join(result.stderr.split())
+    moves = [line for line in output.with_suffix(".src").read_text().splitlines() if "PTP" in line]
+    targets = pd.read_csv(output)[[f"q{j}" for j in range(1, 7)]].to_numpy()
+    np.testing.assert_allclose(
+        np.radians([[float(word.split()[1]) for word in move[15:-1].split(", ")] for move in moves]), targets, atol=1e-8
+    )
+    by_suffix = tmp_path / "go.MOD"
+    result = CliRunner().invoke(app, ["correct", str(cell[1]), str(path), "--output", str(by_suffix)])
+    assert result.exit_code == 0, result.stderr
+    assert (tmp_path / "go.mod").read_text().startswith("MODULE go") and len(pd.read_csv(tmp_path / "go.csv")) == 8
+
+
+def test_targets_that_are_not_reached_are_in_no_program(monkeypatch, tmp_path, cell, angles):
+    path = path_file(tmp_path, angles)
+    table = pd.read_csv(path)
+    table.loc[2, "x"] = 8.0
+    table.to_csv(path, index=False)
+    result, output = run(monkeypatch, cell, path, "--partial", "--format", "tp")
+    assert result.exit_code == 0 and "targets.ls goes to 7 of 8" in " ".join(result.stderr.split())
+    assert output.with_suffix(".ls").read_text().count("GP1:") == 7
+    table["x"] = 8.0
+    table.to_csv(path, index=False)
+    result, _ = run(monkeypatch, cell, path, "--partial", "--format", "urscript")
+    assert isinstance(result.exception, InputError) and "no pose" in str(result.exception)
+    assert not output.with_suffix(".script").exists()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--format", "karel"), "krl | rapid | tp | urscript"),
+        (("--axes", "A1,A2"), "with --format"),
+        (("--format", "krl", "--axes", "A1,A2"), "6 different names"),
+        (("--format", "krl", "--output", "x.mod"), "another language"),
+        (("--format", "krl", "--output", "my targets.csv"), "as the name of a program"),
+    ],
+)
+def test_what_is_no_program_is_refused_before_any_work(monkeypatch, tmp_path, cell, angles, more, words):
+    result, _ = run(monkeypatch, cell, path_file(tmp_path, angles), *more)
+    assert isinstance(result.exception, InputError) and words in str(result.exception)
+    assert [file.name for file in tmp_path.iterdir()] == ["path.csv"] and not Path("x.mod").exists()

@@ -1,4 +1,4 @@
-"""What CONTRIBUTING.md shows works as it stands there: a robot, a strategy, an effect and an importer, one file each."""
+"""What CONTRIBUTING.md shows works as it stands there: robot, strategy, effect, importer, language, one file each."""
 
 import importlib.util
 import re
@@ -14,6 +14,8 @@ from elastocal.campaigns.importers.catalogue import Importer
 from elastocal.campaigns.reading import read_campaign, read_robot
 from elastocal.effects import catalogue
 from elastocal.effects.conditions import conditions_of
+from elastocal.exchange.controllers.catalogue import controllers
+from elastocal.exchange.controllers.protocol import Controller, axes_of, targets_of
 from elastocal.io.documents import check_document, read_document
 from elastocal.mechanics.sites import sites_of
 from elastocal.study.strategies import check_strategy, strategy_from_document
@@ -92,6 +94,15 @@ def test_the_importer_makes_a_campaign_and_refuses_a_file_of_another_kind(module
     path.write_text("J1;J2\n1;2\n", encoding="utf-8")
     with refused(path, "header", "a table of owner/repository"):
         importer.write_campaign(path, tmp_path / "other", "other")
+
+
+def test_the_language_is_whole_and_writes_targets(module):
+    language = module("A controller's language")
+    assert language.NAME not in controllers()
+    assert {*Controller.__annotations__, "program"} <= set(vars(language))
+    shifts = (True, *6 * (False,))
+    targets = targets_of(np.array([[0.5, *6 * (np.pi / 6,)]]), shifts, axes_of(language, shifts, ""))
+    assert language.program("GO", targets) == f"GO\n{6 * '30.000000 '}500.000000\n"
 
 
 @pytest.mark.parametrize("page", ["CONTRIBUTING.md", "config/README.md", "SECURITY.md", "CODE_OF_CONDUCT.md"])

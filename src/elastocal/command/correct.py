@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from elastocal.application.accuracy import Prediction
     from elastocal.application.compensation import Correction
+    from elastocal.exchange.controllers.protocol import Controller
     from elastocal.exchange.target_path import TargetPath
 
 # Lines that a message names.
@@ -28,7 +29,20 @@ _NAMED = 5
 def correct(
     folder: Annotated[Path, typer.Argument(help="Folder of a diagnosed campaign.")],
     path: Annotated[Path, typer.Argument(help="CSV of wanted poses: x, y, z in m, rx, ry, rz in rad; fx..mz, q1..qn.")],
-    output: Annotated[Path, typer.Option(help="CSV of joint targets.")],
+    output: Annotated[
+        Path,
+        typer.Option(
+            help="CSV of joint targets; or a program for a controller by its suffix, .src, .mod, .ls, .script, beside a CSV."
+        ),
+    ],
+    language: Annotated[
+        str,
+        typer.Option("--format", help="Write a program beside the CSV too: krl (KUKA), rapid (ABB), tp (FANUC), urscript."),
+    ] = "",
+    axes: Annotated[
+        str,
+        typer.Option(help="What the controller calls q1..qn, such as A1,A2,E1,A3,A4,A5,A6; asked for where it is not plain."),
+    ] = "",
     partial: Annotated[bool, typer.Option("--partial", help="Write the file though some targets cannot be reached.")] = False,
     accept_environment: AcceptEnvironment = False,
 ) -> None:
@@ -43,17 +57,24 @@ def correct(
     from elastocal.application.calibrated import OperatingConditions, assumptions
     from elastocal.application.compensation import corrected
     from elastocal.application.scope import campaign_accuracy
+    from elastocal.exchange.controllers.protocol import axes_of, check_name, targets_of
     from elastocal.exchange.target_path import OK, read_target_path
-    from elastocal.io.atomic_writes import check_places
+    from elastocal.io.atomic_writes import check_places, write_text, write_together
     from elastocal.io.data_frames import write_csv
     from elastocal.validation.fitted_range import beyond_campaign
 
     console = Console(stderr=True)
-    check_places(output)
+    controller, table, program = places_of(output, language)
+    if axes and controller is None:
+        raise InputError("--axes", "", repr(axes), "with --format, or an --output that is a program")
+    name = check_name(controller, program) if controller else ""
+    check_places(table, program)
     if not output.parent.is_dir():
         raise InputError(output, "", "no such folder", "a file in a folder that is there")
     campaign = diagnosed_campaign(folder, accept_environment)
     calibrated = campaign.calibrated
+    prismatic = calibrated.robot.chain.prismatic
+    named = axes_of(controller, prismatic, axes) if controller else ()
     wanted = read_target_path(path, calibrated.robot.joints)
     operating = OperatingConditions(wanted.wrench, wanted.approach, wanted.time_s, wanted.temperature_c)
     print_lines((f"assumed: {line}" for line in assumptions(calibrated, operating)), console)
@@ -72,16 +93,23 @@ def correct(
         rows = ", ".join(f"line {wanted.lines[row]} is {found.status[row]}" for row in bad[:_NAMED])
         more = f" and {len(bad) - _NAMED} more" if len(bad) > _NAMED else ""
         raise InputError(path, "", rows + more, "poses that the robot reaches within its limits, or --partial")
+    good = found.status == OK
+    if controller and not good.any():
+        raise InputError(path, "", "no pose that the robot reaches", "one at least, for a program")
     beyond = beyond_campaign(
         campaign.case.observations.states, calibrated.robot.model_angles(found.joint_angles), wanted.wrench
     )
     errors = predicted(calibrated, found.joint_angles, operating)
     before = before_m(calibrated, wanted.position, wanted.rotation, found.error_before)
-    write_csv(output, joint_targets(wanted, found, before, errors, beyond))
+    files = [table, program] if controller else [table]
+    with write_together(output.parent, [file.name for file in files]) as folder_of_all:
+        write_csv(folder_of_all / table.name, joint_targets(wanted, found, before, errors, beyond))
+        if controller:
+            targets = targets_of(found.joint_angles[good], prismatic, named)
+            write_text(folder_of_all / program.name, controller.program(name, targets))
     if beyond.any():
         share = f"{beyond.sum():,} of {len(beyond):,} targets"
         print_lines([f"{share} lie beyond the poses or loads of the campaign: errors there are extrapolated"], console)
-    good = found.status == OK
     lines = [f"{good.sum():,} of {len(good):,} targets corrected"]
     if good.any():
         rms = np.sqrt((before[good] ** 2).mean())
@@ -89,7 +117,25 @@ def correct(
         lines[0] += f"; uncorrected they would be missed by {millimetres(rms)} RMS (predicted, in the same frame)"
         lines.append(accuracy_sentence(reachable.accuracy("the targets")))
         lines.append(accuracy_sentence(campaign_accuracy(calibrated, campaign.case.observations.states)))
-    print_lines([*lines, f"    {output}"], console)
+    if controller:
+        called = ", ".join(f"q{number} as {axis}" for number, axis in enumerate(named, 1))
+        lines.append(f"{program.name} goes to {good.sum():,} of {len(good):,} targets: {controller.WORDS}, {called}")
+    print_lines([*lines, *(f"    {file}" for file in files)], console)
+
+
+def places_of(output: Path, language: str) -> tuple[Controller | None, Path, Path]:
+    """The language of a program, if there shall be one, and where the CSV and the program go."""
+    from elastocal.exchange.controllers.catalogue import controller_of
+
+    by_suffix = controller_of("", output.suffix)
+    controller = controller_of(language, "") if language else by_suffix
+    if controller is None:
+        return None, output, output
+    if by_suffix not in (None, controller):
+        raise InputError(
+            output, "--output", f"a program in another language than {controller.WORDS}", f"{controller.SUFFIX} | .csv"
+        )
+    return controller, output.with_suffix(".csv") if by_suffix else output, output.with_suffix(controller.SUFFIX)
 
 
 def joint_targets(

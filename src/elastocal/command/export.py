@@ -103,7 +103,7 @@ def export(
 
 
 def _drop_in(drop_in: CorrectedUrdf, path: Path, nominal: Robot, robot: Robot, angles: np.ndarray) -> list[str]:
-    """Lines to print: what became of the user's URDF, and how far its poses at a campaign's angles are from the robot file's."""
+    """Lines to print: what became of the user's URDF, and how far its poses at measured angles are from the robot file's."""
     import numpy as np
 
     from elastocal.exchange.urdf_origins import nominal_chain
