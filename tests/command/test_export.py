@@ -1,19 +1,25 @@
 """The calibrated robot as files that are read again."""
 
 import json
+import re
 
 import numpy as np
 import pandas as pd
 import pytest
 from analysed_robots import analysed
 from certified import certified_checkout
+from made_calibrated import made_calibrated
+from made_urdf import joint, link, written
 from typer.testing import CliRunner
 
+from elastocal.application.calibrated_geometry import folded
 from elastocal.campaigns.reading import read_robot
+from elastocal.command.export import _drop_in
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.urdf import robot_from_urdf
+from elastocal.exchange.urdf_origins import with_calibrated_origins
 from elastocal.exchange.urdf_writing import urdf_of
 from elastocal.mechanics.kinematics import poses
 
@@ -70,3 +76,21 @@ def test_the_users_urdf_comes_back_with_other_joint_origins_and_another_robots_i
     result = CliRunner().invoke(app, ["export", str(cell[1]), "--urdf", str(output / "robot.urdf"), "--output", str(output)])
     assert isinstance(result.exception, InputError) and "would be replaced" in str(result.exception)
     assert not (tmp_path / "none").exists() and (output / "robot.urdf").read_text() == text
+
+
+def test_what_a_urdf_has_no_place_for_is_stated_in_millimetres(tmp_path):
+    """No fixed joint stands behind the last one, whose link's own error turns with it; and ratios are no joint origins."""
+    path = written(tmp_path, link("a"), link("b"), link("c"), joint("one", "a", "b"), joint("two", "b", "c", xyz=(0.5, 0, 0)))
+    nominal = robot_from_urdf(path, "a", "c").robot
+    angles = np.array([[0.4, -0.3], [1.0, 0.2]])
+
+    def lines(*keys):
+        robot = folded(made_calibrated(nominal, *keys, identified=False)).robot
+        drop_in = with_calibrated_origins(path, nominal, robot)
+        output = tmp_path / "robot.urdf"
+        output.write_bytes(drop_in.content)
+        return _drop_in(drop_in, output, nominal, robot, angles)
+
+    assert len(lines("joint_offset@1", "joint_offset@2", "link_geometry@1")) == 1
+    for key in ("link_geometry@2", "transmission_ratio@1"):
+        assert re.search(r"cannot hold .*: up to 0\.[0-9]*[1-9][0-9]* mm", lines("link_geometry@1", key)[1])

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import given, settings
-from hypothesis import strategies as st
-from made_urdf import Pinocchio, assert_same_poses, joint, link, written
+from made_urdf import Pinocchio, assert_same_poses, joint, link, segments, written
 from support import refused
 from synthetic import made_states
 
@@ -113,18 +112,6 @@ def test_millimetres_are_refused(tmp_path):
     path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 500)))
     with refused(path, "chain", "metres"):
         robot_from_urdf(path, "a", "b")
-
-
-direction = st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
-along = st.sampled_from([(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (-1, 0, 0)])
-angle = st.one_of(st.floats(-3.2, 3.2), st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.57079632679]))
-shift = st.tuples(*[st.one_of(st.just(0.0), st.floats(-0.3, 0.3))] * 3)
-kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
-segments = st.lists(
-    st.tuples(kinds, shift, st.tuples(angle, angle, angle), st.one_of(direction, along), st.floats(0.1, 5), shift, shift),
-    min_size=2,
-    max_size=7,
-).filter(lambda parts: any(part[0] != "fixed" for part in parts))
 
 
 @settings(max_examples=60, deadline=None)

@@ -8,15 +8,19 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_calibrated import made_calibrated
-from made_urdf import Pinocchio
+from made_urdf import Pinocchio, joint, link, segments, written
 from support import refused
 
 from elastocal.application.calibrated_geometry import folded
+from elastocal.effects.catalogue import candidates_on
 from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_origins import with_calibrated_origins
 from elastocal.exchange.urdf_reading import read_urdf
 from elastocal.mechanics.kinematics import poses
+from elastocal.mechanics.sites import sites_of
 
 MESH = '<geometry><mesh filename="part.stl" scale="0.5 0.5 0.5"/></geometry>'
 BOX = '<geometry><box size="0.1 0.1 0.1"/></geometry>'
@@ -49,11 +53,13 @@ def text():
     """With what people have in their files: comments, meshes, other programs' elements, attributes in any form."""
     parts = ['<?xml version="1.0" encoding="utf-8"?>\n<!-- Zelle 7, geprüft -->\n<robot name="my cell">\n']
     parts.append('  <material name="red"><color rgba="1 0 0 1"/></material>\n  <link name="world_mount"/>\n')
-    for number, joint in enumerate(JOINTS):
-        if joint[3] == "tool0":
+    for number, described in enumerate(JOINTS):
+        if described[3] == "tool0":
             parts.append('  <link name="tool0"/>\n')
         else:
-            parts.append(LINK.format(name=joint[3], z=0.01 * number, mass=1.0 + number, geometry=MESH if number % 2 else BOX))
+            parts.append(
+                LINK.format(name=described[3], z=0.01 * number, mass=1.0 + number, geometry=MESH if number % 2 else BOX)
+            )
     for name, kind, parent, child, origin, axis in JOINTS:
         parts.append(f'  <joint type="{kind}"\n     name="{name}"><!-- <origin xyz="9 9 9"/> -->\n    {origin}\n')
         parts.append(f'    <parent link="{parent}"/><child link="{child}"/>\n')
@@ -156,8 +162,6 @@ def test_names_meshes_inertias_limits_and_mimic_are_as_they_were_in_both(cell):
 
 
 def test_a_joint_that_mimics_one_of_the_chain_takes_its_offset_too(tmp_path):
-    from made_urdf import joint, link, written
-
     parts = [link(name) for name in "abcde"]
     parts.append(joint("one", "a", "b", "revolute", (0, 0, 0.4), (0.1, 0, 0), (0, -1, 0)))
     parts.append(joint("two", "b", "c", "revolute", (0.2, 0, 0.3), (0, 0.5, 0), (0, 0, 1)))
@@ -214,3 +218,44 @@ def test_a_file_in_utf_16_is_refused(cell):
     other.write_bytes(text().replace("utf-8", "utf-16").encode("utf-16"))
     with refused(other, "UTF-16", "UTF-8"):
         with_calibrated_origins(other, robot, calibrated)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "iso-8859-1"])
+def test_other_encodings_stay_what_they_are(cell, encoding):
+    path, robot, calibrated = cell
+    other = path.with_name("other.urdf")
+    other.write_bytes(text().replace('encoding="utf-8"', f'encoding="{encoding.removesuffix("-sig")}"').encode(encoding))
+    found = with_calibrated_origins(other, robot, calibrated)
+    assert (
+        without_origins(found.content) == without_origins(other.read_bytes())
+        and "geprüft".encode(encoding)[-7:] in found.content
+    )
+    usual = path.with_name("usual.urdf")
+    usual.write_bytes(found.content)
+    both = [read_urdf(p).joints for p in (usual, exported(cell)[0])]
+    for mine, theirs in zip(*both, strict=True):
+        np.testing.assert_array_equal(mine.origin, theirs.origin)
+
+
+@settings(max_examples=25, deadline=None)
+@given(parts=segments, seed=st.integers(0, 1000))
+def test_any_chain_moves_as_its_calibrated_robot(tmp_path_factory, parts, seed):
+    described = [link("l0")]
+    for number, (kind, xyz, rpy, axis, *_) in enumerate(parts, 1):
+        described += [link(f"l{number}"), joint(f"j{number}", f"l{number - 1}", f"l{number}", kind, xyz, rpy, axis, (-1, 1))]
+    described += [link("tip"), joint("end", f"l{len(parts)}", "tip", "fixed", (0.1, 0, 0.2))]
+    path = written(tmp_path_factory.mktemp("urdf"), *described)
+    robot = robot_from_urdf(path, "l0", "tip").robot
+    places = range(1, robot.joints + 1)
+    keys = [*(f"joint_offset@{place}" for place in places), *(f"link_geometry@{place}" for place in places)]
+    known = candidates_on(sites_of(robot))
+    made = made_calibrated(robot, *(key for key in keys if key in known), identified=False, seed=seed)
+    calibrated = folded(made).robot
+    output, _ = exported((path, robot, calibrated))
+    angles = np.random.default_rng(seed).uniform(-1, 1, (3, robot.joints))
+    position, rotation = poses(calibrated.chain, calibrated.model_angles(angles), calibrated.chain.end_effector)
+    by_pinocchio = Pinocchio(output)
+    for values, at, axes in zip(angles, position, rotation, strict=True):
+        there = by_pinocchio.pose("l0", "tip", dict(zip(robot.joint_names, values, strict=True)))
+        np.testing.assert_allclose(there[0], at, atol=1e-8)
+        np.testing.assert_allclose(there[1], axes, atol=1e-8)

@@ -4,10 +4,23 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import pinocchio as pin
+from hypothesis import strategies as st
 
 from elastocal.mechanics.kinematics import poses
 
 GRAVITY = np.array([0.0, 0.0, -9.80665])
+
+direction = st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1)
+along = st.sampled_from([(1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1), (-1, 0, 0)])
+angle = st.one_of(st.floats(-3.2, 3.2), st.sampled_from([0.0, np.pi / 2, -np.pi / 2, np.pi, 1.5708, -1.57079632679]))
+shift = st.tuples(*[st.one_of(st.just(0.0), st.floats(-0.3, 0.3))] * 3)
+kinds = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
+# Chains: kind, origin, roll-pitch-yaw, axis, mass, centre, place of a part beside.
+segments = st.lists(
+    st.tuples(kinds, shift, st.tuples(angle, angle, angle), st.one_of(direction, along), st.floats(0.1, 5), shift, shift),
+    min_size=2,
+    max_size=7,
+).filter(lambda parts: any(part[0] != "fixed" for part in parts))
 
 
 def numbers(values):
