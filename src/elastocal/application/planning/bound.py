@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.application.planning.exchange import matrix_of
+from elastocal.application.planning.exchange import matrix_of, with_prior
 
 if TYPE_CHECKING:
     from elastocal.application.planning.criteria import Criterion
@@ -91,4 +91,4 @@ def _weights(rows: np.ndarray, count: int, criterion: Criterion) -> np.ndarray:
 
 def _matrix(rows: np.ndarray, weights: np.ndarray) -> np.ndarray:
     flat = (np.sqrt(weights)[:, None, None] * rows).reshape(-1, rows.shape[2]).astype(float)
-    return np.eye(rows.shape[2]) + flat.T @ flat
+    return with_prior(flat.T @ flat)

@@ -18,7 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from elastocal.application.planning.exchange import with_prior
+
 CRITERIA = ("D", "A", "I")
+# Candidates whose small matrices are in memory at a time.
+_AT_ONCE = 1000
 
 
 @dataclass(frozen=True)
@@ -51,12 +55,14 @@ class Criterion:
         -------
         ndarray (N,)
         """
+        return np.concatenate([self._gains(part, matrix) for part in np.split(rows, range(_AT_ONCE, len(rows), _AT_ONCE))])
+
+    def _gains(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
         white = _whitened(rows, matrix)
-        inner = white @ white.transpose(0, 2, 1)
-        inner[:, np.arange(rows.shape[1]), np.arange(rows.shape[1])] += 1.0
+        inner = with_prior(white @ white.transpose(0, 2, 1))
         if self.weight is None:
             return np.linalg.slogdet(inner)[1]
-        across = white @ self._whitened_weight(matrix).astype(white.dtype) @ white.transpose(0, 2, 1)
+        across = white @ self._whitened_weight(matrix) @ white.transpose(0, 2, 1)
         return np.trace(np.linalg.solve(inner, across), axis1=1, axis2=2)
 
     def slopes(self, rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
@@ -64,7 +70,7 @@ class Criterion:
         white = _whitened(rows, matrix)
         if self.weight is None:
             return (white**2).sum(axis=(1, 2))
-        across = white @ self._whitened_weight(matrix).astype(white.dtype)
+        across = white @ self._whitened_weight(matrix)
         return (across * white).sum(axis=(1, 2))
 
     def _whitened_weight(self, matrix: np.ndarray) -> np.ndarray:
@@ -98,5 +104,6 @@ def mean_squares(rows: np.ndarray) -> np.ndarray:
 
 
 def _whitened(rows: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    inverse = np.linalg.inv(np.linalg.cholesky(matrix)).astype(rows.dtype)
+    """Rows in which the matrix is I, in double precision: single precision loses the 1 of I + Z Z' to an unknown base."""
+    inverse = np.linalg.inv(np.linalg.cholesky(matrix))
     return (rows.reshape(-1, rows.shape[2]) @ inverse.T).reshape(rows.shape)

@@ -20,12 +20,24 @@ _SHORT_LIST = 400
 _ROUNDS = 4
 # An exchange that gains less than this share is rounding.
 _LEAST_GAIN = 1e-6
+# What a sum of thousands of products in double precision is known to, over the sum.
+_ROUNDING = 1e-12
+
+
+def with_prior(sums: np.ndarray) -> np.ndarray:
+    """Sums of products, ndarray (..., P, P), plus I: in place, and positive definite whatever their size.
+
+    Where rounding has lost more than the 1, a diagonal element grows by what rounding may have lost.
+    """
+    here = np.arange(sums.shape[-1])
+    sums[..., here, here] += np.maximum(1.0, _ROUNDING * sums[..., here, here])
+    return sums
 
 
 def matrix_of(rows: np.ndarray, chosen: np.ndarray | list[int]) -> np.ndarray:
     """Information matrix of some candidates with the prior, ndarray (P, P), in double precision."""
     flat = rows[chosen].reshape(-1, rows.shape[2]).astype(float)
-    return np.eye(rows.shape[2]) + flat.T @ flat
+    return with_prior(flat.T @ flat)
 
 
 def greedy(rows: np.ndarray, count: int, criterion: Criterion) -> list[int]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from elastocal.application.accuracy import without_rigid_motion
 from elastocal.application.planning.criteria import Criterion, mean_squares
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
 from elastocal.application.planning.plan import allowed_candidates
 from elastocal.application.planning.survey import accuracy_rows, information, model_of, observed
 from elastocal.fitting.displacement import conditions
@@ -110,7 +110,7 @@ def _left(matrix: np.ndarray, weight: np.ndarray) -> float:
 
 def _curve(rows: np.ndarray, order: np.ndarray, weight: np.ndarray) -> np.ndarray:
     each = rows[order].astype(float)
-    totals = np.eye(rows.shape[2]) + np.cumsum(each.transpose(0, 2, 1) @ each, axis=0)
+    totals = with_prior(np.cumsum(each.transpose(0, 2, 1) @ each, axis=0))
     return np.sqrt(np.trace(np.linalg.solve(totals, weight), axis1=1, axis2=2))
 
 

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from elastocal.application.planning.bound import best_value, efficiency
 from elastocal.application.planning.cell import allowed
 from elastocal.application.planning.criteria import Criterion, criterion, mean_squares
-from elastocal.application.planning.exchange import exchanged, greedy, matrix_of
+from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
 from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
 from elastocal.errors import InputError
 
@@ -234,9 +234,8 @@ def _best_first(rows: np.ndarray, chosen: list[int], weight: np.ndarray) -> list
 
 def _curve(rows: np.ndarray, order: list[int] | np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Accuracy with the first 1, 2, .. of some configurations, ndarray (len(order),), m."""
-    matrix, found = np.eye(rows.shape[2]), []
+    total, found = np.zeros((rows.shape[2], rows.shape[2])), []
     for place in order:
-        more = rows[place].astype(float)
-        matrix = matrix + more.T @ more
-        found.append(np.sqrt(np.trace(np.linalg.solve(matrix, weight))))
+        total += rows[place].T @ rows[place]
+        found.append(np.sqrt(max(np.trace(np.linalg.solve(with_prior(total.copy()), weight)), 0.0)))
     return np.array(found)

@@ -151,7 +151,7 @@ def information(survey: Survey, reported_angles: np.ndarray, force: np.ndarray, 
     deviation = np.repeat([survey.position_m, survey.orientation_rad], 3)[:rows]
     scale = plausible / deviation[:, None]
     numbers = survey.numbers
-    found = np.empty((len(reported_angles), numbers, len(named)), np.float32)
+    found = np.empty((len(reported_angles), numbers, len(named)))
     for start in range(0, len(reported_angles), max(_AT_ONCE // len(survey.shares), 1)):
         part = slice(start, start + max(_AT_ONCE // len(survey.shares), 1))
         seen = observed(survey, reported_angles[part], force[part])
