@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import difflib
+import math
 import sys
 from itertools import islice
 from pathlib import Path
@@ -36,6 +37,11 @@ _ROWS_AT_A_TIME = 20_000
 _COMMENT = "#"
 
 CSV, PARQUET = "measurements.csv", "measurements.parquet"
+# Columns of a sheet for people: a place to tick, which is not read, and joint angles as controllers show them, q1_deg or q1_mm,
+# with the SI value of one unit. They must agree with q1 .. qn to what is shown.
+TICK = "done"
+SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
+_SHOWN_TO = 2e-3
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -66,6 +72,11 @@ def file_columns(joints: int) -> dict[str, Column]:
         Column("u95_m", "float64", "m", "expanded uncertainty of this position: 95 % of one coordinate"),
     ]
     return {column.name: column for column in columns}
+
+
+def sheet_columns(joints: int) -> set[str]:
+    """Names of the columns of a sheet for people, which a file of measurements may have beside `file_columns`."""
+    return {TICK, *(f"q{j}_{unit}" for j in range(1, joints + 1) for unit in SHOWN)}
 
 
 def read_measurements(folder: Path, joints: int, measured: str) -> MeasurementFile:
@@ -116,9 +127,9 @@ def check_column_names(names: Collection[str], joints: int, path: str) -> None:
     InputError
         The first such column.
     """
-    known = file_columns(joints)
+    known, beside = file_columns(joints), sheet_columns(joints)
     for name in names:
-        if name not in known:
+        if name not in known and name not in beside:
             # That q7 is unknown helps little where it is not stated how many joints the robot has.
             of = f", for {joints} joints" if name.rstrip("0123456789") in ("q", "approach") else ""
             missing = [other for other in known if other not in names]
@@ -143,7 +154,7 @@ def write_measurements(path: str | Path, table: Mapping[str, Sequence[Any] | np.
 
 def _read_csv(path: str, joints: int) -> tuple[Columns, np.ndarray, np.ndarray]:
     """Columns, and of each row that is not blank its number and its line; a few thousand rows at a time."""
-    texts = {name for name, column in file_columns(joints).items() if column.type == "string"}
+    texts = {TICK, *(name for name, column in file_columns(joints).items() if column.type == "string")}
     # A byte order mark is what spreadsheets write. Bytes that are no UTF-8 become what `_lines` refuses with the line.
     with open(path, encoding="utf-8-sig", errors="surrogateescape", newline="") as file:
         source = _lines(file, path)
@@ -307,6 +318,9 @@ class MeasurementFile:
             if name not in columns:
                 unit = f" in {known[name].unit}" if known[name].unit else ""
                 raise self.fault("header", f"no column {name!r}", f"{name}: {known[name].meaning}{unit}")
+        for name in self.angles:
+            for unit in SHOWN:
+                self._check_shown(name, f"{name}_{unit}", SHOWN[unit])
 
     @property
     def header_line(self) -> int | None:
@@ -345,6 +359,17 @@ class MeasurementFile:
     def texts(self, name: str) -> list[str]:
         """list of str (N,)."""
         return [str(cell).strip() for cell in self.columns[name]]
+
+    def _check_shown(self, name: str, beside: str, scale: float) -> None:
+        """Refuse a row in which what the controller shows is not what the joint angle is."""
+        if beside not in self.columns:
+            return
+        values = self._column(name) / scale
+        wrong = np.abs(values - self._column(beside)) > _SHOWN_TO
+        if wrong.any():
+            index = int(np.argmax(wrong))
+            allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"
+            raise self.cell_fault(index, beside, shown(self.columns[beside][index]), allowed)
 
     def _column(self, name: str) -> np.ndarray:
         try:

@@ -55,7 +55,7 @@ def csv(
         int | None, typer.Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
     ] = None,
     options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is there.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is filled in.")] = False,
 ) -> None:
     """Make measurements.csv of another program's table.
 
@@ -107,9 +107,17 @@ def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
 
 
 def _is_filled(path: Path) -> bool:
-    """Whether a sheet holds a measurement: one of `init`, a header alone, may be replaced."""
-    with path.open(encoding="utf-8") as file:
-        return sum(1 for line in file if line.strip()) > 1
+    """Whether a sheet holds a measurement: one of `init` or `plan`, without a position in any row, may be replaced."""
+    from csv import DictReader, Error
+
+    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+        rows = DictReader((line for line in file if line.strip() and not line.startswith("#")), skipinitialspace=True)
+        try:
+            places = [name for name in rows.fieldnames or () if name.strip() in ("x", "y", "z", "rx", "ry", "rz")]
+            # Rows of a file without such columns may hold anything.
+            return any(not places or any((row[name] or "").strip() for name in places) for row in rows)
+        except Error:
+            return True
 
 
 def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:

@@ -10,18 +10,21 @@ import typer
 from rich.console import Console
 
 from elastocal.command.printed import print_lines
-from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, length_m, numbers
-from elastocal.errors import InputError
+from elastocal.command.quantities import FARTHEST_TARGET_M, LARGEST_SEED, MOST_POSES, MOST_ROWS, angle_rad, length_m, numbers
+from elastocal.errors import InputError, text_fault
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from elastocal.application.planning.plan import Plan
+    from elastocal.application.planning.sensors import Sensor
     from elastocal.application.planning.survey import Survey
     from elastocal.campaigns.campaign import Target
     from elastocal.mechanics.chain import Chain
 
 ROBOT = "robot.yaml"
+# Of a target, as in campaign.yaml.
+_LONGEST_NAME = 80
 
 
 def plan(
@@ -39,14 +42,26 @@ def plan(
     criterion: Annotated[str, typer.Option(help="D, A or I: determinant, parameters, error over the workspace.")] = "D",
     force: Annotated[float, typer.Option(min=0.0, max=1e6, help="Force of the load in N; 0 for none.")] = 0.0,
     pull: Annotated[bool, typer.Option("--pull", help="The load pulls in any direction; otherwise it hangs.")] = False,
-    measured: Annotated[str, typer.Option(help="position or pose.")] = "position",
+    sensor: Annotated[
+        str | None,
+        typer.Option(
+            help="What reads the targets, for the noise: tracker (30 µm), t-mac (30 µm, 0.005°), camera (120 µm, 0.05°)."
+        ),
+    ] = None,
+    measured: Annotated[str | None, typer.Option(help="position or pose; what the sensor usually reads.")] = None,
     base_known: Annotated[bool, typer.Option("--base-known", help="Measurements are in the base frame.")] = False,
     target: Annotated[
-        list[str] | None, typer.Option(help="Measuring point with a reflector, as POINT or POINT=x,y,z in m.")
+        list[str] | None,
+        typer.Option(
+            help="A target and its measuring point: POINT, POINT=x,y,z in m, or with a name of its own A:POINT=x,y,z."
+        ),
     ] = None,
     tracker: Annotated[str | None, typer.Option(help="Where the tracker stands, x,y,z in m, base axes.")] = None,
     box: Annotated[list[str] | None, typer.Option(help="Keep out of xmin,xmax,ymin,ymax,zmin,zmax in m, base axes.")] = None,
-    noise: Annotated[str, typer.Option(help="Standard deviation of a coordinate.")] = "0.03mm",
+    noise: Annotated[str | None, typer.Option(help="Standard deviation of a coordinate, such as 0.03mm; the sensor's.")] = None,
+    orientation_noise: Annotated[
+        str | None, typer.Option(help="Standard deviation of a turn about an axis, such as 0.01deg; the sensor's.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of everything that is drawn.")] = 1,
 ) -> None:
     """Choose configurations and loads that say most about a robot, among those that arm, cell and tracker allow."""
@@ -70,9 +85,9 @@ def plan(
 
     console = Console(stderr=True)
     arm = read_robot(robot)
-    for name, value, known in (("criterion", criterion, CRITERIA), ("measured", measured, ("position", "pose"))):
-        if value not in known:
-            raise InputError(f"--{name}", "", repr(value), ", ".join(known))
+    if criterion not in CRITERIA:
+        raise InputError("--criterion", "", repr(criterion), ", ".join(CRITERIA))
+    instrument, measured = _sensor(sensor, measured)
     if output is None and folder is None:
         raise InputError("plan", "", "neither --output nor --folder", "where the plan shall go")
     if folder is not None and os.path.lexists(folder):
@@ -84,8 +99,8 @@ def plan(
         check_places(*(output.with_name(name) for name in names))
     loads = Loads(force, pull)
     targets = _targets(target or [arm.chain.end_effector.name], arm.chain)
-    deviation = length_m("--noise", noise)
-    survey = Survey(arm, targets, not base_known, measured, loads.shares, deviation, deviation)
+    position_m, orientation_rad = _noise(noise, orientation_noise, instrument, measured)
+    survey = Survey(arm, targets, not base_known, measured, loads.shares, position_m, orientation_rad)
     boxes = tuple(numbers("--box", text, 6).reshape(3, 2) for text in box or ())
     for corner in boxes:
         if (corner[:, 0] >= corner[:, 1]).any():
@@ -128,6 +143,9 @@ def plan(
         f"predicted position error of a robot that is corrected by the fit, {frame}: {millimetres(found.accuracy_m[-1])} RMS "
         f"over configurations that the cell allows (standard error, by the uncertainty of the parameters alone; the tracker's "
         f"noise is not in it); with random poses {random[1]:.3f} mm ({random[0]:.3f} to {random[2]:.3f})",
+        f"assumed noise: {1e6 * position_m:.3g} µm"
+        + (f", {1e6 * orientation_rad:.3g} µrad" if measured == "pose" else "")
+        + ("" if noise and (orientation_noise or measured == "position") else f"; {instrument.words}"),
         f"{criterion}-efficiency: at least {found.efficiency:.2f} of the best design with as many poses",
         f"    {output}, {output.with_suffix('.pdf')}" + (f", {folder}" if folder else ""),
     ]
@@ -135,19 +153,55 @@ def plan(
 
 
 def _targets(described: list[str], chain: Chain) -> tuple[Target, ...]:
-    """Reflectors on measuring points, at a known offset or an unknown one."""
+    """Reflectors on measuring points, at a known offset or an unknown one, each by a name of its own."""
     from elastocal.campaigns.campaign import Target
 
-    found = []
+    known = [place.name for place in chain.points]
+    found: dict[str, Target] = {}
     for text in described:
-        point, _, offset = text.partition("=")
-        known = [place.name for place in chain.points]
+        place, equals, offset = (text, "", "") if text in known else text.partition("=")
+        name, colon, point = (place, "", place) if place in known else map(str.strip, place.partition(":"))
         if point not in known:
-            raise InputError("--target", "", repr(point), ", ".join(known))
-        found.append(
-            Target(point, point, tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M).tolist()) if offset else None)
+            raise InputError(
+                "--target", "", repr(point if colon else place), f"{', '.join(known)}, with a name before: A:{known[-1]}"
+            )
+        if not name or len(name) > _LONGEST_NAME:
+            raise InputError("--target", "", f"a name of {len(name)} characters", f"1 to {_LONGEST_NAME}, such as A:{point}")
+        if fault := text_fault(name):
+            raise InputError("--target", "", *fault)
+        if name in found:
+            raise InputError("--target", "", f"{name!r} twice", f"a name for each target, such as A:{point} and B:{point}")
+        at = tuple(numbers("--target", offset, 3, FARTHEST_TARGET_M).tolist()) if equals else None
+        found[name] = Target(name, point, at)
+    return tuple(found.values())
+
+
+def _sensor(name: str | None, measured: str | None) -> tuple[Sensor, str]:
+    """What reads the targets, and whether it reads positions or poses."""
+    from elastocal.application.planning.sensors import SENSORS
+
+    if measured not in (None, "position", "pose"):
+        raise InputError("--measured", "", repr(measured), "position, pose")
+    name = (name or ("t-mac" if measured == "pose" else "tracker")).lower()
+    if name not in SENSORS:
+        raise InputError("--sensor", "", repr(name), ", ".join(SENSORS))
+    usual = SENSORS[name].measured
+    if measured not in (None, *usual):
+        other = ", ".join(each for each, sensor in SENSORS.items() if measured in sensor.measured)
+        raise InputError("--measured", "", f"{measured} by a {name}", f"{usual[0]}, or --sensor {other}")
+    return SENSORS[name], measured or usual[0]
+
+
+def _noise(position: str | None, orientation: str | None, sensor: Sensor, measured: str) -> tuple[float, float]:
+    """Standard deviations as stated, or the sensor's."""
+    if orientation is not None and measured != "pose":
+        raise InputError(
+            "--orientation-noise", "", f"{orientation!r} where positions are measured", "--measured pose beside it"
         )
-    return tuple(found)
+    position_m = sensor.position_m if position is None else length_m("--noise", position)
+    # Of positions no orientation is read: its noise is not used.
+    orientation_rad = sensor.orientation_rad if orientation is None else angle_rad("--orientation-noise", orientation)
+    return position_m, orientation_rad or position_m
 
 
 def _write_campaign(place: Path, name: str, robot: Path, survey: Survey, found: Plan, table: pd.DataFrame) -> None:

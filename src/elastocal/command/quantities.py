@@ -1,17 +1,24 @@
-"""Options that state quantities: lengths with their unit, and lists of numbers."""
+"""Options that state quantities: lengths and angles with their unit, and lists of numbers."""
 
 from __future__ import annotations
 
+import math
 import re
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from elastocal.errors import InputError
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 _METRES = {"mm": 1e-3, "um": 1e-6, "µm": 1e-6, "m": 1.0}
-_LENGTH = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*(mm|um|µm|m)")
+_RADIANS = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3, "urad": 1e-6, "µrad": 1e-6}
+_QUANTITY = re.compile(r"(\d+(?:\.\d*)?|\.\d+)\s*([a-zµ°]+)")
 # No instrument repeats better than the least (`fitting.noise.FINEST`); no accuracy, noise or tolerance of a robot is larger.
 _LEAST_M, _LARGEST_M = 1e-8, 0.1
+_LEAST_RAD, _LARGEST_RAD = 1e-8, 0.2
 # Of a mass, over the mass, as in a robot file.
 LARGEST_RELATIVE_STD = 100.0
 # Trackers stand at up to a hundred metres, targets within an arm's reach of where they are fixed, as in a campaign.
@@ -39,12 +46,28 @@ def length_m(option: str, text: str) -> float:
     InputError
         No unit, less than any instrument tells, or more than any robot misses by.
     """
-    match = _LENGTH.fullmatch(text.strip())
-    value = float(match[1]) * _METRES[match[2]] if match else 0.0
+    value = _quantity(text, _METRES)
     if not _LEAST_M <= value <= _LARGEST_M:
         allowed = f"a length with its unit such as 0.2mm or 60um, {1e6 * _LEAST_M:g} um to {_LARGEST_M:g} m"
         raise InputError(option, "", repr(text), allowed)
     return value
+
+
+def angle_rad(option: str, text: str) -> float:
+    """An angle such as ``0.01deg`` in rad; an InputError without its unit, or of a size that no noise has."""
+    value = _quantity(text, _RADIANS)
+    if not _LEAST_RAD <= value <= _LARGEST_RAD:
+        allowed = (
+            f"an angle with its unit such as 0.01deg, 0.1mrad or 60urad, {1e6 * _LEAST_RAD:g} urad to {_LARGEST_RAD:g} rad"
+        )
+        raise InputError(option, "", repr(text), allowed)
+    return value
+
+
+def _quantity(text: str, units: Mapping[str, float]) -> float:
+    """A number with one of some units; 0 where it is none."""
+    match = _QUANTITY.fullmatch(text.strip())
+    return float(match[1]) * units.get(match[2], 0.0) if match else 0.0
 
 
 def numbers(option: str, text: str, count: int, largest: float = FARTHEST_PLACE_M) -> np.ndarray:

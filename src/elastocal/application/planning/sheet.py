@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from elastocal.campaigns.measurements import SHOWN, TICK
 from elastocal.mechanics.components import WRENCH
 
 if TYPE_CHECKING:
@@ -28,22 +29,27 @@ def sheet(survey: Survey, plan: Plan) -> pd.DataFrame:
     Returns
     -------
     pandas.DataFrame
-        ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``, ``target``, ``q1..qn`` (rad, as the controller
-        reports them), wrench (N, N m), and ``x, y, z`` and ``rx, ry, rz``, empty. The first poses are repeated, unloaded and
-        under the first load: each repeat is a fresh approach.
+        ``pose`` (fitted ones first, from 1), ``load`` (0 without), ``repeat``, ``target``, ``done``, empty, ``q1_deg..qn_deg``
+        (``_mm`` of prismatic joints) as the controller shows them, ``q1..qn`` the same in rad (m), wrench (N, N m), and
+        ``x, y, z`` and ``rx, ry, rz``, empty. The first poses are repeated, unloaded and under the first load: each repeat is a
+        fresh approach.
     """
     rows = []
     configurations = [*zip(plan.fitted.joint_angles, plan.fitted.force, strict=True)]
     fitted = len(configurations)
     configurations += zip(plan.held_out.joint_angles, plan.held_out.force, strict=True)
+    endings = ["mm" if slides else "deg" for slides in survey.robot.chain.prismatic]
     for pose, (angles, force) in enumerate(configurations, 1):
+        # What is typed at the controller is what is planned.
+        shown = {f"q{j}_{of}": round(q / SHOWN[of], 3) + 0.0 for j, (q, of) in enumerate(zip(angles, endings, strict=True), 1)}
+        exact = {name.partition("_")[0]: value * SHOWN[name.partition("_")[2]] for name, value in shown.items()}
         for repeat in range(REPEATS if pose <= min(REPEATED_POSES, fitted) else 1):
             for load, share in enumerate(survey.shares[: 2 if repeat else None]):
                 # Nothing pulls where no load hangs: a share of zero has no sign.
                 wrench = dict(zip((name for name, _, _ in WRENCH), (*(share * force + 0.0), 0.0, 0.0, 0.0), strict=True))
                 for target in survey.targets:
-                    head: dict[str, Any] = {"pose": pose, "load": load, "repeat": repeat, "target": target.name}
-                    rows.append(head | {f"q{j}": q for j, q in enumerate(angles, 1)} | wrench)
+                    head: dict[str, Any] = {"pose": pose, "load": load, "repeat": repeat, "target": target.name, TICK: ""}
+                    rows.append(head | shown | exact | wrench)
     empty = ["x", "y", "z", *(["rx", "ry", "rz"] if survey.measured == "pose" else [])]
     return pd.DataFrame(rows).assign(**dict.fromkeys(empty, np.nan))
 
