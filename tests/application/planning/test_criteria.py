@@ -5,6 +5,7 @@ import pytest
 from made_surveys import made_rows
 
 from elastocal.application.planning.criteria import CRITERIA, criterion, mean_squares
+from elastocal.application.planning.exchange import matrix_of
 
 ROWS = made_rows()
 PLACES = made_rows(7, 3, 5, 2).astype(float)
@@ -33,3 +34,23 @@ def test_the_value_of_i_is_the_mean_variance_over_the_places():
     variances = np.einsum("nki,ij,nkj->n", PLACES, np.linalg.inv(matrix), PLACES)
     assert -rule.value(matrix) == pytest.approx(variances.mean())
     np.testing.assert_allclose(mean_squares(PLACES), np.einsum("nki,nkj->ij", PLACES, PLACES) / 7)
+
+
+@pytest.mark.parametrize("kind", CRITERIA)
+def test_an_unknown_base_under_opposite_pulls_leaves_the_prior_its_1(kind):
+    """Rows of thirty thousand of which the middle ones follow from the others: I + Z Z' is singular in single precision."""
+    draws = np.random.default_rng(3)
+    scale = np.array([3e4, 3e4, 3e4, 10.0, 1.0])
+    ends = draws.standard_normal((2, 30, 3, 5)) * scale
+    rows = np.concatenate([ends[0], 0.5 * (ends[0] + ends[1]), ends[1]], axis=1)
+    rule = criterion(kind, PLACES)
+    expected = [rule.value(np.eye(5) + row.T @ row) - rule.value(np.eye(5)) for row in rows]
+    np.testing.assert_allclose(rule.gains(rows, np.eye(5)), expected, rtol=1e-4)
+    np.testing.assert_allclose(rule.gains(rows.astype(np.float32), np.eye(5)), expected, rtol=1e-2)
+
+
+def test_no_size_of_rows_makes_a_matrix_that_is_not_definite():
+    rows = np.ones((3, 6, 5)) * np.array([1e8, 1e8, 1e8, 1.0, 1e-8])
+    for kind in CRITERIA:
+        rule, matrix = criterion(kind, PLACES), matrix_of(rows, [0, 1])
+        assert np.isfinite(rule.gains(rows, matrix)).all() and np.isfinite(rule.value(matrix))

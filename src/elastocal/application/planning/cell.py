@@ -95,14 +95,15 @@ def link_points(robot: Robot, angles: np.ndarray) -> np.ndarray:
     ends = [first, *(place + 1 for place in range(first, len(transforms)) if transforms[place].kind == "T")]
     at, _ = poses_of_points(robot.chain, angles, [MeasuringPoint("end of a link", place) for place in ends])
     share = np.linspace(0.0, 1.0, _SAMPLES)[:, None, None]
-    return np.concatenate([one + share * (other - one) for one, other in pairwise(at)])
+    # An arm without lengths behind its first joint is a point.
+    return np.concatenate([one + share * (other - one) for one, other in pairwise(at)]) if len(at) > 1 else at
 
 
 def _hidden(links: np.ndarray, target: np.ndarray, tracker: np.ndarray, radius: float) -> np.ndarray:
     """Whether any link lies in the line of sight, ndarray of bool (N,)."""
     sight = tracker - target
     length = np.linalg.norm(sight, axis=-1)
-    along = sight / length[:, None]
+    along = sight / np.maximum(length, np.finfo(float).tiny)[:, None]
     from_target = links - target
     ahead = (from_target * along).sum(axis=-1).clip(0.0, length)
     aside = np.linalg.norm(from_target - ahead[..., None] * along, axis=-1)

@@ -13,6 +13,7 @@ from elastocal.application.planning.cell import allowed
 from elastocal.application.planning.criteria import Criterion, criterion, mean_squares
 from elastocal.application.planning.exchange import exchanged, greedy, matrix_of, with_prior
 from elastocal.application.planning.survey import accuracy_rows, count_parameters, information
+from elastocal.campaigns.holdout import FEWEST_TRAINING_POSES
 from elastocal.errors import InputError
 
 if TYPE_CHECKING:
@@ -188,8 +189,8 @@ def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: s
 
 
 def fewest_poses(survey: Survey) -> int:
-    """Poses that measure as many numbers as there are parameters."""
-    return -(-count_parameters(survey) // survey.numbers)
+    """Poses that measure as many numbers as there are parameters, and as a campaign must have."""
+    return max(-(-count_parameters(survey) // survey.numbers), FEWEST_TRAINING_POSES)
 
 
 def poses_needed(curve_m: np.ndarray, accuracy_m: float) -> int | None:
