@@ -2,6 +2,7 @@
 
 import struct
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -236,3 +237,14 @@ def test_a_character_that_would_steer_a_terminal_is_refused_with_its_line(tmp_pa
     (tmp_path / CSV).write_text(f"pose,target\n1,a\n2,a{character}b\n", encoding="utf-8")
     with refused(tmp_path / CSV, "", "character"):
         read_measurements(tmp_path, 6, "position")
+
+
+def test_a_sheet_may_be_ticked_and_have_degrees_that_agree(cell):
+    cell.table["done"] = ["x"] * len(cell.table["pose"])
+    cell.table["q2_deg"] = np.degrees(cell.table["q2"]).round(3)
+    cell.write()
+    assert len(read_campaign(cell.folder, cell.robots).measurements) == len(cell.table["pose"])
+    cell.table["q2_deg"][4] += 1.0
+    cell.write()
+    with refused(cell.measurements, "row 5, column q2_deg (line 6)", "which is q2"):
+        cell.read()

@@ -40,6 +40,17 @@ def test_measurements_that_are_there_stay_unless_forced_and_an_empty_sheet_is_fi
     assert sheet.read_bytes() == before
 
 
+def test_a_sheet_without_a_reading_is_filled_and_one_with_a_reading_stays(tmp_path):
+    (tmp_path / "cell").mkdir()
+    sheet = tmp_path / "cell" / "measurements.csv"
+    sheet.write_text("# planned\npose,load,repeat,target,done,q1,x,y,z\n1,0,0,smr,x,0.1,,,\n2,0,0,smr,,0.2,,,1.5\n")
+    assert "--force" in str(run(tmp_path, *OPTIONS).exception)
+    sheet.write_text(sheet.read_text().replace("1.5", ""))
+    result = run(tmp_path, *OPTIONS)
+    assert result.exit_code == 0, result.exception
+    assert len(sheet.read_text().splitlines()) == 3
+
+
 @pytest.mark.parametrize("option", [("--column", "q1"), ("--unit", "=mm"), ("--angles", "gon")])
 def test_bad_options_leave_nothing_behind(tmp_path, option):
     assert isinstance(run(tmp_path, *OPTIONS, *option).exception, InputError)

@@ -1,5 +1,6 @@
 """A plan as files, and what is refused before any planning."""
 
+import numpy as np
 import pandas as pd
 import pytest
 import yaml
@@ -46,6 +47,18 @@ def test_as_few_poses_as_reach_a_wanted_accuracy(tmp_path):
         (["--tracker", "1,2"], "--tracker"),
         (["--noise", "0.03"], "--noise"),
         (["--target", "elbow"], "--target"),
+        (["--target", "A:elbow"], "'elbow'"),
+        (["--target", "A:6DoF", "--target", "A:4DoF"], "'A' twice"),
+        (["--target", "6DoF=0.1,0,0", "--target", "6DoF=0,0.1,0", "--target", "6DoF"], "A:6DoF and B:6DoF"),
+        (["--target", ":6DoF"], "a name of 0"),
+        (["--target", f"{'A' * 81}:6DoF"], "a name of 81"),
+        (["--target", "=A:6DoF"], "--target"),
+        (["--target", "A:6DoF="], "3 numbers"),
+        (["--sensor", "ruler"], "tracker, t-mac, camera"),
+        (["--sensor", "tracker", "--measured", "pose"], "--sensor t-mac, camera"),
+        (["--measured", "angle"], "--measured"),
+        (["--orientation-noise", "0.01deg"], "--measured pose"),
+        (["--measured", "pose", "--orientation-noise", "0.01"], "with its unit"),
         (["--accuracy", "1um"], "--accuracy"),
         (["--box=-9,9,-9,9,-9,9"], "boxes"),
     ],
@@ -55,6 +68,28 @@ def test_a_wrong_option_is_refused_by_its_name_and_nothing_is_written(tmp_path, 
     assert isinstance(result.exception, InputError)
     assert message in str(result.exception)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_three_reflectors_on_one_flange_are_three_targets_of_their_sensor(tmp_path):
+    words = [word for name in "ABC" for word in ("--target", f"{name}:6DoF=0.{ord(name) - 64},0,0")]
+    result = run("--folder", tmp_path / "cell", "--sensor", "T-MAC", *words, "--target", "6DoF")
+    assert result.exit_code == 0, result.exception
+    assert "30 µm, 87.3 µrad" in result.stderr and "Leica" in result.stderr
+    document = yaml.safe_load((tmp_path / "cell" / "campaign.yaml").read_text())
+    assert {name: target["offset_m"] for name, target in document["targets"].items()} == {
+        **{"A": [0.1, 0.0, 0.0], "B": [0.2, 0.0, 0.0], "C": [0.3, 0.0, 0.0], "6DoF": "unknown"}
+    }
+    assert document["measured"] == "pose"
+    assert document["noise"] == {"position_m": 30e-6, "orientation_rad": pytest.approx(np.radians(0.005))}
+    sheet = pd.read_csv(tmp_path / "cell" / "measurements.csv")
+    assert set(sheet["target"].value_counts()) == {len(sheet) // 4} and set(sheet["target"]) == {"A", "B", "C", "6DoF"}
+
+
+def test_noise_that_is_stated_goes_before_that_of_the_sensor(tmp_path):
+    words = ("--measured", "pose", "--noise", "50um", "--orientation-noise", "0.1mrad")
+    assert run("--folder", tmp_path / "cell", *words).exit_code == 0
+    document = yaml.safe_load((tmp_path / "cell" / "campaign.yaml").read_text())
+    assert document["noise"] == {"position_m": pytest.approx(50e-6), "orientation_rad": pytest.approx(1e-4)}
 
 
 def test_a_plan_needs_a_place_and_takes_no_one_elses(tmp_path):

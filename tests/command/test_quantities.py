@@ -8,7 +8,7 @@ from support import refused
 from typer.testing import CliRunner
 
 from elastocal.command.main import app
-from elastocal.command.quantities import length_m, numbers
+from elastocal.command.quantities import angle_rad, length_m, numbers
 
 
 @pytest.mark.parametrize(
@@ -22,6 +22,14 @@ def test_a_length_is_read_with_its_unit(text, metres):
 def test_a_length_without_a_unit_or_of_no_sense_is_refused(text):
     with refused("--tolerance", "", "with its unit"):
         length_m("--tolerance", text)
+
+
+def test_an_angle_is_read_with_its_unit_and_refused_without():
+    for text, value in (("0.01deg", 1.745329e-4), ("0.1mrad", 1e-4), ("60 µrad", 6e-5), (".001rad", 1e-3)):
+        assert angle_rad("--orientation-noise", text) == pytest.approx(value)
+    for text in ("0.01", "90deg", "0rad", "-1deg", "1mm", "deg"):
+        with refused("--orientation-noise", "", "with its unit"):
+            angle_rad("--orientation-noise", text)
 
 
 def test_numbers_are_counted():

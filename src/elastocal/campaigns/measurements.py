@@ -41,7 +41,7 @@ CSV, PARQUET = "measurements.csv", "measurements.parquet"
 # with the SI value of one unit. They must agree with q1 .. qn to what is shown.
 TICK = "done"
 SHOWN = {"deg": math.radians(1.0), "mm": 1e-3}
-_SHOWN_TO = 2e-3
+SHOWN_TO = 2e-3
 
 
 def file_columns(joints: int) -> dict[str, Column]:
@@ -365,7 +365,7 @@ class MeasurementFile:
         if beside not in self.columns:
             return
         values = self._column(name) / scale
-        wrong = np.abs(values - self._column(beside)) > _SHOWN_TO
+        wrong = np.abs(values - self._column(beside)) > SHOWN_TO
         if wrong.any():
             index = int(np.argmax(wrong))
             allowed = f"{values[index]:.3f}, which is {name}, or a file without the column {beside}"

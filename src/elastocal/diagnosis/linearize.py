@@ -22,6 +22,7 @@ from elastocal.diagnosis.summed import (
     triangle_of,
 )
 from elastocal.effects.conditions import at_states
+from elastocal.errors import InputError
 from elastocal.fitting.displacement import conditions
 from elastocal.fitting.factored import Displacements, Factored
 from elastocal.fitting.linearization import linearize
@@ -47,6 +48,8 @@ if TYPE_CHECKING:
 
 # Values of a shape that are tried: neighbours differ by less than measurements show at the sizes that matter.
 _SHAPES_TRIED = 3
+# Of one pose about the joints, 1/rad^2: below it the targets move by rounding only.
+_LEAST_INFORMATION = 1e-6
 # Values that a closer look tries to either side of the best, short of its neighbours. Where the fit has the candidate already,
 # a step is looked for within a quarter of the spacing to either side.
 _SHAPES_CLOSER, _CLOSER_STILL = 3, 0.25
@@ -244,7 +247,12 @@ class _Source:
                 )
 
         triangle = triangle_of(rows())
-        return triangle, float(1.0 / np.sqrt(np.median(np.concatenate(information))))
+        shown = float(np.median(np.concatenate(information)))
+        if shown < _LEAST_INFORMATION:
+            raise InputError(
+                "campaign", "targets", "measurements that no joint moves", "targets on what moves, off a lone axis"
+            )
+        return triangle, 1.0 / np.sqrt(shown)
 
     def blocks(self, lines: Iterable[_Line]) -> Iterator[WhiteRows]:
         """`WhiteRows` of each part.

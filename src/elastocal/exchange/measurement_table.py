@@ -31,6 +31,7 @@ from elastocal.exchange.column_names import (
     units_of,
 )
 from elastocal.exchange.csv_dialect import read_text_table
+from elastocal.exchange.planned_sheet import sheet_options
 from elastocal.exchange.rotations import (
     ALLOWED,
     HOMOGENEOUS_MATRICES,
@@ -144,6 +145,8 @@ def read_measurement_table(path: str | Path, options: ImportOptions) -> Imported
         return set(POSITION) <= names or set(_TRANSLATION) <= names
 
     text = read_text_table(path, is_header, options.separator, options.decimal, options.header)
+    options = sheet_options(text, options)
+    mapped = dict(options.columns or {})
     columns, stated = _columns(text, mapped)
     rotation = _rotation(text, columns, options.rotation)
     position = _TRANSLATION if rotation == HOMOGENEOUS_MATRICES else POSITION

@@ -1,12 +1,18 @@
 """A plan as a whole: better than chance, within the cell, and judged on poses that it did not choose."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import yaml
 from made_surveys import OPEN, PULL, made_candidates, made_survey
+from planned_robots import ROBOTS as PLANNED
 
 from elastocal.application.planning.cell import Cell
-from elastocal.application.planning.plan import Loads, allowed_candidates, planned, poses_needed, tour
+from elastocal.application.planning.plan import Candidates, Loads, allowed_candidates, planned, poses_needed, tour
+from elastocal.campaigns.campaign import Target
 from elastocal.errors import InputError
+from elastocal.mechanics.robot_file import robot_from_document
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +68,15 @@ def test_too_few_poses_are_refused_with_how_many_it_takes(survey, some):
         planned(survey, some, 2, 5, "D", 1)
     with pytest.raises(InputError, match="more candidates"):
         planned(survey, some, 598, 5, "D", 1)
+
+
+def test_targets_that_no_joint_moves_are_refused(survey, some):
+    robot = robot_from_document(yaml.safe_load(PLANNED["turntable"]))
+    for target in (Target("foot", "elbow", (0.1, 0.0, 0.0)), Target("axis", "tool0", (0.0, 0.0, 0.0))):
+        still = replace(survey, robot=robot, targets=(target,), shares=(0.0,), unknown_base=False)
+        turns = Candidates(np.linspace(-1.0, 1.0, 60)[:, None], np.zeros((60, 3)))
+        with pytest.raises(InputError, match="no joint moves"):
+            planned(still, turns, 16, 5, "D", 1)
 
 
 def test_a_tour_is_no_longer_than_the_order_in_which_poses_were_drawn():

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 _PLACES = 300
 # Random designs beside which the plan is shown.
 _RANDOM = 40
+# Over the noise: what an offset of a joint of plausible size moves of a target that it moves only by rounding.
+_LEAST_SEEN = 1e-6
 # More are drawn than are asked for, since the cell forbids some.
 _DRAWS = 4
 
@@ -158,7 +160,7 @@ def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: s
     Raises
     ------
     InputError
-        Fewer candidates than poses, or poses that measure fewer numbers than there are parameters.
+        Fewer candidates than poses, poses that measure fewer numbers than there are parameters, or targets that no joint moves.
     """
     count, draws = len(some.joint_angles), np.random.default_rng(seed)
     if count < poses + held_out:
@@ -168,7 +170,10 @@ def planned(survey: Survey, some: Candidates, poses: int, held_out: int, kind: s
         numbers = poses * survey.numbers
         found = f"{poses}, which measure {numbers} numbers for {count_parameters(survey)} parameters"
         raise InputError("plan", "poses", found, f"at least {fewest_poses(survey)}")
-    rows = information(survey, some.joint_angles, some.force).rows
+    seen = information(survey, some.joint_angles, some.force)
+    rows = seen.rows
+    if np.abs(rows[..., [owner.startswith("joint_offset") for owner, _ in seen.names]]).max() < _LEAST_SEEN:
+        raise InputError("plan", "targets", "targets that no joint moves", "a --target on what moves, off a lone axis")
     places = some.at(draws.permutation(count)[:_PLACES])
     accuracy = accuracy_rows(survey, places.joint_angles, places.force)
     rule, weight = criterion(kind, accuracy), mean_squares(accuracy)
