@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from elastocal.application.planning.sensors import SENSORS
 from elastocal.campaigns.reading import read_robot
+from elastocal.campaigns.writing import write_campaign
 from elastocal.command.main import app
 from elastocal.errors import InputError
 from elastocal.mechanics.kinematics import poses
@@ -75,7 +76,7 @@ def fill(folder, seed):
     sheet.assign(done="x").to_csv(folder / "measurements.csv", index=False)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, phases=[Phase.generate])
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, phases=[Phase.generate])
 @given(calls())
 def test_every_plan_is_a_sheet_that_is_checked_once_it_is_filled(call):
     name, words = call
@@ -92,3 +93,20 @@ def test_every_plan_is_a_sheet_that_is_checked_once_it_is_filled(call):
         assert "found nothing" in invoked("check", folder)
         fill(folder, 1)
         assert not isinstance(checked := invoked("check", folder), str), checked
+
+
+def test_a_campaign_of_what_no_joint_moves_is_refused_by_check(tmp_path):
+    (tmp_path / "robot.yaml").write_text(ROBOTS["turntable"], encoding="utf-8")
+    draws, poses_there = np.random.default_rng(1), np.arange(1, 19)
+    table = {"pose": poses_there, "load": 0 * poses_there, "repeat": 0 * poses_there, "target": ["foot"] * len(poses_there)}
+    table |= {"q1": np.linspace(-2.0, 2.0, len(poses_there))}
+    table |= {
+        axis: at + 3e-5 * draws.standard_normal(len(poses_there)) for axis, at in zip("xyz", (0.1, 0.0, 0.4), strict=True)
+    }
+    document = {"campaign": "still", "robot": "robot.yaml", "measured": "position", "frame": "base"}
+    document |= {
+        "targets": {"foot": {"point": "elbow", "offset_m": [0.1, 0.0, 0.0]}},
+        "declared": ["joint_offset", "link_geometry"],
+    }
+    write_campaign(tmp_path, document | {"holdout": {"fraction": 0.3, "seed": 1}}, table, 1, "csv")
+    assert "no joint moves" in invoked("check", tmp_path)
