@@ -127,7 +127,8 @@ def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(confi
 
     def folders(*given):
         return {
-            user_campaign(config | {"campaign": each}, config_folder / "robots", tmp_path / "results")["cell7"] for each in given
+            user_campaign(config | {"campaign": each}, config_folder / "robots", tmp_path / "results")["cell7"]
+            for each in given
         }
 
     absolute = f"{tmp_path}/2026"
