@@ -302,8 +302,8 @@ NAMED = ("rail", "shoulder_pan_joint", "J1")
     "headers",
     [
         "rail,shoulder_pan_joint,J1",
-        "rail [deg],Shoulder Pan Joint (deg),J1 [deg]",
-        "rail_deg,shoulder_pan_joint_deg,J1_deg",
+        "rail [mm],Shoulder Pan Joint (deg),J1 [deg]",
+        "rail_mm,shoulder_pan_joint_deg,J1_deg",
         "/joint_states/rail/position,/joint_states/shoulder_pan_joint/position,/joint_states/J1/position",
     ],
 )
@@ -312,10 +312,18 @@ def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
     velocity = "/joint_states/rail/velocity"
     (tmp_path / "t.csv").write_text(f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n")
     found = read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
-    np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], np.radians([1, 2, 3]))
+    np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], [0.001, *np.radians([2, 3])])
     assert found.ignored == (velocity,)
     # What was found out needs no robot a second time.
     assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
+
+
+def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
+    robot = robot_of("Tx(q1) Rz(q2) [A]")
+    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
+        (tmp_path / "t.csv").write_text(f"{names},x,y,z\n1,2,{ROW}\n")
+        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
+            read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
 
 
 @pytest.mark.parametrize(

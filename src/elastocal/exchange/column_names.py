@@ -111,15 +111,15 @@ def is_name(name: str) -> bool:
     return name in _ALSO or name in _KNOWN.values() or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
 
 
-def unit_scale(name: str, unit: str) -> float | None:
-    """SI value of one unit of a column; None where it is none of its units."""
+def unit_scale(unit: str, kinds: Iterable[str]) -> float | None:
+    """SI value of one unit, if it is one of some kinds."""
     plain = _plain_unit(unit)
-    return next((UNITS[kind][plain] for kind in kind_of(name) if plain in UNITS[kind]), None)
+    return next((UNITS[kind][plain] for kind in kinds if plain in UNITS[kind]), None)
 
 
-def units_of(name: str) -> list[str]:
-    """Units in which a column may be."""
-    return [unit for kind in kind_of(name) for unit in UNITS[kind]]
+def units_of(kinds: Iterable[str]) -> list[str]:
+    """Units of some kinds."""
+    return [unit for kind in kinds for unit in UNITS[kind]]
 
 
 def recognized(header: str) -> tuple[str | None, str | None]:
@@ -178,7 +178,7 @@ def _without_unit(header: str) -> tuple[str, str | None]:
     behind = _BEHIND.fullmatch(header)
     if _named(header) is None and behind and any(_plain_unit(behind[2]) in units for units in UNITS.values()):
         name = _named(behind[1])
-        if name is None or unit_scale(name, behind[2]) is not None:
+        if name is None or unit_scale(behind[2], kind_of(name)) is not None:
             return behind[1], _plain_unit(behind[2])
     return header, None
 

@@ -18,6 +18,7 @@ from elastocal.campaigns.column_bounds import BOUNDS, beyond
 from elastocal.campaigns.measurements import closest_first, file_columns, shown
 from elastocal.errors import InputError, text_fault
 from elastocal.exchange.column_names import (
+    ANGLE,
     COVARIATES,
     EULER,
     LENGTH,
@@ -179,7 +180,7 @@ def read_measurement_table(path: str | Path, options: ImportOptions, robot: Robo
     orientation = columns_of_rotation(rotation, columns)
     _check_complete(text, columns, angles, (*position, *orientation), robot)
     wanted = [*angles, *position, *orientation, *(name for name in WRENCH_NAMES if name in columns)]
-    units = _units(text, columns, wanted, stated, options.units or {})
+    units = _units(text, columns, wanted, stated, options.units or {}, robot)
     read = _Reader(text, columns, units, _kept(text, columns, position, options.skip_empty))
     covariates = _covariates(read, mapped, stated, options.units or {}, notes)
     table = _numbered(read, angles, mapped)
@@ -355,11 +356,19 @@ def _not_used(text: TextTable, columns: Mapping[str, str]) -> str:
 
 
 def _units(
-    text: TextTable, columns: Mapping[str, str], wanted: Sequence[str], stated: Mapping[str, str], given: Mapping[str, str]
+    text: TextTable,
+    columns: Mapping[str, str],
+    wanted: Sequence[str],
+    stated: Mapping[str, str],
+    given: Mapping[str, str],
+    robot: Robot | None = None,
 ) -> dict[str, str]:
     found: dict[str, str] = {}
     for name in wanted:
         kinds = kind_of(name)
+        if robot and name in joints_in([name]):
+            # A prismatic joint reports a length.
+            kinds = (LENGTH if robot.chain.prismatic[int(name[1:]) - 1] else ANGLE,)
         if kinds == (NONE,):
             continue
         for_all = given.get("lengths" if kinds[0] == LENGTH else "angles")
@@ -368,8 +377,8 @@ def _units(
         if unit is None:
             option = "--lengths mm" if kinds[0] == LENGTH else "--angles deg"
             raise InputError(text.path, "header", f"no unit of {columns[name]!r}", f"{option} or such, or --unit {name}=UNIT")
-        if unit_scale(name, unit) is None:
-            allowed = f"{', '.join(units_of(name))}, by --unit {name}=UNIT"
+        if unit_scale(unit, kinds) is None:
+            allowed = f"{', '.join(units_of(kinds))}, by --unit {name}=UNIT"
             raise InputError(text.path, f"unit of {columns[name]!r}", repr(unit), allowed)
         found[name] = unit
     return found
@@ -439,7 +448,7 @@ class _Reader:
         if not np.isfinite(values).all():
             raise self.fault(int(np.argmin(np.isfinite(values))), name, A_NUMBER)
         unit = self.units.get(name)
-        values = values if unit is None else values * (unit_scale(name, unit) or 1.0)
+        values = values if unit is None else values * (unit_scale(unit, kind_of(name)) or 1.0)
         if (index := beyond(name, values)) is not None:
             raise self.fault(index, name, BOUNDS[name].allowed)
         return values
