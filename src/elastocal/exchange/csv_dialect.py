@@ -67,6 +67,7 @@ class Dialect:
 
 
 _UNSTATED = Dialect()
+_WANTED = "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are"
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,11 @@ class TextTable:
 
 
 def read_text_table(
-    path: str | Path, is_header: Callable[[Sequence[str]], bool], stated: Dialect = _UNSTATED, ignored: Collection[str] = ()
+    path: str | Path,
+    is_header: Callable[[Sequence[str]], bool],
+    stated: Dialect = _UNSTATED,
+    ignored: Collection[str] = (),
+    wanted: str = _WANTED,
 ) -> TextTable:
     """Read a table, finding out what is not stated of its dialect.
 
@@ -97,6 +102,8 @@ def read_text_table(
         Of the cells of a line, whether they name the columns; the first such line does where no line is stated, else one
         behind a comment mark.
     stated : Dialect, optional
+    wanted : str
+        What a header has, for messages.
     ignored : collection of str
         Names of columns that are left out whatever they hold.
 
@@ -112,7 +119,7 @@ def read_text_table(
     comments = [(number, _without_mark(line)) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
-    separator, header, line = _header(kept, comments, is_header, stated, source)
+    separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
     table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number > header]
     names = [name or f"column {place}" for place, name in enumerate(cells_of(line, separator, source, header), 1)]
     rows = [row for row in table if any(row[1])]
@@ -219,7 +226,7 @@ def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, 
         western = content.decode(WESTERN, errors="replace")
         if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
             return western, WESTERN
-        allowed = "UTF-8, or --encoding cp1252 (Western Windows), shift_jis, gb18030 or such, as the program wrote it"
+        allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
         raise InputError(path, error.key, error.found, allowed) from None
 
 
@@ -228,6 +235,7 @@ def _header(
     comments: Sequence[tuple[int, str]],
     is_header: Callable[[Sequence[str]], bool],
     stated: Dialect,
+    wanted: str,
     source: str,
 ) -> tuple[str, int, str]:
     """Separator, and number and text of the line that names the columns."""
@@ -251,8 +259,7 @@ def _header(
     if found:
         return found[0]
     first = kept[0][1][:60]
-    allowed = "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are"
-    raise InputError(source, f"line {kept[0][0]}", repr(first), allowed)
+    raise InputError(source, f"line {kept[0][0]}", repr(first), wanted)
 
 
 def _tried_cells(line: str, separator: str) -> list[str]:
