@@ -116,7 +116,8 @@ def robot_from_dh(
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption")
     if free := [str(number) for number, row in enumerate(joints, 1) if row.limits is None]:
         notes.append(f"no limits of q{', q'.join(free)}: a turn either way")
-    return imported(document, path, f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters", notes)
+    notation = f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters"
+    return imported(document, path, f"{notation}, in {angles} and {lengths} where a column does not say", notes)
 
 
 def _words(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[str]:

@@ -68,7 +68,7 @@ _TRANSLATION = ("t14", "t24", "t34")
 _ONE_POSE = 0.1
 # Nanoseconds since 1970 are 2e18.
 _LARGEST_TIME = 1e19
-# Columns that a table may have in two readings, by what is usual: external axes E1 to E3 beside an orientation.
+# Columns that a table may have in two meanings: external axes E1 to E3 beside an orientation.
 _OTHER_ANGLES = (("A", "B", "C"), ("W", "P", "R"), ("O", "A", "T"))
 # Without a unit, seconds since 1970 of the years 1990 to 2100 cannot be seconds, minutes or hours of a campaign in these.
 _EPOCH_S = 6.3e8, 4.1e9
@@ -105,15 +105,15 @@ class ImportOptions:
     separator: str | None = None
     decimal: str | None = None
     header: int | None = None
-    encoding: str | None = None
-    thousands: str | None = None
-    ignore: Sequence[str] | None = None
     columns: Mapping[str, str] | None = None
     units: Mapping[str, str] | None = None
     rotation: str | None = None
     target: str | None = None
     wrench: str = ON_ROBOT
     skip_empty: bool = False
+    encoding: str | None = None
+    thousands: str | None = None
+    ignore: Sequence[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -324,8 +324,8 @@ def _check_external_axes(text: TextTable, columns: Mapping[str, str], mapped: Ma
     others = [[plain[letter] for letter in letters] for letters in _OTHER_ANGLES if all(letter in plain for letter in letters)]
     more = [header for name, header in plain.items() if name in ("E4", "E5", "E6")]
     if guessed and (others or more):
-        rival = others[0] if others else ["NAME", "NAME", "NAME"]
-        allowed = " ".join(f"--column {name}={header!r}" for name, header in zip(EULER, rival, strict=True))
+        other_names = others[0] if others else ["NAME", "NAME", "NAME"]
+        allowed = " ".join(f"--column {name}={header!r}" for name, header in zip(EULER, other_names, strict=True))
         own = " or ".join([f"{', '.join(guessed)} (external axes?)", *(", ".join(each) for each in others)])
         raise InputError(text.path, "header", f"orientations in {own}", f"{allowed}, or the same with {', '.join(guessed)}")
 

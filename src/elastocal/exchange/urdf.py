@@ -84,6 +84,8 @@ def robot_from_urdf(
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
     if few := _few_digits(urdf, [joint.child for joint in urdf.joints if joint.child in chain.links]):
         notes.append(f"nearly right angles stay as they are written, with few digits: those of {few}")
+    if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
+        notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
     return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
