@@ -119,6 +119,26 @@ def test_a_users_own_campaign_is_known_by_its_name(config, config_folder, tmp_pa
     assert user_campaign(config | {"campaign": ""}, config_folder / "robots", tmp_path) == {}
 
 
+def test_a_users_own_campaign_has_one_spelling_however_its_folder_is_given(config, config_folder, tmp_path, monkeypatch):
+    """Results are of files by their names: `elastocal diagnose` hands on an absolute path, people type any."""
+    users_folder(tmp_path)
+    (tmp_path / "cell").rename(tmp_path / "2026")
+    (tmp_path / "link").symlink_to(tmp_path / "2026")
+
+    def folders(*given):
+        return {
+            user_campaign(config | {"campaign": each}, config_folder / "robots", tmp_path / "results")["cell7"]
+            for each in given
+        }
+
+    absolute = f"{tmp_path}/2026"
+    monkeypatch.chdir(tmp_path)
+    assert folders("2026", 2026, "2026/", "./2026", "2026/../2026//", absolute, f"{absolute}/", "link") == {"2026"}
+    (tmp_path / "beside").mkdir()
+    monkeypatch.chdir(tmp_path / "beside")
+    assert folders("../2026", absolute, "../link/") == {absolute}
+
+
 OWN_FAULTS = {
     "name with a slash": ({"campaign": "cell/7"}, "campaign", ["'cell/7'", "letters, digits"]),
     "name that leads upwards": ({"campaign": "../cell"}, "campaign", ["'../cell'", "letters, digits"]),

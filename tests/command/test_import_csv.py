@@ -63,3 +63,52 @@ def test_a_target_whose_name_would_be_a_formula_or_turn_letters_is_refused(tmp_p
         result = run(tmp_path, "--angles", "deg", "--lengths", "mm", *words, text=text)
         assert isinstance(result.exception, InputError) and len(str(result.exception).splitlines()) == 1
         assert not (tmp_path / "cell").exists()
+
+
+def test_every_import_ends_with_what_was_read_how_and_what_was_left_out(tmp_path):
+    text = "lab\n# J1;X;Y;Z;Config;Temp;;\n90;1000,5;2;3;FUT;21 C;;\n-90;1000;2;3;NUT;21 C;;\n;;;;;;;\n# 4 more\n"
+    result = run(tmp_path, *OPTIONS, "--ignore", "Config", text=text)
+    assert result.exit_code == 0, result.exception
+    lines = result.output.splitlines()
+    assert "file: names of columns in line 2, separator semicolon, decimal comma, thousands not marked, encoding utf-8" in lines
+    assert "read: q1 from 'J1' in deg; x from 'X' in mm; y from 'Y' in mm; z from 'Z' in mm" in lines
+    assert "not used: Temp, Config" in lines
+    for note in (
+        "1 lines above the header",
+        "1 rows of empty cells",
+        "2 columns without",
+        "1 lines of comments",
+        "'Temp' not read",
+    ):
+        assert any(line.startswith("note: ") and note in line for line in lines), note
+    again = run(tmp_path, "--options", str(tmp_path / "cell" / "import.yaml"), "--force", text=text)
+    assert again.exit_code == 0 and again.output.splitlines()[:-1] == lines[:-1]
+
+
+def test_encoding_and_thousands_may_be_stated(tmp_path):
+    text = "J1;X;Y;Z\n90;1.000,5;2;3\n"
+    assert "--thousands" in str(run(tmp_path, *OPTIONS, text=text).exception)
+    assert run(tmp_path, *OPTIONS, "--thousands", "point", "--encoding", "cp1252", text=text).exit_code == 0
+    kept = (tmp_path / "cell" / "import.yaml").read_text()
+    assert "thousands: point" in kept and "encoding: cp1252" in kept
+    assert "1.0005" in (tmp_path / "cell" / "measurements.csv").read_text()
+
+
+ROBOT = "name: two\njoint_names: [pan, lift]\nchain: Rz(q1) Tx(1) Rz(q2) Tx(1) [end]\n"
+
+
+def test_joints_are_called_as_the_robot_of_the_option_or_of_the_campaign_has_them(tmp_path):
+    text = "lift;pan;X;Y;Z\n2;1;10;2;3\n"
+    assert "--robot" in str(run(tmp_path, *OPTIONS, text=text).exception)
+    (tmp_path / "robot.yaml").write_text(ROBOT)
+    assert "q1 from 'pan' in deg" in run(tmp_path, *OPTIONS, "--robot", str(tmp_path / "robot.yaml"), text=text).output
+    cell = tmp_path / "cell"
+    (cell / "measurements.csv").unlink()
+    (cell / "robot.yaml").write_text(ROBOT)
+    targets = "{smr: {point: end, offset_m: [0, 0, 0]}}"
+    (cell / "campaign.yaml").write_text(
+        f"campaign: a\nrobot: robot.yaml\nmeasured: position\nframe: base\ntargets: {targets}\n"
+    )
+    assert "q1 from 'pan' in deg" in run(tmp_path, *OPTIONS, text=text).output
+    result = run(tmp_path, *OPTIONS, "--force", text="J1;J2;J3;X;Y;Z\n2;1;1;10;2;3\n")
+    assert isinstance(result.exception, InputError) and "3 joints" in str(result.exception)

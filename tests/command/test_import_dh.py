@@ -33,5 +33,12 @@ def test_other_units_are_no_options(tmp_path, option):
     assert run(tmp_path, "d,a,alpha\n0,1,0\n", *option).exit_code == 2
 
 
+def test_decimal_commas_are_stated(tmp_path):
+    text = "d;a;alpha\n0;1,5;0\n"
+    assert "--decimal comma" in str(run(tmp_path, text).exception)
+    assert run(tmp_path, text, "--decimal", "comma").exit_code == 0
+    assert "Tx(1.5)" in (tmp_path / "robot.yaml").read_text()
+
+
 def test_the_help_shows_a_row():
     assert "0.1625" in CliRunner().invoke(app, ["import", "dh", "--help"]).output

@@ -45,13 +45,13 @@ def test_headers_are_recognized(header, name, unit):
 
 
 def test_units_are_those_of_the_kind():
-    assert unit_scale("x", "mm") == 1e-3
-    assert unit_scale("q1", "deg") == math.pi / 180.0
+    assert unit_scale("mm", kind_of("x")) == 1e-3
+    assert unit_scale("deg", kind_of("q1")) == math.pi / 180.0
     # Of a prismatic joint.
-    assert unit_scale("q7", "mm") == 1e-3
-    assert unit_scale("x", "deg") is None
-    assert unit_scale("fx", "kgf") == 9.80665
-    assert "mm" in units_of("q2") and "mm" not in units_of("rx")
+    assert unit_scale("mm", kind_of("q7")) == 1e-3
+    assert unit_scale("deg", kind_of("x")) is None
+    assert unit_scale("kgf", kind_of("fx")) == 9.80665
+    assert "mm" in units_of(kind_of("q2")) and "mm" not in units_of(kind_of("rx"))
 
 
 def test_every_unit_of_every_kind_has_a_positive_value():

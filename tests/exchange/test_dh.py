@@ -1,5 +1,7 @@
 """Denavit-Hartenberg tables to robots, beside products of pinocchio's transforms."""
 
+import itertools
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -132,3 +134,57 @@ def test_what_makes_no_robot_is_refused(tmp_path, header, rows, key, words):
     path = written(tmp_path, rows, header)
     with refused(path, key, *words):
         robot_from_dh(path)
+
+
+# A UR5 as its controller has calibrated it; d of the second to the fourth joint cancel.
+UR5_CALIBRATED = [
+    (-9.62699668632896e-06, 0.0888794492754001, 0.000279332356195598, 1.57033858830411),
+    (-1.43707039992005, 574.241384579456, -0.0566854832098269, -0.000733893428160216),
+    (2.02543119975016, -507.363402098168, -0.32646702272051, 0.00325607356326439),
+    (-0.588254688694989, -66.7676839353205, 1.49388687216263e-05, 1.57040005185553),
+    (2.55e-05, 0.0950, 3.5e-05, -1.5705),
+    (1.2e-05, 0.0823, 0.0, 0.0),
+]
+DH_HEADER = "theta_offset,d,a,alpha,type,lower,upper,mass_kg,cx,cy,cz,point"
+
+
+@pytest.mark.parametrize(("lever", "modified"), [(None, False), *itertools.product([3.0, 12.0, 300.0], [False, True])])
+def test_lengths_that_cancel_along_nearly_parallel_axes_become_short_ones(tmp_path, lever, modified):
+    rows = [list(row) for row in UR5_CALIBRATED]
+    if lever is not None:
+        for number, d in enumerate((lever, -lever - 0.1, 0.2), 1):
+            rows[number][1] = d
+    # A centre stands where the link is, far from the frame of the row.
+    centres = [(0.1, -0.2, 0.05 - sum(row[1] for row in rows[1 : number + 1])) for number in range(4)] + 2 * [(0.1, -0.2, 0.05)]
+    weighed = [
+        (*row, "R", -1, 1, 2.0, *centre, "wrist" if number == 4 else "")
+        for number, (row, centre) in enumerate(zip(rows, centres, strict=True))
+    ]
+    path = written(tmp_path, weighed, DH_HEADER)
+    result = robot_from_dh(path, modified, angles="rad")
+    robot = robot_from_document(yaml.safe_load(robot_text(result)))
+    assert sum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T") < 2.5
+    assert any("cancel" in note for note in result.notes)
+    states = made_states(6, 5, seed=2)
+    own = conditions_of(sites_of(robot), robot.compliance, states).gravity[:, :6]
+    points = {point.name: point for point in robot.chain.points}
+    for name, place in (("wrist", 4), ("flange", 5)):
+        position, rotation = poses(robot.chain, states.joint_angles, points[name])
+        for number, q in enumerate(states.joint_angles):
+            frame = frames_of(weighed, q, modified)[place]
+            np.testing.assert_allclose(position[number], frame.translation, rtol=0, atol=1e-9)
+            assert np.linalg.norm(pin.log3(frame.rotation.T @ rotation[number])) < 1e-9
+
+    def height(q):
+        frames = frames_of(weighed, q, modified)
+        return sum(2.0 * frame.act(np.array(centre))[2] for frame, centre in zip(frames, centres, strict=True))
+
+    for number, q in enumerate(states.joint_angles):
+        slope = np.array([(height(q + step) - height(q - step)) / 2e-4 for step in 1e-4 * np.eye(6)])
+        np.testing.assert_allclose(own[number], -9.80665 * slope, rtol=0, atol=1e-4)
+
+
+def test_lengths_that_do_not_cancel_are_still_refused(tmp_path):
+    rows = [(0, 300, 0, 90, "R", "", ""), (0, -300, 0, 0, "R", "", "")]
+    with refused(written(tmp_path, rows), "chain", "metres"):
+        robot_from_dh(tmp_path / "arm.csv")

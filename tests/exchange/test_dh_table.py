@@ -67,7 +67,7 @@ FAULTS = {
     "a quote that is not closed": (HEADER + '1,0,"0.1,0,90,R\n2,0,0,0,0,R\n', "line 2", ["quotes in pairs"]),
     "more rows than a chain has room for": ("d,a,alpha\n" + "0,0,90\n" * 501, "", ["501 rows", "at most 500"]),
     "no joint": ("d,a,alpha,type\n0,0,0,F\n", "", ["no joint"]),
-    "nothing at all": ("# only this\n", "", ["an empty file"]),
+    "nothing at all": ("# only this\n", "", ["nothing but comments"]),
 }
 
 
@@ -77,6 +77,31 @@ def test_a_fault_names_its_line_and_column(tmp_path, fault):
     path = table(tmp_path, text)
     with refused(path, key, *words):
         read_dh_table(path)
+
+
+def test_commas_are_decimal_marks_only_where_an_option_says_so(tmp_path):
+    path = table(tmp_path, "theta_offset_deg;d_mm;a_mm;alpha_deg\n0;162,5;0;90\n-1,5;0;-1425,25;0\n")
+    with refused(path, "", "commas", "--decimal comma"):
+        read_dh_table(path)
+    first, second = read_dh_table(path, decimal="comma")
+    assert (first.d, second.a, second.theta) == pytest.approx((0.1625, -1.42525, math.radians(-1.5)))
+    for cell in ("1,425", "1.425,5", "1 425"):
+        with refused(table(tmp_path, f"d;a;alpha\n{cell};0;90\n"), "line 2", repr(cell), "--"):
+            read_dh_table(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "encoding"),
+    [
+        ("# d_m,a_m,alpha_deg\n0.5,0,90\n", "utf-8"),
+        ("% DH of the cell\nd_m\ta_m\talpha_deg\t\t\n0.5\t0\t90\t\t\n\t\t\t\t\n", "utf-16"),
+        ("// größe\nd_m,a_m,alpha_deg\n0.5,0,90,,\n", "cp1252"),
+    ],
+)
+def test_a_table_may_be_in_any_dialect(tmp_path, text, encoding):
+    (tmp_path / "arm.csv").write_bytes(text.encode(encoding))
+    (row,) = read_dh_table(tmp_path / "arm.csv")
+    assert (row.d, row.a, row.alpha) == (0.5, 0.0, pytest.approx(math.pi / 2))
 
 
 @pytest.mark.parametrize("cell", ["pi/0", "0*pi/0", "9" * 400 + "*pi", "1e9*pi", "1000000*pi", "pi/pi"])

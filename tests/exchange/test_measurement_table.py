@@ -1,11 +1,13 @@
 """Another program's table becomes measurements; what it leaves open is asked for."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from durations import growth
-from support import refused
+from scipy.spatial.transform import Rotation
+from support import refused, robot_of
 
 from elastocal.exchange.measurement_table import SAME_POSE, ImportOptions, read_measurement_table
 
@@ -126,3 +128,216 @@ def test_what_is_missing_ambiguous_or_wrong_is_said_with_the_option_that_helps(t
     source = words[0] if words[0].startswith("--") else (tmp_path / "t.csv").as_posix()
     with refused(source, "", *words):
         table(tmp_path, text, options)
+
+
+ROW = "1,2,3"
+TIMES = {
+    "2023-05-04 10:20:33|2023-05-04 10:21:33.5": [1683195633.0, 1683195693.5],
+    "2023-05-04T12:20:33+02:00|2023-05-04T10:21:33+00:00": [1683195633.0, 1683195693.0],
+    "2023/05/04 10:20:33|2023/05/04 10:21:33": [1683195633.0, 1683195693.0],
+    "04.05.2023 10:20:33|05.05.2023 10:20:33": [1683195633.0, 1683282033.0],
+    "10:20:33|10:21:33": [37233.0, 37293.0],
+    "23:59|00:01": [86340.0, 86460.0],
+    "11:59:00 AM|01:00:00 PM": [43140.0, 46800.0],
+    "1600000000000|1600000002000": [1.6e9, 1600000002.0],
+    "1600000000000000|1600000002000000": [1.6e9, 1600000002.0],
+    "1600000000000000000|1600000002000000000": [1.6e9, 1600000002.0],
+    "1600000000.0|1600000002.0": [1.6e9, 1600000002.0],
+    "0.5|2": [0.5, 2.0],
+}
+
+
+@pytest.mark.parametrize("cells", TIMES)
+@pytest.mark.parametrize("header", ["Time", "Timestamp", "%time", "__time", "/header/Time"])
+def test_time_is_read_as_anybody_writes_it(tmp_path, cells, header):
+    rows = "".join(f"{number},1,2,3,{cell}\n" for number, cell in enumerate(cells.split("|")))
+    found = table(tmp_path, f"q1,x,y,z,{header}\n{rows}")
+    if header == "/header/Time":
+        assert "time_s" not in found.table and header in found.ignored
+        return
+    np.testing.assert_allclose(found.table["time_s"], TIMES[cells], rtol=0, atol=1e-6)
+    again = table(tmp_path, f"q1,x,y,z,{header}\n{rows}", found.options)
+    np.testing.assert_array_equal(again.table["time_s"], found.table["time_s"])
+
+
+@pytest.mark.parametrize(
+    ("header", "cells"),
+    [
+        ("Time", ["05/04/2023 10:20", "06/04/2023 10:20"]),
+        ("Time", ["10:20:33", "noon"]),
+        ("Time", ["10:20:33", "2023-05-04 10:20:33"]),
+        ("Temp", ["21.3 C", "21.3 C"]),
+        ("Temperature", ["21.3", ""]),
+    ],
+)
+def test_time_or_temperature_that_is_no_number_is_left_out_with_a_note_but_not_where_it_is_asked_for(tmp_path, header, cells):
+    text = f"q1,x,y,z,{header}\n" + "".join(f"{number},1,2,3,{cell}\n" for number, cell in enumerate(cells))
+    found = table(tmp_path, text)
+    name = "time_s" if header == "Time" else "temperature_c"
+    assert name not in found.table and found.ignored == (header,)
+    assert len(found.notes) == 1 and header in found.notes[0] and "not read" in found.notes[0]
+    assert table(tmp_path, text, replace(PLAIN, ignore=[header])).notes == ()
+    with refused(tmp_path / "t.csv", f"column {header}", f"--ignore {header!r}"):
+        table(tmp_path, text, replace(PLAIN, columns={name: header}))
+
+
+@pytest.mark.parametrize("header", ["Load [kg]", "load (kg)", "Cycle [s]", "Target [mm]", "Marker (mm)"])
+def test_a_number_or_name_with_a_unit_is_a_question(tmp_path, header):
+    text = f"q1,x,y,z,{header}\n0,1,2,3,4\n"
+    with refused(tmp_path / "t.csv", repr(header), f"--ignore {header!r}", f"={header!r}"):
+        table(tmp_path, text)
+    assert table(tmp_path, text, replace(PLAIN, ignore=[header])).ignored == (header,)
+    assert table(tmp_path, text, replace(PLAIN, columns={"load": header})).table["load"].tolist() == [4]
+    assert table(tmp_path, "q1,x,y,z,load [-]\n0,1,2,3,4\n").table["load"].tolist() == [4]
+
+
+SIX = "1,2,3,4,5,6"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        [f"q[{joint}]" for joint in range(1, 7)],
+        [f"q[{joint}]" for joint in range(6)],
+        [f"J({joint})" for joint in range(1, 7)],
+        [f"J ( {joint} )" for joint in range(1, 7)],
+        [f"q[{joint}] [deg]" for joint in range(6)],
+        [f"actual_q_{joint}" for joint in range(6)],
+        [f"rax_{joint}" for joint in range(1, 7)],
+        [f"/joint_states/A{joint}/position" for joint in range(1, 7)],
+        [f"/joint_states/position.J{joint}" for joint in range(1, 7)],
+    ],
+)
+def test_joints_may_be_counted_by_an_index_or_from_0_and_have_the_names_of_topics(tmp_path, names):
+    found = table(tmp_path, f"{','.join(names)},x,y,z\n{SIX},{ROW}\n")
+    np.testing.assert_allclose([found.table[f"q{joint}"][0] for joint in range(1, 7)], np.radians(range(1, 7)))
+    assert bool(found.notes) == ("0" in names[0])
+
+
+def test_an_index_is_no_unit(tmp_path):
+    names = {f"q{joint + 1}": f"q_d[{joint}]" for joint in range(6)}
+    found = table(tmp_path, f"{','.join(names.values())},x,y,z\n{SIX},{ROW}\n", replace(PLAIN, columns=names))
+    assert found.options.units["q1"] == "deg"
+
+
+@pytest.mark.parametrize(
+    ("names", "columns", "words"),
+    [
+        # A part of what is counted from 0, four of it, and two counts.
+        ("q[0],q[2],q[3]", {}, ["counted from 0", "--column q1="]),
+        ("q0,q1,q2,q3", {}, ["counted from 0", "--column q1="]),
+        ("q[0],q[1],q[2]", {"q1": "q[0]"}, ["counted from 0"]),
+        ("J1,J2,A3", {}, ["'J1' and 'A3'", "--ignore"]),
+        ("J1,J2,A1,A2", {}, ["both 'J1' and 'A1'", "--ignore"]),
+        ("position0,position1", {}, ["no joint angles", "not yet used: position0, position1"]),
+    ],
+)
+def test_joints_that_may_be_counted_in_two_ways_are_a_question(tmp_path, names, columns, words):
+    text = f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n"
+    with refused(tmp_path / "t.csv", "header", *words):
+        table(tmp_path, text, replace(PLAIN, columns=columns))
+
+
+@pytest.mark.parametrize(
+    "joints", [[f"rax_{j}" for j in range(1, 7)], [f"A{j}" for j in range(1, 7)], [f"axis_{j}_real" for j in "abcdef"], []]
+)
+@pytest.mark.parametrize("parts", [["q1", "q2", "q3", "q4"], ["q0", "q1", "q2", "q3"]])
+def test_a_quaternion_beside_joints_is_a_question(tmp_path, joints, parts):
+    rng = np.random.default_rng(1)
+    turns = Rotation.random(5, random_state=rng)
+    rows = "".join(
+        f"{','.join(['5'] * len(joints) + [f'{each:.6f}' for each in quat])},{ROW}\n"
+        for quat in turns.as_quat()[:, [3, 0, 1, 2]]
+    )
+    text = f"{','.join([*joints, *parts])},x,y,z\n{rows}"
+    with refused(tmp_path / "t.csv", "header", ", ".join(parts), "length 1", f"--column qw={parts[0]!r}"):
+        table(tmp_path, text)
+    if joints:
+        columns = {f"q{number}": name for number, name in enumerate(joints, 1)} | dict(
+            zip(("qw", "qx", "qy", "qz"), parts, strict=True)
+        )
+        found = table(tmp_path, text, replace(PLAIN, columns=columns))
+        got = np.column_stack([found.table[name] for name in ("rx", "ry", "rz")])
+        np.testing.assert_allclose(got, turns.as_rotvec(), atol=1e-5)
+
+
+def test_four_joints_that_are_no_quaternion_are_joints(tmp_path):
+    assert table(tmp_path, f"q1,q2,q3,q4,x,y,z\n0.5,0.5,0.5,0.5,{ROW}\n10,20,30,40,{ROW}\n").joints == 4
+
+
+@pytest.mark.parametrize("others", ["A,B,C", "W,P,R", "A [deg],B [deg],C [deg]", "E4,E5,E6"])
+@pytest.mark.parametrize("external", ["E1,E2,E3", "E1"])
+def test_external_axes_beside_an_orientation_are_a_question(tmp_path, others, external):
+    count = len(external.split(","))
+    text = f"q1,x,y,z,{others},{external}\n1,{ROW},10,20,30{',0' * count}\n"
+    options = replace(PLAIN, rotation="euler:ZYX")
+    with refused(tmp_path / "t.csv", "header", external.replace(",", ", "), "external axes?", "--column e1="):
+        table(tmp_path, text, options)
+    # Said in part it is still one.
+    names = others.split(",")
+    if count == 1:
+        with refused(tmp_path / "t.csv", "header", "external axes?"):
+            table(tmp_path, text, replace(options, columns={"e2": names[1], "e3": names[2]}))
+    found = table(tmp_path, text, replace(options, columns=dict(zip(("e1", "e2", "e3"), names, strict=True))))
+    expected = Rotation.from_euler("ZYX", [10, 20, 30], degrees=True).as_rotvec()
+    np.testing.assert_allclose([found.table[name][0] for name in ("rx", "ry", "rz")], expected)
+
+
+def test_euler_angles_with_nothing_beside_them_are_what_the_option_says(tmp_path):
+    assert "rx" in table(tmp_path, f"q1,x,y,z,E1,E2,E3\n1,{ROW},1,2,3\n", replace(PLAIN, rotation="euler:ZYX")).table
+
+
+def test_a_label_that_is_no_pose_is_a_question(tmp_path):
+    """Controllers call the posture of the arm its configuration."""
+    text = f"Config,q1,x,y,z\nFUT,1,{ROW}\nFUT,40,{ROW}\n"
+    with refused(tmp_path / "t.csv", "line 2, column Config", "'FUT'", "--ignore 'Config'"):
+        table(tmp_path, text)
+    assert table(tmp_path, text, replace(PLAIN, ignore=["Config"])).table["pose"].tolist() == [1, 2]
+
+
+NAMED = ("rail", "shoulder_pan_joint", "J1")
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        "rail,shoulder_pan_joint,J1",
+        "rail [mm],Shoulder Pan Joint (deg),J1 [deg]",
+        "rail_mm,shoulder_pan_joint_deg,J1_deg",
+        "/joint_states/rail/position,/joint_states/shoulder_pan_joint/position,/joint_states/J1/position",
+    ],
+)
+def test_columns_may_have_the_names_of_the_robots_joints(tmp_path, headers):
+    robot = replace(robot_of("Tx(q1) Rz(q2) Tx(1) Rz(q3) [A]"), joint_names=NAMED)
+    velocity = "/joint_states/rail/velocity"
+    (tmp_path / "t.csv").write_text(f"{headers},{velocity},x,y,z\n1,2,3,9,{ROW}\n")
+    found = read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+    np.testing.assert_allclose([found.table[name][0] for name in ("q1", "q2", "q3")], [0.001, *np.radians([2, 3])])
+    assert found.ignored == (velocity,)
+    # What was found out needs no robot a second time.
+    assert read_measurement_table(tmp_path / "t.csv", found.options).options == found.options
+
+
+def test_a_rail_is_measured_in_lengths_and_a_joint_in_angles(tmp_path):
+    robot = robot_of("Tx(q1) Rz(q2) [A]")
+    for names, unit in (("J1 [deg],J2", "J1 [deg]"), ("J1,J2 [mm]", "J2 [mm]")):
+        (tmp_path / "t.csv").write_text(f"{names},x,y,z\n1,2,{ROW}\n")
+        with refused(tmp_path / "t.csv", f"unit of {unit!r}", "--unit"):
+            read_measurement_table(tmp_path / "t.csv", PLAIN, robot)
+
+
+@pytest.mark.parametrize(
+    ("names", "words"), [("J1,J2,J3", ["3 joints", "--ignore"]), ("J1", ["no column q2"]), ("a,b", ["no joint angles"])]
+)
+def test_as_many_joints_as_the_robot_has_are_needed(tmp_path, names, words):
+    (tmp_path / "t.csv").write_text(f"{names},x,y,z\n{','.join('5' * len(names.split(',')))},{ROW}\n")
+    with refused(tmp_path / "t.csv", "header", *words):
+        read_measurement_table(tmp_path / "t.csv", PLAIN, robot_of("Rz(q1) Tx(1) Rz(q2) [A]"))
+
+
+def test_topics_have_positions_orientations_and_forces(tmp_path):
+    names = [f"/tcp/pose/position/{axis}" for axis in "xyz"] + [f"field.pose.orientation.{axis}" for axis in "wxyz"]
+    text = f"J1,/ft/wrench/force/x,/tcp/twist/linear/x,{','.join(names)}\n5,6,9,{ROW},1,0,0,0\n"
+    found = table(tmp_path, text)
+    assert [found.table[name][0] for name in ("x", "y", "z", "fx", "rx")] == [0.001, 0.002, 0.003, 6.0, 0.0]
+    assert found.ignored == ("/tcp/twist/linear/x",)

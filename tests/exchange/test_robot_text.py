@@ -44,8 +44,9 @@ def test_the_name_of_a_file_cannot_leave_the_comment(tmp_path):
 
 def test_what_was_read_is_told_in_a_few_lines(result):
     told = summary(result)
-    assert told[0] == "arm #1: 'heavy': 2 joints, 1 of them prismatic, 2.5 m stretched out, 2 kg"
-    assert told[1] == "measuring points: flange" and told[2] == "note: masses are guessed"
+    assert told[0] == result.origin and "by hand" in told[0]
+    assert told[1] == "arm #1: 'heavy': 2 joints, 1 of them prismatic, 2.5 m stretched out, 2 kg"
+    assert told[2] == "measuring points: flange" and told[3] == "note: masses are guessed"
 
 
 def test_what_a_robot_file_may_not_say_is_refused_by_the_other_file(tmp_path):

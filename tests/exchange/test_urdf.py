@@ -85,6 +85,25 @@ def test_limits_that_stand_for_none_are_a_turn_too(tmp_path):
     assert any("'j' has no limits" in note for note in result.notes)
 
 
+@pytest.mark.parametrize("limits", [(-170, 170), (0, 20), (-125, 10)])
+def test_limits_that_look_like_degrees_are_asked_for(tmp_path, limits):
+    path = written(
+        tmp_path, *map(link, "abc"), joint("j", "a", "b", xyz=(0, 0, 1), limits=limits), joint("rail", "b", "c", "prismatic")
+    )
+    with refused(path, "joint 'j': limit", "turns", "--limits deg", "--limits rad"):
+        robot_from_urdf(path, "a", "c")
+    degrees = robot_from_urdf(path, "a", "c", limits_in="deg")
+    assert degrees.document["joint_limits_deg"] == [[float(each) for each in limits], [-2.0, 2.0]]
+    assert any("degrees" in note for note in degrees.notes)
+    radians = robot_from_urdf(path, "a", "c", limits_in="rad")
+    np.testing.assert_allclose(radians.robot.joint_limits[0], limits)
+
+
+def test_two_turns_either_way_are_no_question(tmp_path):
+    path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", xyz=(0, 0, 1), limits=(-12.5664, 12.5664)))
+    assert robot_from_urdf(path, "a", "b").document["joint_limits_deg"][0][1] == pytest.approx(720, abs=0.01)
+
+
 def test_a_shift_without_limits_is_refused(tmp_path):
     path = written(tmp_path, link("a"), link("b"), joint("j", "a", "b", "prismatic", limits=None))
     with refused(path, "joint 'j': limit", "metres"):

@@ -11,7 +11,7 @@ from made_urdf import joint, link, robot
 
 from elastocal.campaigns.measurements import write_measurements
 from elastocal.campaigns.reading import read_robot
-from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS
+from elastocal.exchange.csv_dialect import DECIMALS, SEPARATORS, THOUSANDS
 from elastocal.exchange.dh import robot_from_dh
 from elastocal.exchange.import_options import import_options_text, read_import_options
 from elastocal.exchange.measurement_table import ImportOptions, read_measurement_table
@@ -139,6 +139,18 @@ def test_denavit_hartenberg_tables(folder, content, modified, angles):
     robot_of_table(folder, content, modified, angles)
 
 
+KINEMATICS = {
+    "kinematics": {"hash": "a", "shoulder": {"x": 0, "y": 0.1, "z": "1e-05", "roll": 1.5, "pitch": 0, "yaw": -9.6e-06}}
+}
+
+
+@given(any_document(KINEMATICS))
+def test_kinematics_of_ros_drivers(folder, content):
+    path = folder / "calib.yaml"
+    path.touch()
+    over(path, content, lambda: quietly(lambda: imported(folder, lambda: robot_from_dh(path))))
+
+
 @given(st.lists(st.sampled_from(ANGLE_CELLS) | CELLS, min_size=4, max_size=4))
 def test_numbers_of_denavit_hartenberg_tables(folder, cells):
     """One cell after another, so that a fault of the first hides none of the others."""
@@ -158,6 +170,9 @@ def test_denavit_hartenberg_tables_as_yaml(folder, content):
 TRACKER = "Tracker 7;;\nPose;J1;J2 [deg];q3;X [mm];Y;Z;Target;qw;qx;qy;qz;fz [kN];time\n" + "".join(
     f"{n};{n},5;{-n};{2 * n};{100 + n};{200 - n},25;{n};A;1;0;0;0;{-n % 3};{10 * n}\n" for n in range(1, 7)
 )
+TIMES = st.sampled_from(
+    ["10:20", "2023-05-04", "9999-12-31T23:59:59+00:01", "0001-01-01", "01.01.0001 00:00", "1e18", "24:00:00"]
+)
 HEADERS = (
     "q1",
     "J0",
@@ -175,6 +190,13 @@ HEADERS = (
     "#",
     "٣",
     "Axis 2",
+    "q[0]",
+    "J(2)",
+    "Load [kg]",
+    "E1",
+    "/arm/J1/position",
+    "Config",
+    "Timestamp",
 )
 
 
@@ -221,6 +243,9 @@ def test_measurements_of_other_programs(folder, data):
         separator=data.draw(st.sampled_from([None, None, *SEPARATORS])),
         decimal=data.draw(st.sampled_from([None, None, *DECIMALS])),
         header=data.draw(st.sampled_from([None, None, 1, 2, 3])),
+        encoding=data.draw(st.sampled_from([None, None, "utf-8", "cp1252", "utf-16-le", "shift_jis"])),
+        thousands=data.draw(st.sampled_from([None, None, *THOUSANDS])),
+        ignore=data.draw(st.sampled_from([None, None, ["time"], ["Z"]])),
         units=UNITS | {"angles": data.draw(st.sampled_from(["deg", "rad", "mm"]))},
         rotation=data.draw(st.sampled_from([None, None, "none", "vector", "euler:ZYX", "matrix", "euler:"])),
         target=data.draw(st.sampled_from([None, "A"])),
@@ -234,7 +259,7 @@ def test_headers_of_other_programs(folder, content):
     measurements_of(folder, content, ImportOptions(units=UNITS, target="A"))
 
 
-@given(st.sampled_from(["Pose", "J1", "X [mm]", "Target", "qw", "fz [kN]", "time"]), CELLS | SCALARS.map(str))
+@given(st.sampled_from(["Pose", "J1", "X [mm]", "Target", "qw", "fz [kN]", "time"]), CELLS | TIMES | SCALARS.map(str))
 def test_cells_of_other_programs(folder, name, cell):
     lines = TRACKER.splitlines()
     row = lines[3].split(";")

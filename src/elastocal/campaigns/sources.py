@@ -82,16 +82,16 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
     Returns
     -------
     dict of str to str
-        Its folder by its name; empty where there is none.
+        Its folder by its name, spelled in one way however it was given; empty where there is none.
 
     Raises
     ------
     InputError
         As `reading.campaign_files`; a name that a campaign of this project has, or another one whose results are there.
     """
-    folder = config.get("campaign")
-    if not folder:
+    if not config.get("campaign"):
         return {}
+    folder = _one_spelling(config["campaign"])
     for path in campaign_files(folder, robots_folder):
         if set(path) & set("{}"):
             raise InputError(path, "", "braces", "a path without braces, which Snakemake takes for wildcards")
@@ -105,7 +105,14 @@ def user_campaign(config: Mapping[str, Any], robots_folder: str | Path, results:
     if earlier is not None and earlier.is_dir() and not earlier.samefile(folder):
         found = f"{name!r}, whose results are of {earlier.as_posix()}"
         raise InputError(source, "campaign", found, f"another name, or first take away {Path(results, name).as_posix()}")
-    return {name: str(folder).rstrip("/")}
+    return {name: folder}
+
+
+def _one_spelling(folder: object) -> str:
+    """A folder as the names of the files in it begin: another spelling of the same one would make every result anew."""
+    # Snakemake takes a folder that is called 2026 for a number.
+    path = Path(str(folder)).resolve()
+    return (path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path).as_posix()
 
 
 def _folder_of_results(folder: Path) -> Path | None:

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from elastocal.command.pipeline import pipeline
 from elastocal.command.quantities import MOST_ROWS
 from elastocal.errors import InputError, printable
 
 if TYPE_CHECKING:
     from elastocal.exchange.measurement_table import ImportedMeasurements, ImportOptions
+    from elastocal.mechanics.robot import Robot
 
 
 class Separator(StrEnum):
@@ -27,6 +29,12 @@ class Decimal(StrEnum):
     POINT, COMMA = "point", "comma"
 
 
+class Thousands(StrEnum):
+    """What stands between thousands."""
+
+    POINT, COMMA, SPACE, APOSTROPHE = "point", "comma", "space", "apostrophe"
+
+
 class Wrench(StrEnum):
     """What forces act on."""
 
@@ -34,7 +42,7 @@ class Wrench(StrEnum):
 
 
 def csv(
-    file: Annotated[Path, typer.Argument(help="The table: CSV, tabs, semicolons, spaces; UTF-8 or UTF-16.")],
+    file: Annotated[Path, typer.Argument(help="The table: CSV, tabs, semicolons, spaces.")],
     folder: Annotated[Path, typer.Option(help="Folder of the campaign; measurements.csv and import.yaml go there.")],
     angles: Annotated[str | None, typer.Option(help="Unit of angles whose header has none: deg, rad, mrad.")] = None,
     lengths: Annotated[str | None, typer.Option(help="Unit of lengths whose header has none: m, mm, um, in.")] = None,
@@ -45,14 +53,20 @@ def csv(
         ),
     ] = None,
     column: Annotated[list[str] | None, typer.Option(help="NAME=HEADER, such as q1=Axis_A1; as often as needed.")] = None,
+    ignore: Annotated[list[str] | None, typer.Option(help="Header of a column to leave out; as often as needed.")] = None,
     unit: Annotated[list[str] | None, typer.Option(help="NAME=UNIT of one column, such as fx=kN.")] = None,
     target: Annotated[str | None, typer.Option(help="Name of the target where no column has it.")] = None,
     wrench: Annotated[Wrench | None, typer.Option(help="Forces on the robot, or those that it exerts.")] = None,
     skip_empty: Annotated[bool, typer.Option("--skip-empty", help="Leave out rows without a position.")] = False,
     separator: Annotated[Separator | None, typer.Option(help="Found out where not given.")] = None,
     decimal: Annotated[Decimal | None, typer.Option(help="Found out where not given.")] = None,
+    thousands: Annotated[Thousands | None, typer.Option(help="Mark between thousands, where there is one.")] = None,
+    encoding: Annotated[str | None, typer.Option(help="Such as utf-8, cp1252; found out where not given.")] = None,
     header: Annotated[
         int | None, typer.Option(min=1, max=MOST_ROWS, help="Line of the names of columns; found out where not given.")
+    ] = None,
+    robot: Annotated[
+        Path | None, typer.Option(help="Robot file whose joint_names the columns have; that of FOLDER/campaign.yaml without.")
     ] = None,
     options: Annotated[Path | None, typer.Option(help="import.yaml of an earlier import, to repeat it.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace measurements.csv that is filled in.")] = False,
@@ -60,8 +74,9 @@ def csv(
     """Make measurements.csv of another program's table.
 
     Columns are found by their usual names (q1 or J1 or Axis 1, x, y, z, qw .. qz, r11 .. r33, t11 .. t34, fx .. mz, pose,
-    load, repeat, target, time), units by brackets or endings ("X [mm]", x_mm). What is ambiguous is asked for. Poses, loads and
-    repeats that no column numbers are counted. The options, and what was found out, are written to import.yaml.
+    load, repeat, target, time) or as the robot's file calls its joints, units by brackets or endings ("X [mm]", x_mm). What is
+    ambiguous is asked for. Poses, loads and repeats that no column numbers are counted. What was read, how, and what was left
+    out is printed at the end; the options, and what was found out, are written to import.yaml.
     """
     from elastocal.campaigns.measurements import CSV, PARQUET, write_measurements
     from elastocal.exchange.import_options import IMPORT, import_options_text, read_import_options
@@ -81,6 +96,9 @@ def csv(
         separator=separator.value if separator else earlier.separator,
         decimal=decimal.value if decimal else earlier.decimal,
         header=header or earlier.header,
+        encoding=encoding or earlier.encoding,
+        thousands=thousands.value if thousands else earlier.thousands,
+        ignore=[*(earlier.ignore or ()), *(ignore or ())] or None,
         columns=dict(earlier.columns or {}) | _pairs("--column", column),
         units=dict(earlier.units or {}) | units,
         rotation=rotation or earlier.rotation,
@@ -88,12 +106,22 @@ def csv(
         wrench=wrench.value if wrench else earlier.wrench,
         skip_empty=skip_empty or earlier.skip_empty,
     )
-    found = read_measurement_table(file, chosen)
+    found = read_measurement_table(file, chosen, _robot(robot, folder))
     with write_together(folder, (CSV, IMPORT)) as partial:
         write_measurements(partial / CSV, found.table, found.joints)
         write_text(partial / IMPORT, import_options_text(found.options, file))
     lines = [*_summary(found, found.options), f"written: {(folder / CSV).as_posix()}, {(folder / IMPORT).as_posix()}"]
     typer.echo("\n".join(map(printable, lines)))
+
+
+def _robot(path: Path | None, folder: Path) -> Robot | None:
+    """The robot of the file, or of the campaign that the folder holds already."""
+    from elastocal.campaigns.campaign import DOCUMENT
+    from elastocal.campaigns.reading import read_descriptions, read_robot
+
+    if path is None and (folder / DOCUMENT).is_file():
+        path = read_descriptions(folder, pipeline() / "config" / "robots")[1]
+    return None if path is None else read_robot(path)
 
 
 def _pairs(option: str, texts: list[str] | None) -> dict[str, str]:
@@ -128,7 +156,11 @@ def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
     table = found.table
     poses = len(np.unique(np.column_stack([table.get("session", np.zeros_like(table["pose"])), table["pose"]]), axis=0))
     targets = ", ".join(sorted(set(table["target"].tolist())))
-    first = [f"{len(table['pose'])} measurements of {targets} at {poses} poses, {found.joints} joints"]
+    first = [
+        f"{len(table['pose'])} measurements of {targets} at {poses} poses, {found.joints} joints",
+        f"file: names of columns in line {options.header}, separator {options.separator}, decimal {options.decimal}, "
+        f"thousands {options.thousands or 'not marked'}, encoding {options.encoding}",
+    ]
     if found.skipped:
         first.append(f"left out: {found.skipped} rows without a position")
     read = [f"{name} from {header!r}" + (f" in {options.units[name]}" if options.units and name in options.units else "")
@@ -142,4 +174,5 @@ def _summary(found: ImportedMeasurements, options: ImportOptions) -> list[str]:
         lines.append(f"taken for zero, as no column has it: {', '.join(forces)}")
     if found.ignored:
         lines.append(f"not used: {', '.join(found.ignored)}")
+    lines += [f"note: {note}" for note in found.notes]
     return lines

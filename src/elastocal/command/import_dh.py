@@ -21,6 +21,12 @@ class Angles(StrEnum):
     RAD = "rad"
 
 
+class Decimal(StrEnum):
+    """Decimal marks."""
+
+    POINT, COMMA = "point", "comma"
+
+
 class Lengths(StrEnum):
     """Units of lengths."""
 
@@ -29,11 +35,12 @@ class Lengths(StrEnum):
 
 
 def dh(
-    file: Annotated[Path, typer.Argument(help="The table, .csv or .yaml.")],
+    file: Annotated[Path, typer.Argument(help="The table, .csv or .yaml; or the kinematics file of the ROS driver.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The robot file to write.")],
     modified: Annotated[bool, typer.Option("--modified", help="Craig's notation: alpha and a come before the joint.")] = False,
     angles: Annotated[Angles, typer.Option(help="Unit of columns of angles that do not end in one.")] = Angles.DEG,
     lengths: Annotated[Lengths, typer.Option(help="Unit of columns of lengths that do not end in one.")] = Lengths.M,
+    decimal: Annotated[Decimal | None, typer.Option(help="Mark of a CSV table; a comma has to be stated.")] = None,
     name: Annotated[str | None, typer.Option(help="Maker and model; the file's name without.")] = None,
     mass_std: Annotated[
         float,
@@ -57,6 +64,6 @@ def dh(
     2, 0, 0, -0.425, 0, R
     """
     refuse_existing(output, force)
-    result = robot_from_dh(file, modified, angles.value, lengths.value, name, mass_std)
+    result = robot_from_dh(file, modified, angles.value, lengths.value, name, mass_std, decimal.value if decimal else None)
     write_robot(result, output)
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -14,12 +15,21 @@ from elastocal.exchange.urdf import robot_from_urdf
 from elastocal.exchange.urdf_weights import RELATIVE_STD
 
 
+class Limits(StrEnum):
+    """Units of limits of joints that turn."""
+
+    RAD, DEG = "rad", "deg"
+
+
 def urdf(
     file: Annotated[Path, typer.Argument(help="The URDF; of a xacro file, what xacro makes of it.")],
     base: Annotated[str, typer.Option(help="Link whose frame is the robot's base frame.")],
     tip: Annotated[str, typer.Option(help="Link at the end; its frame is the last measuring point.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The robot file to write.")],
     point: Annotated[list[str] | None, typer.Option(help="A link between them that targets may sit on; any number.")] = None,
+    limits: Annotated[
+        Limits | None, typer.Option(help="Unit of the limits of joints that turn; asked for where they look like degrees.")
+    ] = None,
     mass_std: Annotated[
         float,
         typer.Option(
@@ -32,6 +42,6 @@ def urdf(
 ) -> None:
     """Make a robot file of the chain between two links of a URDF: its lengths, limits and masses."""
     refuse_existing(output, force)
-    result = robot_from_urdf(file, base, tip, point or (), mass_std)
+    result = robot_from_urdf(file, base, tip, point or (), mass_std, limits.value if limits else None)
     write_robot(result, output)
     typer.echo("\n".join(map(printable, [*summary(result), f"written: {output.as_posix()}"])))

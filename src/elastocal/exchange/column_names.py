@@ -24,7 +24,7 @@ UNITS: dict[str, dict[str, float]] = {
     ANGLE: {"rad": 1.0, "deg": math.radians(1.0), "°": math.radians(1.0), "mrad": 1e-3},
     FORCE: {"N": 1.0, "kN": 1e3, "kgf": constants.kgf, "lbf": constants.lbf},
     MOMENT: {"Nm": 1.0, "Nmm": 1e-3, "kNm": 1e3, "kgfm": constants.kgf, "lbfft": constants.lbf * constants.foot},
-    TIME: {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+    TIME: {"s": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
     TEMPERATURE: {"C": 1.0, "°C": 1.0},
     NONE: {"": 1.0},
 }
@@ -40,21 +40,26 @@ HOMOGENEOUS = tuple(f"t{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3, 4))
 COVARIATES = ("time_s", "temperature_c", "u95_m")
 
 _BRACKETS = re.compile(r"(.*?)\s*[\[(]\s*(.*?)\s*[\])]\s*")
+_INDEX = re.compile(r"([^\[(]*?)\s*[\[(]\s*([0-9]+)\s*[\])](.*)", re.ASCII)
+# What has no unit, as people write it.
+_NO_UNIT = ("", "-", "1", "#")
 _BEHIND = re.compile(r"(.+?)[_/ ]([A-Za-zµ°]+)")
 # No arm has a hundred joints, and a table is looked through for each up to the last that it names.
-_JOINT = re.compile(r"(?:q|j|a|axis|joint|theta|jointangle|actualq)([0-9]{1,2})")
+_JOINT = re.compile(
+    r"(q|j|a|axis|joint|theta|jointangle|actualq|targetq|qactual|rax|jointpos|jointposition|jointpositions|joints)([0-9]{1,2})"
+)
 _APPROACH = re.compile(r"(?:approach|direction)([0-9]{1,2})")
 _ALSO = {
-    "x": ("px", "posx", "positionx", "measuredx", "xmeas"),
-    "y": ("py", "posy", "positiony", "measuredy", "ymeas"),
-    "z": ("pz", "posz", "positionz", "measuredz", "zmeas"),
+    "x": ("px", "posx", "positionx", "measuredx", "xmeas", "translationx", "pointx"),
+    "y": ("py", "posy", "positiony", "measuredy", "ymeas", "translationy", "pointy"),
+    "z": ("pz", "posz", "positionz", "measuredz", "zmeas", "translationz", "pointz"),
     "rx": ("rotx", "roll", "rvx"),
     "ry": ("roty", "pitch", "rvy"),
     "rz": ("rotz", "yaw", "rvz"),
-    "qw": ("quatw",),
-    "qx": ("quatx",),
-    "qy": ("quaty",),
-    "qz": ("quatz",),
+    "qw": ("quatw", "orientationw", "rotationw"),
+    "qx": ("quatx", "orientationx", "rotationx"),
+    "qy": ("quaty", "orientationy", "rotationy"),
+    "qz": ("quatz", "orientationz", "rotationz"),
     "fx": ("forcex",),
     "fy": ("forcey",),
     "fz": ("forcez",),
@@ -70,6 +75,8 @@ _ALSO = {
     "temperature_c": ("temperature", "temp"),
     "u95_m": ("u95", "expandeduncertainty"),
 }
+# Last but one names of topics that hold angles by their number.
+_ANGLES = ("position", "positions", "jointstates", "joints", "jointpositions")
 _KNOWN = {other: name for name, others in _ALSO.items() for other in (name.replace("_", ""), *others)}
 _KNOWN |= {name: name for name in (*EULER, *MATRIX, *HOMOGENEOUS)}
 
@@ -104,23 +111,22 @@ def is_name(name: str) -> bool:
     return name in _ALSO or name in _KNOWN.values() or re.fullmatch(r"(q|approach)[1-9][0-9]?", name) is not None
 
 
-def unit_scale(name: str, unit: str) -> float | None:
-    """SI value of one unit of a column; None where it is none of its units."""
+def unit_scale(unit: str, kinds: Iterable[str]) -> float | None:
+    """SI value of one unit, if it is one of some kinds."""
     plain = _plain_unit(unit)
-    return next((UNITS[kind][plain] for kind in kind_of(name) if plain in UNITS[kind]), None)
+    return next((UNITS[kind][plain] for kind in kinds if plain in UNITS[kind]), None)
 
 
-def units_of(name: str) -> list[str]:
-    """Units in which a column may be."""
-    return [unit for kind in kind_of(name) for unit in UNITS[kind]]
+def units_of(kinds: Iterable[str]) -> list[str]:
+    """Units of some kinds."""
+    return [unit for kind in kinds for unit in UNITS[kind]]
 
 
 def recognized(header: str) -> tuple[str | None, str | None]:
     """What a column is, by its header.
 
-    Parameters
-    ----------
-    header : str
+    A number in brackets is an index, whatever else stands there a unit. Of a topic such as ``/tcp/pose/position/x`` or
+    ``field.pose.position.x`` the last two names count, or the last but one before ``position``.
 
     Returns
     -------
@@ -129,17 +135,30 @@ def recognized(header: str) -> tuple[str | None, str | None]:
     unit : str or None
         As it stands in the header, None where none does.
     """
-    bracketed = _BRACKETS.fullmatch(header)
-    if bracketed:
-        name = _named(bracketed[1])
-        return name, _plain_unit(bracketed[2]) or None
-    name = _named(header)
-    if name is not None:
+    text, unit = _without_unit(header)
+    name = _named(text)
+    if name is not None and unit is None:
         return name, {"time_s": "s", "temperature_c": "C", "u95_m": "m"}.get(header.lower())
-    behind = _BEHIND.fullmatch(header)
-    if behind and (name := _named(behind[1])) is not None and unit_scale(name, behind[2]) is not None:
-        return name, _plain_unit(behind[2])
-    return None, None
+    return name, unit
+
+
+def ordinal_of_joint(header: str) -> tuple[str, int] | None:
+    """What a header calls joints and the number of this one, which may be counted from 0; None where it is no joint angle."""
+    matches = (_JOINT.fullmatch(name) for name in _names_in(_without_unit(header)[0]))
+    return next(((match[1], int(match[2])) for match in matches if match), None)
+
+
+def unit_of_joint(header: str, joint: str) -> tuple[bool, str | None]:
+    """Whether a column has the name of a joint (alone, with a unit, or as a topic has it), and the unit."""
+    if _plain(joint) in _names_in(header):
+        return True, None
+    text, unit = _without_unit(header)
+    return _plain(joint) in _names_in(text), unit
+
+
+def is_unit_of_none(name: str, unit: str | None) -> bool:
+    """Whether a column that counts or names something has a unit in its header all the same, as ``Load [kg]`` has."""
+    return unit not in (None, *_NO_UNIT) and kind_of(name) == (NONE,)
 
 
 def joints_in(names: Iterable[str]) -> list[str]:
@@ -148,13 +167,47 @@ def joints_in(names: Iterable[str]) -> list[str]:
     return [f"q{number}" for number in numbers]
 
 
+def _without_unit(header: str) -> tuple[str, str | None]:
+    """A header without its unit, and the unit; an index in brackets is a part of the name."""
+    index = _INDEX.fullmatch(header)
+    if index and index[1]:
+        # Of a name with a number an index is one too many.
+        header = f"{index[1]}{' index ' if index[1][-1].isdigit() else ''}{index[2]}{index[3]}"
+    if bracketed := _BRACKETS.fullmatch(header):
+        return bracketed[1], _plain_unit(bracketed[2]) or None
+    behind = _BEHIND.fullmatch(header)
+    if _named(header) is None and behind and any(_plain_unit(behind[2]) in units for units in UNITS.values()):
+        name = _named(behind[1])
+        if name is None or unit_scale(behind[2], kind_of(name)) is not None:
+            return behind[1], _plain_unit(behind[2])
+    return header, None
+
+
 def _named(text: str) -> str | None:
-    plain = re.sub(r"[^a-z0-9]", "", text.lower())
+    return next((name for plain in _names_in(text) if (name := _named_plainly(plain)) is not None), None)
+
+
+def _names_in(text: str) -> list[str]:
+    """What a header may be called: the whole of it, and of a topic its end."""
+    parts = [plain for part in re.split(r"[/.]", text) if (plain := _plain(part))]
+    if len(parts) < 2:
+        return [_plain(text)]
+    if parts[-1] in ("position", "pos"):
+        return [_plain(text), parts[-2]]
+    return [_plain(text), parts[-2] + parts[-1], *([parts[-1]] if _JOINT.fullmatch(parts[-1]) and parts[-2] in _ANGLES else [])]
+
+
+def _named_plainly(plain: str) -> str | None:
     for pattern, letter in ((_JOINT, "q"), (_APPROACH, "approach")):
         if match := pattern.fullmatch(plain):
-            # Joint 0 is somebody's first: whose, an option has to say.
-            return f"{letter}{int(match[1])}" if int(match[1]) else None
+            # Joint 0 is somebody's first: whose, an option or the other columns have to say.
+            number = int(match[match.lastindex or 1])
+            return f"{letter}{number}" if number else None
     return _KNOWN.get(plain)
+
+
+def _plain(text: str) -> str:
+    return re.sub(r"[^a-z0-9]", "", text.lower())
 
 
 def _plain_unit(unit: str) -> str:

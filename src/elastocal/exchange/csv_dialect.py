@@ -1,4 +1,4 @@
-"""Tables of numbers as text, in whatever dialect: separator, decimal mark, byte order, lines before the header, comments."""
+"""Tables of numbers as text, in whatever dialect: encoding, separator, decimal mark, lines before the header, comments."""
 
 from __future__ import annotations
 
@@ -6,23 +6,38 @@ import codecs
 import csv
 import re
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError, steering
 from elastocal.io.texts import decoded, read_bytes
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection, Sequence
 
 # In this order: a header that holds a semicolon is not separated by its commas.
 SEPARATORS = {"tab": "\t", "semicolon": ";", "bar": "|", "comma": ",", "space": " "}
 DECIMALS = {"point": ".", "comma": ","}
+# What may stand between groups of three digits: a space is any that people see as one.
+THOUSANDS = {"point": ".", "comma": ",", "space": " \u00a0\u2009\u202f", "apostrophe": "'\u2019"}
 _MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+# What Western spreadsheets and instruments write beyond ASCII. Another encoding that gives these alone is not to be expected:
+# that of Windows is taken where a file is no UTF-8, and asked for where anything else comes out.
+WESTERN, _WESTERN_SIGNS = "cp1252", frozenset("°µ±²³·äöüÄÖÜßàâçèéêëîïôùûñÉ\u00a0")
 _COMMENTS = ("#", "%", "//")
 _POINT = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?", re.ASCII)
 _COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
+# A number with marks between its thousands for certain: other marks than the decimal one, or several.
+_GROUPED = re.compile(
+    r"[+-]?\d{1,3}(?:(?:[ \u00a0\u2009\u202f'\u2019]\d{3})+(?:[.,]\d*)?"
+    r"|(?:,\d{3})+\.\d*|(?:\.\d{3})+,\d*|(?:,\d{3}){2,}|(?:\.\d{3}){2,})",
+    re.ASCII,
+)
+# What may be one, looked at quickly; a comma before three digits may be either.
+_MARKED = re.compile("[ \u00a0\u2009\u202f'\u2019,]|[.].*[.]")
+_EITHER = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 _ENDS = re.compile(r"\r\n|\n|\r")
 # The whole of it is in memory, as text and as cells: some 2 GB at most.
 LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
@@ -30,7 +45,7 @@ LARGEST_BYTES, MOST_LINES = 100_000_000, 500_000
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a table is written.
+    """How a table is written; what is None is found out, or refused where it is ambiguous.
 
     Attributes
     ----------
@@ -38,81 +53,79 @@ class Dialect:
         Names in `SEPARATORS` and `DECIMALS`.
     header : int
         Line of the names of columns, from 1.
+    encoding : str
+        As Python calls it.
+    thousands : str or None
+        Name in `THOUSANDS` of the mark between thousands; None for none.
     """
 
-    separator: str
-    decimal: str
-    header: int
+    separator: str | None = None
+    decimal: str | None = None
+    header: int | None = None
+    encoding: str | None = None
+    thousands: str | None = None
+
+
+_UNSTATED = Dialect()
+_WANTED = "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are"
 
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells of a table.
+    """Cells of a table: decimal points throughout, no marks between thousands; `lines` has the line of the file of each row.
 
-    Attributes
-    ----------
-    path : str
-    dialect : Dialect
-    columns : dict of str to tuple of str
-        Cells by the name of the column, decimal points throughout.
-    lines : tuple of int
-        Line of the file of each row.
+    `left_out` says in words what of the file is no cell of `columns`.
     """
 
     path: str
     dialect: Dialect
     columns: dict[str, tuple[str, ...]]
     lines: tuple[int, ...]
+    left_out: tuple[str, ...] = field(default=())
 
 
 def read_text_table(
     path: str | Path,
     is_header: Callable[[Sequence[str]], bool],
-    separator: str | None = None,
-    decimal: str | None = None,
-    header: int | None = None,
+    stated: Dialect = _UNSTATED,
+    ignored: Collection[str] = (),
+    wanted: str = _WANTED,
 ) -> TextTable:
     """Read a table, finding out what is not stated of its dialect.
+
+    Columns without a name are called ``column 3`` by their place; those of empty cells are left out, and so are such rows.
 
     Parameters
     ----------
     path : str or Path
-        UTF-8, or UTF-16 with a byte order mark.
     is_header : callable
-        Of the cells of a line, whether they name the columns; the first such line does where `header` is not given.
-    separator, decimal : str, optional
-        Names in `SEPARATORS` and `DECIMALS`.
-    header : int, optional
-        Line of the names of columns, from 1.
-
-    Returns
-    -------
-    TextTable
+        Of the cells of a line, whether they name the columns; the first such line does where no line is stated, else one
+        behind a comment mark.
+    stated : Dialect, optional
+    wanted : str
+        What a header has, for messages.
+    ignored : collection of str
+        Names of columns that are left out whatever they hold.
 
     Raises
     ------
     InputError
-        A file that cannot be read or has no header, a row of another length, or decimals that are written both ways.
+        A file that cannot be read or has no header, a row of another length, or numbers that may be read in two ways.
     """
     source = Path(path).as_posix()
-    lines = _lines(path)
-    kept = [(number, line) for number, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith(_COMMENTS)]
+    lines, encoding = _lines(path, stated.encoding)
+    filled = [(number, line) for number, line in enumerate(lines, 1) if line.strip()]
+    kept = [(number, line) for number, line in filled if not line.lstrip().startswith(_COMMENTS)]
+    comments = [(number, _without_mark(line)) for number, line in filled if line.lstrip().startswith(_COMMENTS)]
     if not kept:
         raise InputError(source, "", "nothing but comments and blank lines", "a header and one row for each measurement")
-    if header is None:
-        separator, header = _header(kept, is_header, separator, source)
-    else:
-        stated = [line for number, line in kept if number == header]
-        if not stated:
-            raise InputError(source, f"line {header}", "no header", "the line that names the columns")
-        separator = separator or _separator_of(stated[0])
-    table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number >= header]
-    names, rows = table[0][1], table[1:]
-    if twice := [name for name, times in Counter(names).items() if times > 1]:
-        raise InputError(source, f"line {header}", f"column {twice[0]!r} twice", "each column once")
+    separator, header, line = _header(kept, comments, is_header, stated, wanted, source)
+    table = [(number, cells_of(line, separator, source, number)) for number, line in kept if number > header]
+    names = [name or f"column {place}" for place, name in enumerate(cells_of(line, separator, source, header), 1)]
+    rows = [row for row in table if any(row[1])]
     for number, cells in rows:
-        # A separator at the end of the rows and not of the header is common.
-        if len(cells) == len(names) + 1 and not cells[-1]:
+        # Separators at the end of the rows and not of the header are common.
+        while len(cells) > len(names) and not cells[-1]:
             cells.pop()
         if len(cells) != len(names):
             raise InputError(
@@ -120,11 +133,52 @@ def read_text_table(
             )
     if not rows:
         raise InputError(source, "", "a header alone", "one row for each measurement")
-    decimal = decimal or _decimal_of(rows, separator, source)
+    for name in ignored:
+        if name not in names:
+            raise InputError(
+                source, f"line {header}", f"no column {name!r} to ignore", closest_first(name, list(dict.fromkeys(names)))
+            )
+    cells_by_place = list(zip(*(cells for _, cells in rows), strict=True))
+    places = [
+        place
+        for place, name in enumerate(names)
+        if name not in ignored and (not _nameless(name, place) or any(cells_by_place[place]))
+    ]
+    if twice := [name for name, times in Counter(names[place] for place in places).items() if times > 1]:
+        allowed = f"each column once (import csv --ignore {twice[0]!r} leaves out those that nobody needs)"
+        raise InputError(source, f"line {header}", f"column {twice[0]!r} twice", allowed)
+    numbers = [number for number, _ in rows]
+    columns = {names[place]: cells_by_place[place] for place in places}
+    thousands = stated.thousands
+    if thousands is not None and thousands == stated.decimal:
+        raise InputError("--thousands", "", f"{thousands}, the decimal mark too", "two different marks")
+    if thousands is not None:
+        columns = {name: tuple(_ungrouped(cell, thousands) for cell in cells) for name, cells in columns.items()}
+    decimal = stated.decimal or _decimal_of(columns, numbers, separator, thousands, source)
     if decimal == "comma":
-        rows = [(number, [_with_point(cell) for cell in cells]) for number, cells in rows]
-    columns = dict(zip(names, zip(*(cells for _, cells in rows), strict=True), strict=True))
-    return TextTable(source, Dialect(separator, decimal, header), columns, tuple(number for number, _ in rows))
+        columns = {name: tuple(map(_with_point, cells)) for name, cells in columns.items()}
+    left_out = _left_out(
+        {
+            "rows of empty cells": len(table) - len(rows),
+            "lines above the header": sum(number < header for number, _ in kept),
+            "lines of comments below the header": sum(number > header for number, _ in comments),
+            "columns without name and values": len(names) - len(places) - sum(name in ignored for name in names),
+        }
+    )
+    dialect = Dialect(separator, decimal, header, encoding, thousands)
+    return TextTable(source, dialect, columns, tuple(numbers), left_out)
+
+
+def _left_out(counted: dict[str, int]) -> tuple[str, ...]:
+    return tuple(f"{number} {what}" for what, number in counted.items() if number)
+
+
+def _nameless(name: str, place: int) -> bool:
+    return name == f"column {place + 1}"
+
+
+def _without_mark(line: str) -> str:
+    return line.lstrip().lstrip("#%/").strip()
 
 
 def lines_of(text: str, path: str | Path) -> list[str]:
@@ -137,27 +191,83 @@ def lines_of(text: str, path: str | Path) -> list[str]:
     return lines[:-1] if lines[-1] == "" else lines
 
 
-def _lines(path: str | Path) -> list[str]:
+def _lines(path: str | Path, encoding: str | None) -> tuple[list[str], str]:
     content = read_bytes(path, LARGEST_BYTES, "a table with a line for each measurement")
-    encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "utf-8")
-    text = decoded(content, path, encoding)
+    text, encoding = _text(content, path, encoding)
     lines = lines_of(text, path)
     if len(lines) > MOST_LINES:
         allowed = f"at most {MOST_LINES} (the mean of a tracker's stream at each pose is one measurement)"
         raise InputError(path, "", f"{len(lines)} lines", allowed)
-    return lines
+    return lines, encoding
+
+
+def _text(content: bytes, path: str | Path, encoding: str | None) -> tuple[str, str]:
+    """Text of a file and its encoding, found out where it is not stated."""
+    if encoding is not None:
+        try:
+            return decoded(content, path, encoding).removeprefix("\ufeff"), encoding
+        except InputError:
+            raise
+        except (LookupError, ValueError) as error:
+            known = "an encoding as Python calls it, such as utf-8, cp1252, cp437, mac-roman, shift_jis, gb18030 or utf-16-le"
+            raise InputError("--encoding", "", f"{encoding!r}: {error}", known) from None
+    if mark := next((name for mark, name in _MARKS if content.startswith(mark)), None):
+        return decoded(content, path, mark), mark
+    # In UTF-16 every other byte of digits, letters and separators is zero.
+    for name, zeros, letters in (
+        ("utf-16-le", content[1:200:2], content[:200:2]),
+        ("utf-16-be", content[:200:2], content[1:200:2]),
+    ):
+        if zeros and not any(zeros) and all(letters):
+            return decoded(content, path, name), name
+    try:
+        return decoded(content, path, "utf-8"), "utf-8"
+    except InputError as error:
+        western = content.decode(WESTERN, errors="replace")
+        if all(character in _WESTERN_SIGNS for character in western if not character.isascii()):
+            return western, WESTERN
+        allowed = "UTF-8 (iconv -f cp1252 -t utf-8), or in import csv --encoding cp1252, shift_jis, gb18030 or such"
+        raise InputError(path, error.key, error.found, allowed) from None
 
 
 def _header(
-    kept: Sequence[tuple[int, str]], is_header: Callable[[Sequence[str]], bool], separator: str | None, source: str
-) -> tuple[str, int]:
+    kept: Sequence[tuple[int, str]],
+    comments: Sequence[tuple[int, str]],
+    is_header: Callable[[Sequence[str]], bool],
+    stated: Dialect,
+    wanted: str,
+    source: str,
+) -> tuple[str, int, str]:
+    """Separator, and number and text of the line that names the columns."""
+    if stated.header is not None:
+        line = dict((*kept, *comments)).get(stated.header)
+        if not line:
+            raise InputError(source, f"line {stated.header}", "no header", "the line that names the columns")
+        return stated.separator or _separator_of(line), stated.header, line
+
+    def separator_of(line: str, cells: Callable[[str, str], list[str]]) -> str | None:
+        tried = [stated.separator] if stated.separator else [name for name, mark in SEPARATORS.items() if mark in line]
+        return next((name for name in tried if is_header(cells(line, name))), None)
+
     for number, line in kept:
-        for name in [separator] if separator else [name for name, mark in SEPARATORS.items() if mark in line]:
-            if is_header(cells_of(line, name, source, number)):
-                return name, number
+        if separator := separator_of(line, lambda line, name: cells_of(line, name, source, number)):  # noqa: B023
+            return separator, number, line
+    found = [(separator, number, line) for number, line in comments if (separator := separator_of(line, _tried_cells))]
+    if len({line for _, _, line in found}) > 1:
+        allowed = "--header LINE, the one that names the columns"
+        raise InputError(source, f"line {found[0][1]} and line {found[1][1]}", "two headers behind comment marks", allowed)
+    if found:
+        return found[0]
     first = kept[0][1][:60]
-    allowed = "columns x, y, z or such; --header LINE and --column x=NAME say which line and which columns they are"
-    raise InputError(source, f"line {kept[0][0]}", repr(first), allowed)
+    raise InputError(source, f"line {kept[0][0]}", repr(first), wanted)
+
+
+def _tried_cells(line: str, separator: str) -> list[str]:
+    """Cells of a comment, in which quotes need not be in pairs."""
+    try:
+        return cells_of(line, separator, "", 0)
+    except InputError:
+        return []
 
 
 def _separator_of(line: str) -> str:
@@ -196,20 +306,50 @@ def cells_of(line: str, separator: str, source: str, number: int) -> list[str]:
     return [cell.strip() for cell in row]
 
 
-def _decimal_of(rows: Sequence[tuple[int, list[str]]], separator: str, source: str) -> str:
-    if separator == "comma":
-        return "point"
+def _decimal_of(
+    columns: dict[str, tuple[str, ...]], lines: Sequence[int], separator: str, thousands: str | None, source: str
+) -> str:
+    """The decimal mark that all numbers have; refused are numbers that may be read in two ways."""
     seen: dict[str, tuple[int, str]] = {}
-    for number, cells in rows:
-        for cell in cells:
+    sure = False
+    for place, number in enumerate(lines):
+        for cells in columns.values():
+            cell = cells[place]
+            marked = _MARKED.search(cell)
+            if not marked and ("." not in cell or "point" in seen):
+                continue
+            if marked and thousands is None and _GROUPED.fullmatch(cell):
+                allowed = (
+                    "numbers without marks between thousands; --thousands comma, point, space or apostrophe, where it is one"
+                )
+                raise InputError(source, f"line {number}", repr(cell), allowed)
             for name, pattern in (("point", _POINT), ("comma", _COMMA)):
-                if name not in seen and pattern.fullmatch(cell):
-                    seen[name] = number, cell
+                if pattern.fullmatch(cell):
+                    seen.setdefault(name, (number, cell))
+                    sure |= name == "comma" and not _EITHER.fullmatch(cell)
         if len(seen) == 2:
             (one, left), (other, right) = seen["point"], seen["comma"]
             found = f"{left!r} in line {one} and {right!r} in line {other}"
-            raise InputError(source, "", found, "one decimal mark; --decimal point or comma says which")
-    return next(iter(seen), "point")
+            raise InputError(
+                source, "", found, "one decimal mark: --decimal point or comma says which, --thousands that the other is none"
+            )
+    decimal = next(iter(seen), "comma" if thousands == "point" else "point")
+    if decimal == thousands:
+        number, cell = seen[decimal]
+        raise InputError(
+            source, f"line {number}", repr(cell), f"three digits behind each {decimal}, as it is between thousands"
+        )
+    if "comma" in seen and (separator == "comma" or not sure):
+        number, cell = seen["comma"]
+        allowed = "--decimal comma where the comma is the decimal mark, or --thousands comma"
+        raise InputError(source, f"line {number}", repr(cell), allowed)
+    return decimal
+
+
+def _ungrouped(cell: str, thousands: str) -> str:
+    marks = re.escape(THOUSANDS[thousands])
+    grouped = re.fullmatch(rf"[+-]?\d{{1,3}}(?:[{marks}]\d{{3}})+(?:[.,]\d*)?", cell, re.ASCII)
+    return re.sub(f"[{marks}]", "", cell) if grouped else cell
 
 
 def _with_point(cell: str) -> str:

@@ -23,7 +23,10 @@ from elastocal.errors import InputError
 from elastocal.exchange.dh_table import FIXED, PRISMATIC, REVOLUTE, read_dh_table
 from elastocal.exchange.fixed_transforms import rotation_about, shift_word, turn_word
 from elastocal.exchange.robot_text import imported
+from elastocal.exchange.ros_kinematics import KINEMATICS, robot_from_kinematics
+from elastocal.exchange.slid_frames import lengths_of, slid_words
 from elastocal.exchange.urdf_chain import point_name
+from elastocal.io.documents import read_document
 from elastocal.mechanics.usual_values import UNLIMITED_DEG
 
 if TYPE_CHECKING:
@@ -31,11 +34,14 @@ if TYPE_CHECKING:
 
     from elastocal.exchange.dh_table import DhRow
     from elastocal.exchange.robot_text import Imported
+    from elastocal.exchange.slid_frames import Piece
 
 # A table with masses is a maker's or was identified; a tenth is what such masses are known to at best.
 RELATIVE_STD = 0.1
 END = "flange"
 _DECIMALS = 9
+# Calibrated tables have lengths along nearly parallel axes, by hundreds of metres, that cancel.
+_MUCH_SHORTER = 0.5
 
 
 def robot_from_dh(
@@ -45,15 +51,16 @@ def robot_from_dh(
     lengths: str = "m",
     name: str | None = None,
     relative_std: float = RELATIVE_STD,
+    decimal: str | None = None,
 ) -> Imported:
-    """The robot of a Denavit-Hartenberg table.
+    """The robot of a Denavit-Hartenberg table, or of a YAML file of `ros_kinematics`.
 
     Parameters
     ----------
     path : str or Path
     modified : bool
         Craig's notation; else the standard one.
-    angles, lengths : str
+    angles, lengths, decimal : str
         As in `read_dh_table`.
     name : str, optional
         Of the robot; that of the file without.
@@ -69,14 +76,26 @@ def robot_from_dh(
     InputError
         As in `read_dh_table`; compliances of some joints only, a prismatic joint without limits, two points of one name.
     """
-    rows, source = read_dh_table(path, angles, lengths), Path(path).as_posix()
+    source = Path(path).as_posix()
+    if Path(path).suffix.lower() in (".yaml", ".yml"):
+        described = read_document(path)
+        if isinstance(described, dict) and KINEMATICS in described:
+            if modified:
+                raise InputError("--modified", "", f"a file of {KINEMATICS}, which is no table", "the file without --modified")
+            return robot_from_kinematics(described, path, name)
+    rows = read_dh_table(path, angles, lengths, decimal)
     joints = [row for row in rows if row.kind != FIXED]
     points = [point_name(row.point) if row.point else "" for row in rows]
     points[-1] = points[-1] or END
     document: dict[str, Any] = {"name": name or Path(path).stem}
     if names := _joint_names(joints, source):
         document["joint_names"] = names
-    document["chain"] = " ".join(_words(rows, points, modified))
+    words, slid = _words(rows, points, modified), np.zeros(len(joints) + 1)
+    near, slides = slid_words(_gaps(rows, points, modified), [row.kind for row in joints])
+    written, short = lengths_of(words), lengths_of(near)
+    if short < _MUCH_SHORTER * written:
+        words, slid = near, slides
+    document["chain"] = " ".join(words)
     if any(row.limits or row.kind == PRISMATIC for row in joints):
         document["joint_limits_deg"] = [_limits(row, source) for row in joints]
     compliances = [row.compliance for row in joints]
@@ -85,14 +104,20 @@ def robot_from_dh(
     elif any(compliances):
         row = joints[compliances.index(None)]
         raise InputError(source, f"{row.where}, compliance_urad_per_Nm", "nothing", "one for every joint, or for none")
-    masses = _masses(rows, modified, relative_std)
+    masses = _masses(rows, modified, relative_std, slid)
     notes = [] if masses else ["no masses: the weight of the links is not known"]
+    if slid.any():
+        notes.append(
+            f"lengths of {written:.4g} m that cancel along nearly parallel axes became {short:.4g} m in the chain, "
+            "whose joints are at other places of the same axes: the pose at the end is the same"
+        )
     if masses:
         document["masses"] = masses
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption")
     if free := [str(number) for number, row in enumerate(joints, 1) if row.limits is None]:
         notes.append(f"no limits of q{', q'.join(free)}: a turn either way")
-    return imported(document, path, f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters", notes)
+    notation = f"{'modified' if modified else 'standard'} Denavit-Hartenberg parameters"
+    return imported(document, path, f"{notation}, in {angles} and {lengths} where a column does not say", notes)
 
 
 def _words(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[str]:
@@ -129,8 +154,24 @@ def _limits(row: DhRow, source: str) -> list[float]:
     return [round(value if row.kind == PRISMATIC else math.degrees(value), _DECIMALS) for value in row.limits]
 
 
-def _masses(rows: Sequence[DhRow], modified: bool, relative_std: float) -> list[dict[str, Any]]:
-    """Masses of each link, that of fixed rows with the joint before; centres in the frame directly behind the joint."""
+def _gaps(rows: Sequence[DhRow], points: Sequence[str], modified: bool) -> list[list[Piece]]:
+    """What stands before, between and behind the joints: displacements, each with the point at its end."""
+    gaps: list[list[Piece]] = [[]]
+    for row, point in zip(rows, points, strict=True):
+        before, behind = (np.vstack([np.column_stack(part), [0.0, 0.0, 0.0, 1.0]]) for part in _displacements(row, modified))
+        if row.kind == FIXED:
+            gaps[-1].append((before @ behind, point))
+        else:
+            gaps[-1].append((before, ""))
+            gaps.append([(behind, point)])
+    return gaps
+
+
+def _masses(rows: Sequence[DhRow], modified: bool, relative_std: float, slid: np.ndarray) -> list[dict[str, Any]]:
+    """Masses of each link, that of fixed rows with the joint before; centres in the frame directly behind the joint.
+
+    `slid` (n + 1,) is by how much the frame of each link is moved along z from where the table has it (m).
+    """
     body, rotation, position = 0, np.eye(3), np.zeros(3)
     moments: dict[int, np.ndarray] = {}
     for row in rows:
@@ -138,7 +179,7 @@ def _masses(rows: Sequence[DhRow], modified: bool, relative_std: float) -> list[
         if row.kind == FIXED:
             rotation, position = _behind(rotation, position, before)
         else:
-            body, rotation, position = body + 1, np.eye(3), np.zeros(3)
+            body, rotation, position = body + 1, np.eye(3), np.array([0.0, 0.0, -slid[body + 1]])
         rotation, position = _behind(rotation, position, behind)
         if row.mass_kg is not None:
             centre = position + rotation @ np.array(row.centre_m)

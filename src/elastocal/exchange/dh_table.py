@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING, Any
 
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import cells_of, lines_of
-from elastocal.io.documents import LARGEST_BYTES, read_document
-from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number, read_text
+from elastocal.exchange.csv_dialect import Dialect, read_text_table
+from elastocal.io.documents import read_document
+from elastocal.io.texts import A_NUMBER, LARGEST_NUMBER, plain_number
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -46,7 +46,6 @@ _PI = re.compile(r"([+-]?)(\d+(?:\.\d+)?)?\*?pi(?:/(\d+(?:\.\d+)?))?", re.ASCII 
 MOST_ROWS = 500
 # A joint may count any number of turns; a thousand are a mistake.
 MOST_TURNS = 1000
-_COMMENT = "#"
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,7 @@ class DhRow:
     point: str
 
 
-def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m") -> list[DhRow]:
+def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m", decimal: str | None = None) -> list[DhRow]:
     """Rows of a Denavit-Hartenberg table.
 
     Parameters
@@ -98,6 +97,8 @@ def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m") -> 
         Of columns that do not say.
     lengths : {"m", "mm"}
         Of columns that do not say.
+    decimal : {"point", "comma"}, optional
+        Of CSV; commas are asked for where it is not stated.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def read_dh_table(path: str | Path, angles: str = "deg", lengths: str = "m") -> 
     suffix = Path(path).suffix.lower()
     if suffix not in (".csv", ".yaml", ".yml"):
         raise InputError(source, "", f"a file that ends in {suffix or 'nothing'!r}", ".csv, .yaml or .yml")
-    columns, table = _csv_rows(path, source) if suffix == ".csv" else _yaml_rows(path, source)
+    columns, table = _csv_rows(path, source, decimal) if suffix == ".csv" else _yaml_rows(path, source)
     meanings = _meanings(columns, angles, lengths, source)
     if len(table) > MOST_ROWS:
         raise InputError(source, "", f"{len(table)} rows", f"at most {MOST_ROWS}, one for each joint")
@@ -131,19 +132,19 @@ class _Meaning:
     length: str
 
 
-def _csv_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
-    text = enumerate(lines_of(read_text(path, LARGEST_BYTES), path), 1)
-    lines = [(number, line) for number, line in text if line.strip() and not line.startswith(_COMMENT)]
-    if not lines:
-        raise InputError(source, "", "an empty file", "a header and one row for each joint")
-    separator = ";" if ";" in lines[0][1] else ","
-    cells = [cells_of(line, separator, source, number) for number, line in lines]
-    header, table = cells[0], []
-    for (number, _), row in zip(lines[1:], cells[1:], strict=True):
-        if len(row) != len(header):
-            raise InputError(source, f"line {number}", f"{len(row)} cells", f"{len(header)}, one for each column")
-        table.append((f"line {number}", dict(zip(header, row, strict=True))))
-    return header, table
+def _csv_rows(path: str | Path, source: str, decimal: str | None) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:
+    text = read_text_table(
+        path, _has_known_column, Dialect(decimal=decimal), wanted="columns d, a and alpha, such as d_m or d_mm"
+    )
+    if text.dialect.decimal == "comma" and decimal is None:
+        raise InputError(source, "", "numbers with commas", "--decimal comma where the comma is the decimal mark, else points")
+    rows = zip(*text.columns.values(), strict=True)
+    table = [(f"line {line}", dict(zip(text.columns, row, strict=True))) for line, row in zip(text.lines, rows, strict=True)]
+    return list(text.columns), table
+
+
+def _has_known_column(cells: Sequence[str]) -> bool:
+    return any(cell in _NEEDED or cell.rpartition("_")[0] in _NEEDED for cell in cells)
 
 
 def _yaml_rows(path: str | Path, source: str) -> tuple[list[str], list[tuple[str, dict[str, Any]]]]:

@@ -144,6 +144,7 @@ def summary(result: Imported) -> list[str]:
     reach = math.fsum(abs(t.constant) for t in robot.chain.transforms if t.kind == "T")
     weight = math.fsum(mass.mass_kg for mass in robot.masses)
     return [
+        result.origin,
         f"{robot.name}: {kinds}, {reach:.4g} m stretched out{f', {weight:.4g} kg' if robot.masses else ''}",
         f"measuring points: {', '.join(point.name for point in robot.chain.points)}",
         *(f"note: {note}" for note in result.notes),

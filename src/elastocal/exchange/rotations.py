@@ -21,7 +21,7 @@ ALLOWED = (
     "body; small letters, euler:xyz: about fixed ones)"
 )
 # Rounded to four digits, a quaternion's length and a matrix' columns are off by less.
-_OFF = 2e-3
+UNIT_LENGTH = 2e-3
 _SEQUENCE = re.compile(r"[XYZ]{3}|[xyz]{3}")
 
 
@@ -84,11 +84,11 @@ def rotation_vectors(notation: str, values: np.ndarray) -> tuple[np.ndarray, np.
     if notation.startswith(EULER_ANGLES):
         return Rotation.from_euler(notation.removeprefix(EULER_ANGLES), values).as_rotvec(), good
     if notation == QUATERNIONS:
-        off = np.abs(np.linalg.norm(values, axis=1) - 1.0) > _OFF
+        off = np.abs(np.linalg.norm(values, axis=1) - 1.0) > UNIT_LENGTH
         safe = np.where(off[:, None], [1.0, 0.0, 0.0, 0.0], values)
         return Rotation.from_quat(safe[:, [1, 2, 3, 0]]).as_rotvec(), off
     width = 4 if notation == HOMOGENEOUS_MATRICES else 3
     matrices = values.reshape(-1, 3, width)[:, :, :3]
-    off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2)) > _OFF
+    off = np.abs(np.swapaxes(matrices, 1, 2) @ matrices - np.eye(3)).max(axis=(1, 2)) > UNIT_LENGTH
     off |= np.linalg.det(matrices) < 0.0
     return Rotation.from_matrix(np.where(off[:, None, None], np.eye(3), matrices)).as_rotvec(), off

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from elastocal.campaigns.column_bounds import BOUNDS, FARTHEST_RAD, beyond
 from elastocal.campaigns.measurements import closest_first
 from elastocal.errors import InputError
-from elastocal.exchange.csv_dialect import read_text_table
+from elastocal.exchange.csv_dialect import Dialect, read_text_table
 from elastocal.io.texts import A_NUMBER, plain_number
 from elastocal.mechanics.components import WRENCH
 
@@ -29,6 +29,7 @@ _POSE = ("x", "y", "z", "rx", "ry", "rz")
 _WRENCH = tuple(name for name, _, _ in WRENCH)
 # Of a corrected target, and where it is.
 OK, STATUS = "ok", "status"
+_DIALECT = Dialect("comma", "point")
 # A position farther from the base than any arm reaches is in other units.
 _FARTHEST_M = 10.0
 
@@ -86,7 +87,7 @@ def read_target_path(path: str | Path, joints: int) -> TargetPath:
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     approach = tuple(f"approach{j}" for j in range(1, joints + 1))
     known = (*_POSE, *_WRENCH, *angles, *approach, "time_s", "temperature_c")
-    read = read_text_table(path, lambda _: True, "comma", "point")
+    read = read_text_table(path, lambda _: True, _DIALECT)
     cells, header = read.columns, f"line {read.dialect.header}"
     for name in _POSE:
         if name not in cells:
@@ -128,7 +129,7 @@ def read_corrected_targets(path: str | Path, joints: int) -> CorrectedTargets:
     InputError
         A column that is missing, or a cell that is no finite number.
     """
-    read = read_text_table(path, lambda _: True, "comma", "point")
+    read = read_text_table(path, lambda _: True, _DIALECT)
     angles = tuple(f"q{j}" for j in range(1, joints + 1))
     for name in (*_POSE, *angles, STATUS):
         if name not in read.columns:

@@ -24,12 +24,19 @@ if TYPE_CHECKING:
 
 # Limits to a billionth of a degree, or to a nanometre.
 _DECIMALS = 9
+# Two turns, and rounding; the limits of a joint in degrees are farther, and few joints turn so often.
+_FARTHEST_RAD, DEG = 4.0 * math.pi + 0.01, "deg"
 # An angle this close to a right one, and none, is one that was written with few digits: 1.57 and 1.5708 are.
 _NEARLY_RAD, _EXACTLY_RAD = 1e-3, 1e-9
 
 
 def robot_from_urdf(
-    path: str | Path, base: str, tip: str, points: Sequence[str] = (), relative_std: float = RELATIVE_STD
+    path: str | Path,
+    base: str,
+    tip: str,
+    points: Sequence[str] = (),
+    relative_std: float = RELATIVE_STD,
+    limits_in: str | None = None,
 ) -> Imported:
     """The robot between two links of a URDF.
 
@@ -42,6 +49,8 @@ def robot_from_urdf(
         Links between them that become measuring points too.
     relative_std : float
         How well the masses are known.
+    limits_in : {"rad", "deg"}, optional
+        Unit of the limits of joints that turn; asked for where one goes farther than joints do in rad, else rad as URDF has it.
 
     Returns
     -------
@@ -58,7 +67,9 @@ def robot_from_urdf(
     weights = weights_of(urdf, chain, relative_std)
     gravity = gravity_in_base(urdf, base)
     notes = list(weights.notes)
-    limits = [_limits(joint, notes, source) for joint in chain.joints]
+    limits = [_limits(joint, limits_in, notes, source) for joint in chain.joints]
+    if limits_in == DEG:
+        notes.append("limits read in degrees, as the option says")
     document: dict[str, Any] = {
         "name": urdf.name,
         "joint_names": [joint.name for joint in chain.joints],
@@ -73,10 +84,12 @@ def robot_from_urdf(
         notes.append(f"masses are known to {100 * relative_std:g} %, by assumption: a URDF does not say")
     if few := _few_digits(urdf, [joint.child for joint in urdf.joints if joint.child in chain.links]):
         notes.append(f"nearly right angles stay as they are written, with few digits: those of {few}")
+    if beside := [joint.name for joint in urdf.joints if joint.kind != "fixed" and joint.child not in chain.links]:
+        notes.append(f"joints that are no part of the chain, left out: {', '.join(beside)}")
     return imported(document, path, f"the links from {base!r} to {tip!r}", notes)
 
 
-def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
+def _limits(joint: Joint, limits_in: str | None, notes: list[str], source: str) -> list[float]:
     """Degrees, of prismatic joints metres."""
     low, high = joint.lower, joint.upper
     prismatic = joint.kind == "prismatic"
@@ -88,7 +101,11 @@ def _limits(joint: Joint, notes: list[str], source: str) -> list[float]:
     if low >= high or (not prismatic and max(-low, high) > 2.0 * math.pi * MOST_TURNS):
         notes.append(f"joint {joint.name!r} has no limits in the URDF: a turn either way")
         return list(UNLIMITED_DEG)
-    return [round(value if prismatic else math.degrees(value), _DECIMALS) for value in (low, high)]
+    if limits_in is None and not prismatic and max(-low, high) > _FARTHEST_RAD:
+        turns = max(-low, high) / (2.0 * math.pi)
+        allowed = "radians; --limits deg where the file has degrees, or --limits rad where the joint does turn as often"
+        raise InputError(source, f"joint {joint.name!r}: limit", f"{low:g} to {high:g}, {turns:.0f} turns", allowed)
+    return [round(value if prismatic or limits_in == DEG else math.degrees(value), _DECIMALS) for value in (low, high)]
 
 
 def _few_digits(urdf: Urdf, children: Sequence[str]) -> str:

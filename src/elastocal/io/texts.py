@@ -112,7 +112,7 @@ def decoded(content: bytes, path: str | Path, encoding: str = "utf-8-sig") -> st
     except UnicodeDecodeError as error:
         # Its object may lack the mark in front; lines are the same.
         line = error.object[: error.start].count(b"\n") + 1
-        name = "UTF-16" if encoding == "utf-16" else "UTF-8"
+        name = encoding.upper().removesuffix("-SIG")
         raise InputError(path, f"line {line}", f"text that is not {name} (byte {error.start})", "a UTF-8 file") from None
 
 

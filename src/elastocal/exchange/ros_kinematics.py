@@ -1,0 +1,90 @@
+"""The kinematics file of a calibrated robot, as the ROS drivers of Universal Robots write it, to the contents of a robot file.
+
+``kinematics`` has a fixed transform before each joint, ``{x, y, z, roll, pitch, yaw}`` (m, rad), as ``origin`` of a URDF [1]_;
+the joint turns about z. The base frame is that of the controller (``base`` of ur_description, not ``base_link``).
+
+References
+----------
+.. [1] Universal Robots, ur_calibration: extracts the factory calibration of a robot, github.com/UniversalRobots.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from elastocal.errors import InputError
+from elastocal.exchange.fixed_transforms import displacement_words, rotation_about
+from elastocal.exchange.robot_text import imported
+from elastocal.exchange.urdf_chain import point_name
+from elastocal.io.texts import A_NUMBER, plain_number
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from elastocal.exchange.robot_text import Imported
+
+KINEMATICS = "kinematics"
+_KEYS = ("x", "y", "z", "roll", "pitch", "yaw")
+# Links of Universal Robots and the joints before them; of other robots both have the name that the file has.
+_JOINTS = {
+    "shoulder": "shoulder_pan_joint",
+    "upper_arm": "shoulder_lift_joint",
+    "forearm": "elbow_joint",
+    "wrist_1": "wrist_1_joint",
+    "wrist_2": "wrist_2_joint",
+    "wrist_3": "wrist_3_joint",
+}
+
+
+def robot_from_kinematics(document: Mapping[str, Any], path: str | Path, name: str | None = None) -> Imported:
+    """The robot of a kinematics file, its links in the order of the arm.
+
+    Raises `InputError` for another key than those of the format or a cell that is no number.
+    """
+    source = Path(path).as_posix()
+    described = document[KINEMATICS]
+    if not isinstance(described, dict):
+        raise InputError(source, KINEMATICS, type(described).__name__, f"links, each with {', '.join(_KEYS)}")
+    # A digest of the calibration stands beside the links.
+    links = {str(link): origin for link, origin in described.items() if link != "hash"}
+    if not links:
+        raise InputError(source, KINEMATICS, "no link", f"links, each with {', '.join(_KEYS)}")
+    if set(links) <= {*_JOINTS}:
+        links = {link: links[link] for link in _JOINTS if link in links}
+        if missing := [link for link in [*_JOINTS][: [*_JOINTS].index([*links][-1])] if link not in links]:
+            raise InputError(source, KINEMATICS, f"no link {missing[0]}", f"every link before {[*links][-1]}")
+    words: list[str] = []
+    for number, (link, origin) in enumerate(links.items(), 1):
+        words += [*displacement_words(_transform(origin, f"{KINEMATICS}.{link}", source)), f"Rz(q{number})"]
+    words.append(f"[{point_name([*links][-1])}]")
+    contents = {
+        "name": name or Path(path).stem,
+        "joint_names": [_JOINTS.get(link, link) for link in links],
+        "chain": " ".join(words),
+    }
+    notes = [
+        "no masses: the weight of the links is not known",
+        "no limits of any joint: a turn either way",
+        "base axes are the controller's (base, not base_link, which is turned half round)",
+    ]
+    return imported(contents, path, "the kinematics of a calibrated robot as ROS has them", notes)
+
+
+def _transform(origin: object, where: str, source: str) -> np.ndarray:
+    if not isinstance(origin, dict) or set(origin) != set(_KEYS):
+        found = ", ".join(map(str, origin)) if isinstance(origin, dict) else type(origin).__name__
+        raise InputError(source, where, found or "nothing", ", ".join(_KEYS))
+    values = {}
+    for key in _KEYS:
+        value = plain_number(str(origin[key]))
+        if value is None:
+            raise InputError(source, f"{where}.{key}", repr(origin[key]), A_NUMBER)
+        values[key] = value
+    transform = np.eye(4)
+    for letter, turn in (("z", "yaw"), ("y", "pitch"), ("x", "roll")):
+        transform[:3, :3] = transform[:3, :3] @ rotation_about(letter, values[turn])
+    transform[:3, 3] = [values[axis] for axis in "xyz"]
+    return transform
