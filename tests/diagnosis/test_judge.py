@@ -134,26 +134,46 @@ def test_figures_before_and_after(made):
     assert again.document["heldout"] == found.document["heldout"]
 
 
-def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
-    case, held_out, steps = made
+def with_first_pose_turned(case, held_out, turn):
+    """The first held-out pose, with its third joint said to stand elsewhere, and its number."""
     first = held_out.observations.states.pose.min()
 
     def turned(states):
         away = np.zeros(case.campaign.robot.joints)
-        away[2] = 8.0
+        away[2] = turn
         return replace(states, joint_angles=states.joint_angles + (states.pose == first)[:, None] * away)
 
     observations, measurements = held_out.observations, held_out.campaign.measurements
-    away = replace(
+    return first, replace(
         held_out,
         observations=replace(observations, states=turned(observations.states)),
         campaign=replace(held_out.campaign, measurements=turned(measurements)),
     )
+
+
+@pytest.mark.parametrize(("off_m", "named"), [(5e-4, False), (1.0, True)])
+def test_a_row_far_off_outside_the_fitted_range_is_a_gross_error_too(made, off_m, named):
+    """Within three times the limit it may be the model that errs there."""
+    case, held_out, steps = made
+    first, away = with_first_pose_turned(case, held_out, 2.0 * np.pi)
+    measurements = away.campaign.measurements
+    row = int(np.argmax(measurements.pose == first))
+    position = measurements.position + off_m * (np.arange(len(measurements)) == row)[:, None] * np.array([1.0, 0.0, 0.0])
+    away = replace(away, campaign=replace(away.campaign, measurements=replace(measurements, position=position)))
+    found = judged(steps, case, away)
+    assert [error["rows"] for error in found.document["gross_errors"]] == ([[measurements.row[row]]] if named else [])
+    assert found.document["heldout"]["after"]["rms_m"] < 1e-3
+
+
+def test_poses_outside_the_fitted_range_are_counted_flagged_and_warned_of(made):
+    """A whole turn brings the joint out of its range and the target nowhere else."""
+    case, held_out, steps = made
+    first, away = with_first_pose_turned(case, held_out, 2.0 * np.pi)
     found = judged(steps, case, away)
     beyond, poses = found.document["heldout"]["outside_range"], found.document["heldout"]["poses"]
     assert 1 <= beyond["poses"] < poses
-    # A pose that was not there at all is far off; the others bear the effect out.
-    assert beyond["outside"]["after"]["rms_m"] > 0.1 > beyond["inside"]["after"]["rms_m"]
+    assert max(beyond[where]["after"]["rms_m"] for where in ("outside", "inside")) < 1e-3
+    assert found.document["gross_errors"] == []
     assert f"{beyond['poses']} of {poses} validation poses lie outside" in found.document["warnings"][-1]
     training, unseen = blocks_of(diagnosis_of(case, steps), away)
     assert not training["outside_range"].any()

@@ -53,6 +53,8 @@ _LEAST_OWN = 0.01
 _POSE_SHARES = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 # Rows of which the scale is estimated at most, to a percent; more determine the parameters so well that one hardly counts.
 _MOST = 4_000
+# Extrapolated rows of which the usual error is known.
+_FEWEST_TO_COMPARE = 5
 # Gross errors that have a sentence each among the warnings; the table of residuals has all.
 _MOST_NAMED = 10
 
@@ -232,16 +234,30 @@ def gross_errors(fitted: Fit, noise: Noise, measurements: Measurements, kept: np
 
 
 def held_out_gross_errors(
-    fitted: Fit, there: tuple[Model, Estimate], yardstick: Yardstick, held_out: Case, settings: Settings
+    fitted: Fit,
+    there: tuple[Model, Estimate],
+    yardstick: Yardstick,
+    held_out: Case,
+    outside: np.ndarray,
+    settings: Settings,
 ) -> Deviations:
-    """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them."""
+    """Judge held-out rows by the rule of `gross_errors`, in the model and estimate that were carried to them.
+
+    Where a prediction is extrapolated, ``outside`` (N,), it is first the model that errs: such a row has to be farther off, and
+    farther than most of such rows.
+    """
     model, estimate = there
     measurements = held_out.campaign.measurements
     if model is not fitted.model or estimate is not fitted.estimate:
         yardstick = replace(yardstick, covariance=None)
     unseen, every = np.zeros(len(measurements), bool), np.ones(len(measurements), bool)
     residual, distance = deviations(model, estimate, measurements, yardstick, unseen)
-    return Deviations(residual, *beyond_chance(distance, model.rows, every, settings))
+    distance, gross = beyond_chance(distance, model.rows, every, settings)
+    least = settings.extrapolated_error
+    if outside.sum() >= _FEWEST_TO_COMPARE:
+        least = max(least, float(np.median(distance[outside])) / np.sqrt(chi2.median(model.rows)))
+    far = distance > least * _limit(len(distance), model.rows, settings)
+    return Deviations(residual, distance, gross & (far | ~outside))
 
 
 def improbable(problem: Linearized, settings: Settings) -> np.ndarray:

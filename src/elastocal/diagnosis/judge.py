@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,13 +117,11 @@ def without_gross_errors(diagnosis: Diagnosis, held_out: Case) -> tuple[Deviatio
     errors = Deviations.none(count, held_out.model.rows)
     noise = noise_from(diagnosis.document).of_measurements
     yardstick = yardstick_of(final, noise, diagnosis.case.campaign.measurements)
-    # Where a prediction is extrapolated it is the model that errs, and no row.
-    inside = ~outside_poses(final, diagnosis.case, held_out)[state_clusters(held_out.campaign.measurements)]
+    outside = outside_poses(final, diagnosis.case, held_out)[state_clusters(held_out.campaign.measurements)]
     for _ in range(settings.gross_error_rounds):
         # Frames of another campaign are fitted to what is kept of it.
         there, last = placed(final, diagnosis.case, part), errors.gross
-        errors = held_out_gross_errors(final, there, yardstick, held_out, settings)
-        errors = replace(errors, gross=errors.gross & inside)
+        errors = held_out_gross_errors(final, there, yardstick, held_out, outside, settings)
         part = held_out.select(~errors.gross) if errors.gross.any() else held_out
         if (errors.gross == last).all():
             break

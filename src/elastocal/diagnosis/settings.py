@@ -78,6 +78,11 @@ class Settings:
         "times the upper quartile of forces beyond which a few rows are first judged by the others: ladders of loads stay"
         " within, and honest rows beyond it come back as soon as the others predict them",
     )
+    extrapolated_error: float = _setting(
+        3.0,
+        "times the limit of a gross error that a held-out row may be off where its prediction is extrapolated: on public data"
+        " models err there by up to 1.6 times (WAM)",
+    )
     gross_error_rounds: int = _setting(
         4, "times that a model is searched for at most, each without the rows that the one before does not explain"
     )
