@@ -1,5 +1,6 @@
 """What the benchmarks share: a row of the report, interleaved timing, and the robots and strategies of the repository."""
 
+import resource
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -52,28 +53,26 @@ class Row:
 
 
 def interleaved(functions: Mapping[str, Callable[[], Any]], repetitions: int) -> list[list[float]]:
-    """Seconds of several functions, called in turn so that a busy spell of the machine hits all of them.
+    """CPU seconds of several functions without arguments, by the names to print, their processes included; a list for each.
 
-    Parameters
-    ----------
-    functions : dict of str to callable
-        Without arguments, by the names to print.
-    repetitions : int
-
-    Returns
-    -------
-    list of list of float
-        For each function its seconds, one for each repetition.
+    They are called in turn so that a busy spell of the machine hits all of them. Other processes only ever add to them: the
+    least of a few is the function's own (documentation of `timeit`).
     """
     seconds: list[list[float]] = [[] for _ in functions]
     for repetition in range(1, repetitions + 1):
         for taken, function in zip(seconds, functions.values(), strict=True):
-            start = time.perf_counter()
+            start = _cpu_seconds()
             function()
-            taken.append(time.perf_counter() - start)
+            taken.append(_cpu_seconds() - start)
         last = ", ".join(f"{name} {taken[-1]:.3f} s" for name, taken in zip(functions, seconds, strict=True))
         print(f"  {repetition}/{repetitions}: {last}", flush=True)
     return seconds
+
+
+def _cpu_seconds() -> float:
+    """Of this process and those that it has ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
 
 
 def beside_yardstick(function: Callable[[], Found]) -> tuple[Found, float]:
