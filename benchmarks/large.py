@@ -82,7 +82,7 @@ class Setting:
 
 # The median of a dozen cases lies between two groups of them and jumps by a tenth from run to run. The longer growth is twice
 # the shorter; the small setting measures one campaign for all.
-FULL, SMALL = Setting(48, 6, None, 1_000_000, (20_000, 40_000)), Setting(1, 1, 60, 200, (200, 200))
+FULL, SMALL = Setting(48, 6, None, 1_000_000, (20_000, 40_000)), Setting(1, 1, 60, 1000, (1000, 1000))
 
 
 def rows(work: Path, setting: Setting) -> Iterator[Row]:

@@ -37,6 +37,10 @@ class Files:
 class _Named(dict):
     __getattr__ = dict.__getitem__
 
+    def __iter__(self):
+        # Of no job: they have no record.
+        return iter(())
+
 
 class _Job:
     def __init__(self, **parts):

@@ -27,7 +27,7 @@ def part(tmp_path_factory):
 def test_a_plain_run_finishes_what_a_killed_one_began(part, tmp_path):
     """Of Snakemake alone: its locks stay, its jobs go on without it."""
     study, expected = part
-    assert len(expected) > 6
+    assert len(expected) > 3
     again = part_of_the_study(tmp_path / "study")
     again.path("Snakefile").write_text(study.path("Snakefile").read_text(encoding="utf-8"), encoding="utf-8")
     middle = files_made(study) // 3, 2 * files_made(study) // 3

@@ -7,13 +7,6 @@ hold, reports/audit.txt; where one does not, it ends with an error. Files of oth
 from elastocal.audit.targets import finished
 
 
-def audited(wildcards):
-    """What is audited; asked for before any job of the run begins, so that nobody waits for results that cannot be audited."""
-    if find_spec("pinocchio") is None:
-        sys.exit(str(InputError("audit", "pinocchio", "no such package", "the extra audit: make audit, or pip install pin")))
-    return files_behind([*rules.study.input, *rules.loop.input])
-
-
 rule audit_files:
     input:
         files=audited,
