@@ -82,13 +82,13 @@ def export(
         write_text(partial / ROBOT, f"# {stated}\n{text}")
         if drop_in is None:
             write_text(partial / URDF, urdf_of(robot, f"{stated} Geometry alone: springs and effects are in {SIDECAR}."))
+            if calibrated.robot.joint_names:
+                lines.append(
+                    f"{URDF} has points for links, no meshes; --urdf FILE gives back the URDF that the robot was imported from"
+                )
         else:
             (partial / URDF).write_bytes(drop_in.content)
             lines += _drop_in(drop_in, partial / URDF, calibrated.robot, robot, found.case.observations.states.joint_angles)
-        if drop_in is None and calibrated.robot.joint_names:
-            lines.append(
-                f"{URDF} has points for links, no meshes; --urdf FILE gives back the URDF that the robot was imported from"
-            )
         write_json(partial / SIDECAR, document)
         lines += _denavit_hartenberg(calibrated.robot, robot, partial, output)
         lines += _table(calibrated, table, force, partial, output) if table else []

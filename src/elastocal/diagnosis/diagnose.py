@@ -186,9 +186,9 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         found = replace(found, conclusion=replace(found.conclusion, verdict=verdict))
     warnings = [*contradicting, *part.warnings, *filter(None, lost)]
     document = _document(case, noise, steps, final, found, known, settings, warnings)
-    document |= {"contradictions": contradicting}
     left_out = entries_of(errors, whole, held_out=False)
-    document |= {"gross_errors": left_out, "warnings": [*document["warnings"], *warnings_of(left_out)]}
+    warnings = [*document["warnings"], *warnings_of(left_out)]
+    document |= {"contradictions": contradicting, "gross_errors": left_out, "warnings": warnings}
     return Diagnosis(case, tuple(steps), found, document, whole.measurements.select(errors.gross))
 
 

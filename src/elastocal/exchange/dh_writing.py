@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import rotation_about
+from elastocal.exchange.fixed_transforms import elementary, rotation_about
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -179,16 +179,12 @@ def _axes(robot: Robot, own: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     here, points, directions = np.eye(4), [], []
     for place in range(chain.end_effector.after):
         transform = chain.transforms[place]
-        step, value = np.eye(4), transform.constant
+        value = transform.constant
         if transform.coordinate is not None:
             value = transform.sign * zero[transform.coordinate]
             points.append(here[:3, 3].copy())
             directions.append(np.sign(transform.sign * sense[transform.coordinate]) * here[:3, transform.axis])
-        if transform.kind == "T":
-            step[transform.axis, 3] = value
-        else:
-            step[:3, :3] = rotation_about("xyz"[transform.axis], value)
-        here = here @ step
+        here = here @ elementary(transform.kind, transform.axis, value)
     here = here.copy()
     here[:3, 3] += here[:3, :3] @ np.array(chain.end_effector.offset_m)
     return np.array([*points, here[:3, 3]]), np.array([*directions, here[:3, 2]]), here

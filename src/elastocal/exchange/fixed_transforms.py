@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
 # Picometres, and as many degrees: a chain of any length keeps to far less than a nanometre, and cos(90 deg) is no length.
 _DECIMALS = 12
@@ -111,6 +111,25 @@ def rotation_about(letter: str, angle_rad: float) -> np.ndarray:
     turn[first, first] = turn[second, second] = c
     turn[first, second], turn[second, first] = -s, s
     return turn
+
+
+def elementary(kind: str, axis: int, amount: float) -> np.ndarray:
+    """Shift (``T``, m) along or turn (``R``, rad) about an axis, 0 to 2, ndarray (4, 4)."""
+    found = np.eye(4)
+    if kind == "T":
+        found[axis, 3] = amount
+    else:
+        found[:3, :3] = rotation_about("xyz"[axis], amount)
+    return found
+
+
+def origin_transform(xyz: Sequence[float], rpy: Sequence[float]) -> np.ndarray:
+    """Shift (m), then turn by roll, pitch and yaw (rad) as the origin of a URDF has them, ndarray (4, 4)."""
+    roll, pitch, yaw = rpy
+    found = np.eye(4)
+    found[:3, :3] = rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)
+    found[:3, 3] = xyz
+    return found
 
 
 def _rounded(amount: float) -> float:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import displacement_words, rotation_about
+from elastocal.exchange.fixed_transforms import displacement_words, origin_transform
 from elastocal.exchange.robot_text import imported
 from elastocal.exchange.urdf_chain import point_name
 from elastocal.io.texts import A_NUMBER, plain_number
@@ -83,8 +83,4 @@ def _transform(origin: object, where: str, source: str) -> np.ndarray:
         if value is None:
             raise InputError(source, f"{where}.{key}", repr(origin[key]), A_NUMBER)
         values[key] = value
-    transform = np.eye(4)
-    for letter, turn in (("z", "yaw"), ("y", "pitch"), ("x", "roll")):
-        transform[:3, :3] = transform[:3, :3] @ rotation_about(letter, values[turn])
-    transform[:3, 3] = [values[axis] for axis in "xyz"]
-    return transform
+    return origin_transform([values[key] for key in _KEYS[:3]], [values[key] for key in _KEYS[3:]])

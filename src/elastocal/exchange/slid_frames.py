@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from elastocal.exchange.fixed_transforms import displacement_words
+from elastocal.exchange.fixed_transforms import displacement_words, elementary
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,14 +50,14 @@ def slid_words(gaps: Sequence[Sequence[Piece]], kinds: Sequence[str]) -> tuple[l
     words: list[str] = []
     slides = np.zeros(len(gaps))
     for number, gap in enumerate(gaps):
-        here = _along_z(-slides[number])
+        here = elementary("T", 2, -slides[number])
         for place, (piece, point) in enumerate(gap):
             here = here @ piece
             last = place == len(gap) - 1 and number < len(kinds)
             if last:
                 # Of the points of the next axis the nearest one.
                 slides[number + 1] = -here[:3, 2] @ here[:3, 3]
-                here = here @ _along_z(slides[number + 1])
+                here = here @ elementary("T", 2, slides[number + 1])
             if point or last or place == len(gap) - 1:
                 words += displacement_words(here)
                 words += [f"[{point}]"] if point else []
@@ -65,9 +65,3 @@ def slid_words(gaps: Sequence[Sequence[Piece]], kinds: Sequence[str]) -> tuple[l
         if number < len(kinds):
             words.append(f"{'T' if kinds[number] == 'P' else 'R'}z(q{number + 1})")
     return words, slides
-
-
-def _along_z(shift: float) -> np.ndarray:
-    moved = np.eye(4)
-    moved[2, 3] = shift
-    return moved

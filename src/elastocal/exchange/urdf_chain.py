@@ -19,14 +19,14 @@ from elastocal.errors import InputError
 from elastocal.exchange.fixed_transforms import (
     axis_rotation,
     displacement_words,
-    rotation_about,
+    elementary,
     shift_word,
     turn_word,
     turned_axis,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Sequence
 
     from elastocal.exchange.urdf_reading import Joint, Urdf
 
@@ -81,6 +81,14 @@ class UrdfChain:
 def parent_joints(urdf: Urdf) -> dict[str, Joint]:
     """The joint above each link, by the link's name; the root has none."""
     return {joint.child: joint for joint in urdf.joints}
+
+
+def joints_above(urdf: Urdf, link: str) -> Iterator[Joint]:
+    """The joints that carry a link, the nearest first, to the root."""
+    above = parent_joints(urdf)
+    while link in above:
+        yield above[link]
+        link = above[link].parent
 
 
 def chain_between(urdf: Urdf, base: str, tip: str, points: Sequence[str], source: str) -> UrdfChain:
@@ -153,15 +161,11 @@ def _moved(
     passive = master in numbers
     number = numbers.setdefault(master, len(numbers) + 1)
     words = [*before, *([fixed] if fixed else []), f"{kind}{letter}({'-' if negative else ''}q{number})", *after]
-    turn, step = np.eye(4), np.eye(4)
+    turn = np.eye(4)
     turn[:3, :3] = axis_rotation(axis)
     if not passive:
         return words, Carried(number, turn.T, False)
-    amount = -offset if minus else offset
-    if kind == "R":
-        step[:3, :3] = rotation_about(letter, amount)
-    else:
-        step["xyz".index(letter), 3] = amount
+    step = elementary(kind, "xyz".index(letter), -offset if minus else offset)
     return words, Carried(place.body, place.transform @ turn @ step @ turn.T, place.behind_passive or kind == "R")
 
 
@@ -174,7 +178,7 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     path, at = [], tip
     while at != base:
         if at not in above:
-            raise InputError(source, f"base {base!r}, tip {tip!r}", _relation(above, base, tip), "a tip that the base carries")
+            raise InputError(source, f"base {base!r}, tip {tip!r}", _relation(urdf, base, tip), "a tip that the base carries")
         path.append(above[at])
         at = above[at].parent
     path.reverse()
@@ -186,12 +190,9 @@ def _path(urdf: Urdf, base: str, tip: str, source: str) -> list[Joint]:
     return path
 
 
-def _relation(above: Mapping[str, Joint], base: str, tip: str) -> str:
-    at = base
-    while at in above:
-        at = above[at].parent
-        if at == tip:
-            return "a base that the tip carries (give them the other way round)"
+def _relation(urdf: Urdf, base: str, tip: str) -> str:
+    if any(joint.parent == tip for joint in joints_above(urdf, base)):
+        return "a base that the tip carries (give them the other way round)"
     return "two branches of the tree"
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.parsers import expat
@@ -17,8 +18,8 @@ from xml.parsers import expat
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import axis_rotation, rotation_about, yaw_pitch_roll
-from elastocal.exchange.urdf_chain import chain_between, parent_joints, point_name
+from elastocal.exchange.fixed_transforms import axis_rotation, elementary, yaw_pitch_roll
+from elastocal.exchange.urdf_chain import chain_between, joints_above, point_name
 from elastocal.exchange.urdf_reading import LARGEST_BYTES, read_urdf
 from elastocal.io.texts import read_bytes
 from elastocal.mechanics.chain import parse_chain
@@ -115,11 +116,7 @@ def _difference(chain: Chain, other: Chain, names: list[str]) -> tuple[int, str,
 
 
 def _path(urdf: Urdf, base: str | None, tip: str) -> list[Joint]:
-    above, found, at = parent_joints(urdf), [], tip
-    while at != base and at in above:
-        found.append(above[at])
-        at = above[at].parent
-    return found[::-1]
+    return [*takewhile(lambda joint: joint.child != base, joints_above(urdf, tip))][::-1]
 
 
 def _stretches(chain: Chain) -> tuple[list[np.ndarray], list[Transform]]:
@@ -127,20 +124,11 @@ def _stretches(chain: Chain) -> tuple[list[np.ndarray], list[Transform]]:
     fixed, moving = [np.eye(4)], []
     for transform in chain.transforms:
         if transform.coordinate is None:
-            fixed[-1] = fixed[-1] @ _displacement(transform, transform.constant)
+            fixed[-1] = fixed[-1] @ elementary(transform.kind, transform.axis, transform.constant)
         else:
             moving.append(transform)
             fixed.append(np.eye(4))
     return fixed, moving
-
-
-def _displacement(transform: Transform, amount: float) -> np.ndarray:
-    found = np.eye(4)
-    if transform.kind == "T":
-        found[transform.axis, 3] = amount
-    else:
-        found[:3, :3] = rotation_about("xyz"[transform.axis], amount)
-    return found
 
 
 def _origins(path: list[Joint], nominal: Robot, calibrated: Robot) -> dict[str, np.ndarray]:
@@ -158,7 +146,7 @@ def _origins(path: list[Joint], nominal: Robot, calibrated: Robot) -> dict[str, 
             transform = moving[number]
             assert transform.coordinate is not None
             to_chain = np.linalg.inv(here) @ before[number]
-            error = error @ _displacement(transform, transform.sign * offset[transform.coordinate])
+            error = error @ elementary(transform.kind, transform.axis, transform.sign * offset[transform.coordinate])
             change = to_chain @ error @ np.linalg.inv(to_chain)
             number, here = number + 1, np.eye(4)
             here[:3, :3] = axis_rotation(joint.axis).T
@@ -179,7 +167,7 @@ def _edited(content: bytes, origins: Mapping[str, np.ndarray]) -> bytes:
         origin = origins[name]
         yaw, pitch, roll = yaw_pitch_roll(origin[:3, :3])
         values = {b"xyz": origin[:3, 3], b"rpy": np.array([roll, pitch, yaw])}
-        if tag.startswith(b"<") and tag[1:].split(None, 1)[0].rpartition(b":")[2] == b"origin":
+        if tag[1:].split(None, 1)[0].rpartition(b":")[2] == b"origin":
             for attribute, numbers in values.items():
                 tag = _with_attribute(tag, attribute, _words(numbers))
             parts += [content[done:start], tag]

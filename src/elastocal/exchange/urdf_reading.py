@@ -20,7 +20,7 @@ from xml.parsers import expat
 import numpy as np
 
 from elastocal.errors import InputError
-from elastocal.exchange.fixed_transforms import rotation_about
+from elastocal.exchange.fixed_transforms import origin_transform
 from elastocal.io.texts import LARGEST_NUMBER, plain_number, read_bytes
 
 if TYPE_CHECKING:
@@ -115,10 +115,7 @@ def _link(part: Element) -> Link:
 
 
 def _joint(part: Element) -> Joint:
-    roll, pitch, yaw = _values(part, "origin", "rpy", "0 0 0")
-    origin = np.eye(4)
-    origin[:3, :3] = rotation_about("z", yaw) @ rotation_about("y", pitch) @ rotation_about("x", roll)
-    origin[:3, 3] = _values(part, "origin", "xyz", "0 0 0")
+    origin = origin_transform(*(_values(part, "origin", name, "0 0 0") for name in ("xyz", "rpy")))
     (lower,), (upper,) = _values(part, "limit", "lower", "0"), _values(part, "limit", "upper", "0")
     (multiplier,), (offset,) = _values(part, "mimic", "multiplier", "1"), _values(part, "mimic", "offset", "0")
     mimic = None if part.find("mimic") is None else Mimic(_end(part, "mimic", "joint"), multiplier, offset)

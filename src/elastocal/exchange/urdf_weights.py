@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from elastocal.exchange.urdf_chain import parent_joints
+from elastocal.exchange.urdf_chain import joints_above, parent_joints
 from elastocal.mechanics.robot import STANDARD_GRAVITY
 
 if TYPE_CHECKING:
@@ -94,10 +94,9 @@ def gravity_in_base(urdf: Urdf, base: str) -> list[float] | None:
     list of float or None
         None where it points down the link's z axis.
     """
-    above, transform, at = parent_joints(urdf), np.eye(4), base
-    while at in above:
-        transform = above[at].origin @ transform
-        at = above[at].parent
+    transform = np.eye(4)
+    for joint in joints_above(urdf, base):
+        transform = joint.origin @ transform
     gravity = np.round(-STANDARD_GRAVITY * transform[2, :3], _DECIMALS) + 0.0
     return None if gravity[2] == -STANDARD_GRAVITY else gravity.tolist()
 

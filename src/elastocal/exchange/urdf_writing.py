@@ -18,7 +18,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from elastocal.exchange.fixed_transforms import rotation_about, yaw_pitch_roll
+from elastocal.exchange.fixed_transforms import elementary, yaw_pitch_roll
 
 if TYPE_CHECKING:
     from elastocal.mechanics.chain import Transform
@@ -66,10 +66,10 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
             break
         transform = robot.chain.transforms[place]
         if transform.coordinate is None:
-            here = here @ _moved(transform, transform.constant)
+            here = here @ elementary(transform.kind, transform.axis, transform.constant)
             continue
         joint, passive = transform.coordinate, robot.chain.is_passive(place)
-        start = here @ _moved(transform, transform.sign * zero[joint])
+        start = here @ elementary(transform.kind, transform.axis, transform.sign * zero[joint])
         name = f"{names[joint]}_again_{place}" if passive else names[joint]
         child = f"passive_{place}" if passive else f"link_{joint + 1}"
         _joint(root, robot, transform, name, parent, child, start, sense[joint], zero[joint], names[joint] if passive else "")
@@ -77,15 +77,6 @@ def urdf_of(robot: Robot, comment: str = "") -> str:
         parent, here = child, np.eye(4)
     Xml.indent(root)
     return '<?xml version="1.0"?>\n' + Xml.tostring(root, encoding="unicode") + "\n"
-
-
-def _moved(transform: Transform, amount: float) -> np.ndarray:
-    found = np.eye(4)
-    if transform.kind == "T":
-        found[transform.axis, 3] = amount
-    else:
-        found[:3, :3] = rotation_about("xyz"[transform.axis], amount)
-    return found
 
 
 def _joint(

@@ -126,11 +126,13 @@ def input_digests(paths: Iterable[str], checked: Collection[str] | None = None) 
     """
     digests, own = {}, []
     for path in map(str, paths):
-        if checked is None or path in checked:
-            digests[path] = _intact(path)[1] if _made(path) else _joint({file: checksum(file) for file in files_of(path)})
+        judged = checked is None or path in checked
+        if judged and _made(path):
+            digests[path] = _intact(path)[1]
         else:
             digests[path] = _joint({file: checksum(file) for file in files_of(path)})
-            own += [] if record_of(path).is_file() else [path]
+        if not judged and not record_of(path).is_file():
+            own.append(path)
     return digests, tuple(own)
 
 
