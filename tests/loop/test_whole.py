@@ -16,6 +16,7 @@ from elastocal.diagnosis.hypotheses import OTHER
 from elastocal.diagnosis.judge import judge
 from elastocal.diagnosis.settings import Settings
 from elastocal.loop.whole import cases_in, diagnosed
+from elastocal.report.first_page import sentences
 
 ROBOTS = Path(__file__).resolve().parents[2] / "config" / "robots"
 # Loads in both senses, for what comes with the load and is in no catalogue.
@@ -136,6 +137,7 @@ import sys
 opened = []
 sys.addaudithook(lambda event, details: opened.append(str(details[0])) if event == "open" else None)
 from elastocal.loop.whole import diagnosed
+from elastocal.report.first_page import sentences
 diagnosed(*sys.argv[1:3], 1)
 print("\\n".join(opened))
 """
@@ -174,3 +176,14 @@ def test_a_lost_beam_changes_nothing_in_what_is_stated_of_the_accuracy(kuka, tmp
         stated.append(diagnosed(folder.as_posix(), ROBOTS.as_posix(), 1))
     assert stated[1]["gross_errors"]
     assert stated[1]["accuracy"]["rms_m"] == pytest.approx(stated[0]["accuracy"]["rms_m"], rel=0.1)
+
+
+@pytest.mark.parametrize(("kind", "stated"), [("adequate", ["a contradiction"]), ("unexplained", [])])
+def test_what_contradicts_an_adequate_model_is_stated_of_no_other(kind, stated, kuka, tmp_path, monkeypatch):
+    """Where an alarm was raised it is the residual that is unexplained, and the report says that."""
+    monkeypatch.setattr("elastocal.diagnosis.diagnose.contradictions", lambda *_: ["a contradiction"])
+    verdict = diagnosed(folder_of(tmp_path, kuka, kind).as_posix(), ROBOTS.as_posix(), 1)
+    assert (verdict["verdict"], verdict["contradictions"]) == ("unexplained", stated)
+    text = " ".join(sentences(verdict))
+    assert ("the declared model cannot be right: a contradiction" in text) == bool(stated)
+    assert ("residual of the declared model is more than noise" in text) != bool(stated)

@@ -179,11 +179,10 @@ def diagnose(case: Case, settings: Settings, seed: int, progress: Callable[[str]
         elif lost and lost[0]:
             kept = fit(bare.model, case.observations, steps[-1].fitted.noise, bare.estimate)
             steps.append(Step("frames and targets, kept", "kept", kept))
-    contradicting: list[str] = []
-    if found and found.conclusion.verdict in (ADEQUATE, UNEXPLAINED):
-        contradicting = contradictions(final, noise, settings)
-        verdict = UNEXPLAINED if contradicting else found.conclusion.verdict
-        found = replace(found, conclusion=replace(found.conclusion, verdict=verdict))
+    adequate = found is not None and found.conclusion.verdict == ADEQUATE
+    contradicting = contradictions(final, noise, settings) if adequate else []
+    if found and contradicting:
+        found = replace(found, conclusion=replace(found.conclusion, verdict=UNEXPLAINED))
     warnings = [*contradicting, *part.warnings, *filter(None, lost)]
     document = _document(case, noise, steps, final, found, known, settings, warnings)
     left_out = entries_of(errors, whole, held_out=False)
